@@ -13,10 +13,10 @@ from typing import Annotated, Any
 import typer
 
 from rrtik_ompl.cli.bench import bench
+from rrtik_ompl.cli.drawing import overlay, play
 from rrtik_ompl.cli.ik import inverse_kinematics
 from rrtik_ompl.cli.markers import markers
 from rrtik_ompl.cli.motion import list_moves, time_path
-from rrtik_ompl.cli.overlay import overlay
 from rrtik_ompl.cli.pilot import pilot
 from rrtik_ompl.cli.plan import plan
 from rrtik_ompl.cli.reach import reach
@@ -212,6 +212,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "task": task,
     "check": check,
     "show": show,
+    "play": play,
     "moves": list_moves,
     "time": time_path,
     "replan": replan_scenario,

@@ -13,15 +13,17 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import write_text
 
 if TYPE_CHECKING:
+    from rrtik_ompl.problem import Problem
     from rrtik_ompl.replanning.record import ReplanRun
     from rrtik_ompl.tasks import TaskPlan
     from rrtik_ompl.viewer.drawing.marks import Mark
     from rrtik_ompl.viewer.subject import Showable, ShownPath
 
-__all__ = ["view"]
+__all__ = ["play", "view"]
 
 
 def view(
@@ -79,3 +81,39 @@ def view(
         on_ready(server.url)
         server.wait()
     return None
+
+
+def play(
+    problem: Problem,
+    path: ShownPath | None = None,
+    *,
+    port: int = 0,
+    on_ready: Callable[[str], object] = webbrowser.open,
+) -> None:
+    """Serve the page that plans, with this process as a second opinion, until Ctrl-C is pressed.
+
+    Whatever is dragged, the page finds a path by itself, and sends it here to be proven; it says what this process
+    found.
+
+    Args:
+        problem: A problem.
+        path: Its first path: a ``JointPath``, or waypoints of shape (k, dof) [rad or m]; none if None.
+        port: On 127.0.0.1; a free one if 0.
+        on_ready: Called with the URL once the page is being served; opens the browser unless something else is given.
+
+    Raises:
+        InputError: If the page of this problem cannot plan, or the port cannot be used.
+    """
+    from rrtik_ompl.viewer.opinion import opinion
+    from rrtik_ompl.viewer.page import page
+    from rrtik_ompl.viewer.serve import PageServer
+
+    text = page(problem, path, asks=True)
+    if '"plan":null' in text:
+        raise InputError(
+            f"{problem.name}: its page cannot plan: give a path or a goal of joint values, no path constraints and "
+            "no obstacles that move; or use rrtik show"
+        )
+    with PageServer(text, port, lambda asked: opinion(problem, asked)) as server:
+        on_ready(server.url)
+        server.wait()

@@ -20,9 +20,10 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.transitions import single_joint
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.marks import Mark
-from rrtik_ompl.viewer.page_planner import page_planner
+from rrtik_ompl.viewer.page_planner import packed, page_planner
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import play_pace, story_of
 from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
@@ -32,9 +33,21 @@ from rrtik_ompl.viewer.task_story import held_in, run_of
 # WebAssembly may be compiled, text may not be run as script.
 SCRIPT_POLICY = "script-src 'unsafe-inline' 'wasm-unsafe-eval'"
 POLICY = f"default-src 'none'; {SCRIPT_POLICY}; style-src 'unsafe-inline'; img-src data: blob:"
+ASKING_POLICY = f"{POLICY}; connect-src 'self'"  # of a page that asks this machine, and nobody else
 SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "clearance.js", "player.js")
 BOX_SHARE = 0.1  # side of a box that is added, of the arm
-PLANNING = ("kernels.js", "obstacles.js", "planner.js", "controls.js")
+STARTING = ("unpack.js", "start.js")
+PLANNING = (
+    "kernels.js",
+    "obstacles.js",
+    "moves.js",
+    "shapes.js",
+    "saving.js",
+    "opinion.js",
+    "planner.js",
+    "dragging.js",
+    "controls.js",
+)
 
 
 def page(
@@ -47,6 +60,7 @@ def page(
     run: ReplanRun | None = None,
     title: str | None = None,
     still: bool = False,
+    asks: bool = False,
 ) -> str:
     """The page that shows something, as the text of one HTML file that needs no other file and no network.
 
@@ -61,6 +75,7 @@ def page(
         run: A run to replay in place of a path; obstacles are where they were.
         title: Heading; made from the problem's or the robot's name if None.
         still: Whether to leave out what plans in the page.
+        asks: Whether the page asks whoever serves it about each path that it finds.
 
     Raises:
         InputError: If that cannot be shown.
@@ -73,16 +88,19 @@ def page(
     heading = _title(subject) if title is None else title
     told = story_of(subject, frame, heading)
     told["plan"] = None if still else _planning(shown, subject, frame)
+    if told["plan"]:
+        told["plan"]["asks"] = asks
     story = json.dumps(told, allow_nan=False, separators=(",", ":"))
     return Template(_asset("page.html")).substitute(
         title=html.escape(heading),
-        policy=html.escape(POLICY),
+        policy=html.escape(ASKING_POLICY if asks else POLICY),
         style=_asset("page.css"),
         notice=_meshcat("main.min.js.LICENSE.txt").replace("--", "- -"),
-        meshcat=_meshcat("main.min.js"),
+        meshcat=_packed_engine(),
         story=story.replace("<", "\\u003c"),  # so that no name can end the element that holds it
-        commands=json.dumps([base64.b64encode(command).decode("ascii") for command in recording.commands], indent=0),
+        commands=packed(json.dumps([base64.b64encode(each).decode("ascii") for each in recording.commands]).encode()),
         script="\n".join(_asset(name) for name in SCRIPTS + (PLANNING if told["plan"] else ())),
+        start="\n".join(_asset(name) for name in STARTING),
     )
 
 
@@ -91,7 +109,8 @@ def _planning(shown: Showable, subject: Subject, frame: Frame) -> dict[str, Any]
     plain = subject.run is None and subject.times is None and subject.ghosts is None
     if not isinstance(shown, Problem) or subject.end is None or not plain:
         return None
-    found = page_planner(shown, subject.end, BOX_SHARE * frame.arm)
+    one_joint = subject.is_path and bool(single_joint(subject.waypoints))
+    found = page_planner(shown, subject.end, BOX_SHARE * frame.arm, one_joint=one_joint)
     return None if found is None else found | play_pace(shown.robot, frame.arm)
 
 
@@ -107,6 +126,11 @@ def _title(subject: Subject) -> str:
 @cache
 def _asset(name: str) -> str:
     return files("rrtik_ompl.viewer").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+@cache
+def _packed_engine() -> str:
+    return packed(_meshcat("main.min.js").encode("utf-8"))
 
 
 @cache

@@ -6,65 +6,43 @@ import base64
 import gzip
 from collections.abc import Iterable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.shape_table import core_of
 from rrtik_ompl.collision.solids import SameObject
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.ik import ik_layout
-from rrtik_ompl.fast.search import connect_layout, shortcut_layout, tree_layout
-from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.motions import motion_layout
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
-from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE
 from rrtik_ompl.fast.tables.scene_tables import SLACK_PER_METRE as PRIMITIVE_SLACK
 from rrtik_ompl.fast.tables.scene_tables import primitive_kind
-from rrtik_ompl.fast.tables.scratch import probe_table
 from rrtik_ompl.fast.tables.solid_tables import SLACK_PER_METRE as SOLID_SLACK
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
-from rrtik_ompl.fast.wasm.image import MemoryImage
 from rrtik_ompl.fast.wasm.page_kernels import page_kernels
-from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
-from rrtik_ompl.ik.numeric.kernel_call import call_table
-from rrtik_ompl.ik.serial_chain import limb_of
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.problem_files.problem import problem_data
 from rrtik_ompl.scene import Obstacle
-from rrtik_ompl.shapes import Box
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
+from rrtik_ompl.viewer.page_tables import BASE, layout_numbers, page_tables
 from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
 
-BASE = 1 << 20  # where the image begins; the stack of the kernels lies below
-VERTICES = 1 << 14  # of each tree
-PATH_ROWS = 2048
 SAMPLES = 60_000  # of a search
 TRIES = 2000  # of shortcuts
-SPARE_BOXES = 4
+SPARES = {"box": 4, "sphere": 2, "cylinder": 2, "capsule": 2}  # what a person can add
 FAR_AWAY = 1e3  # [m] below the arm
 PATH_RESULTS = ("length", "transitions", "waypoints")  # of a path's file; the page adds its own
-LAYOUTS: dict[str, ModuleType] = {
-    "table": layout,
-    "motion": motion_layout,
-    "tree": tree_layout,
-    "connect": connect_layout,
-    "shortcut": shortcut_layout,
-    "ik": ik_layout,
-}
 
 
-def page_planner(problem: Problem, goal: Vector, side: float) -> dict[str, Any] | None:
+def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool = False) -> dict[str, Any] | None:
     """What the page of a problem reads to plan from its start to joint values, as values of JSON.
 
     None where it cannot plan: there are no kernels, tasks constrain the path, obstacles move by themselves, or joints
@@ -73,35 +51,30 @@ def page_planner(problem: Problem, goal: Vector, side: float) -> dict[str, Any] 
     Args:
         problem: What the page shows.
         goal: Where its path ends, shape (dof,).
-        side: Of the boxes that a person may add [m].
+        side: Of the obstacles that a person may add, before they are made another size [m].
+        one_joint: Whether the page moves one joint at a time at first.
     """
     if problem.constraints or any(obstacle.motion is not None for obstacle in problem.world.scene.obstacles):
         return None
     document = _document(problem)
-    problem, spare = _with_spare_boxes(problem, side)
+    problem, spare = _with_spares(problem, side)
     room = room_between(problem.world, np.stack([problem.start, goal]), None) or Room(0.0, 0.0)
     world = leaving_room(densely_checked(problem).world, room)
-    module, motions, limb = page_kernels(), world.motions, limb_of(problem.robot)
+    module, motions = page_kernels(), world.motions
     if module is None or motions is None:
         return None
-    lower, upper = problem.robot.finite_range()
     try:
-        search = ConnectSearch(motions, lower, upper, vertices=VERTICES)
-        shortcuts = ShortcutSearch(motions, np.zeros((PATH_ROWS, problem.robot.dof)) + problem.start, asking=False)
+        image, places = page_tables(problem, world, motions)
     except InputError:  # beyond what the margins of the kernels cover
         return None
-    still, image = JointPath.of(problem.robot, problem.start[None]), MemoryImage(BASE)
-    places = _add_searches(image, motions, search, shortcuts)
-    if limb is not None:
-        places |= {"limb": image.add(limb), "ik": image.add(call_table(limb, STEPS, PATIENCE))}
-    places["probe"] = image.add(probe_table(motions.fast.tables[layout.OUTER_PRIMITIVES : layout.INNER_PRIMITIVES + 1]))
+    still, (lower, upper) = JointPath.of(problem.robot, problem.start[None]), problem.robot.finite_range()
     return {
-        "module": _packed(module),
-        "image": _packed(image.bytes()),
+        "module": packed(module),
+        "image": packed(image.bytes()),
         "base": BASE,
         "end": image.end,
         "places": places,
-        "names": {name: _numbers_of(module) for name, module in LAYOUTS.items()},
+        "names": layout_numbers(),
         "width": WIDTH,
         "dof": problem.robot.dof,
         "lower": lower.tolist(),
@@ -111,6 +84,7 @@ def page_planner(problem: Problem, goal: Vector, side: float) -> dict[str, Any] 
         "far": UNBOUNDED_COORDINATE,
         "slack": {"primitive": PRIMITIVE_SLACK, "solid": SOLID_SLACK},
         "clearance": room.kept,
+        "planner": "BiCRDT" if one_joint else "RRTConnect",
         "start": problem.start.tolist(),
         "goal": goal.tolist(),
         "obstacles": _obstacles(problem.world, motions.fast, room.searched, spare),
@@ -129,62 +103,34 @@ def _document(problem: Problem) -> dict[str, Any] | None:
         return None
 
 
-def _with_spare_boxes(problem: Problem, side: float) -> tuple[Problem, set[str]]:
-    """The problem with boxes far away, of which the page can take some, and their names."""
+def _with_spares(problem: Problem, side: float) -> tuple[Problem, set[str]]:
+    """The problem with simple shapes far away, of which the page can take some, and their names."""
     scene = problem.world.scene
     taken = {obstacle.name for obstacle in scene.obstacles} | {held.name for held in scene.attached}
-    names = [name for name in (f"box {k}" for k in range(1, SPARE_BOXES + len(taken) + 1)) if name not in taken]
-    boxes = [Obstacle(name, Box([side] * 3), pose([0.0, 0.0, -FAR_AWAY])) for name in names[:SPARE_BOXES]]
-    return problem.with_world(problem.world.with_scene(scene.with_(*boxes))), set(names[:SPARE_BOXES])
+    shapes = {
+        "box": Box([side] * 3),
+        "sphere": Sphere(0.5 * side),
+        "cylinder": Cylinder(0.5 * side, side),
+        "capsule": Capsule(0.3 * side, side),
+    }
+    far, spares = pose([0.0, 0.0, -FAR_AWAY]), []
+    for key, count in SPARES.items():
+        names = [name for name in (f"{key} {k}" for k in range(1, count + len(taken) + 1)) if name not in taken]
+        spares += [Obstacle(name, shapes[key], far) for name in names[:count]]
+    return problem.with_world(problem.world.with_scene(scene.with_(*spares))), {spare.name for spare in spares}
 
 
 def _names(world: World, numbers: Iterable[int]) -> str:
     return ", ".join(dict.fromkeys(world.bodies[number].name for number in numbers))
 
 
-def _add_searches(
-    image: MemoryImage, motions: FastMotions, search: ConnectSearch, shortcuts: ShortcutSearch
-) -> dict[str, int]:
-    """Add the tables of a world and of the searches in it; where the page finds them."""
-    fast = motions.fast
-    for each in fast.tables:
-        image.add(each)
-    image.add(fast.table, links=dict(enumerate(fast.tables)))
-    image.add(motions.table, links={motion_layout.WORLD: fast.table})
-    alias = {tree_layout.VALUES: tree_layout.ROWS} if motions.identity else {}
-    for tree in search.trees:
-        image.add(tree, same=alias)
-    starts, goals, _ = search.rows
-    path: Matrix = np.zeros((PATH_ROWS, motions.dof))
-    for rows in (starts, goals, path):
-        image.add(rows)
-    links: dict[int, Any] = {connect_layout.MOTIONS: motions.table, connect_layout.PATH: path}
-    links |= {connect_layout.START_TREE + side: tree for side, tree in enumerate(search.trees)}
-    links |= {connect_layout.START_ROWS: starts, connect_layout.GOAL_ROWS: goals}
-    values = {connect_layout.ROW_VALUES: connect_layout.ROW} if motions.identity else {}
-    image.add(search.table, links=links, same=values)
-    image.add(shortcuts.table, links={shortcut_layout.MOTIONS: motions.table})
-    return {
-        "world": image.place(fast.table),
-        "motions": image.place(motions.table),
-        "search": image.place(search.table),
-        "shortcuts": image.place(shortcuts.table),
-        "pathRows": PATH_ROWS,
-    }
-
-
-def _numbers_of(module: ModuleType) -> dict[str, int]:
-    """The whole numbers that a layout names."""
-    return {name: value for name, value in vars(module).items() if name.isupper() and type(value) is int}
-
-
 def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str]) -> list[dict[str, Any]]:
     """The obstacles of simple shapes, which a page can move: how they are packed, and what is kept from each [m]."""
-    found = []
+    found, shapes = [], {obstacle.name: obstacle.shape for obstacle in world.scene.obstacles}
     for place, number in enumerate(fast.standing):
         body = world.bodies[number]
-        packed = _packed_shape(body)
-        if packed is not None:
+        packed, shape = _packed_shape(body), shapes.get(body.name)
+        if packed is not None and shape is not None and shape.key in SPARES:
             placed = body.placement.homogeneous
             found.append(
                 {
@@ -194,10 +140,17 @@ def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str]) -> l
                     "spare": body.name in spare,
                     "margin": body.margin + kept,
                     "pose": placed.ravel().tolist(),
+                    "shape": shape.key,
+                    "sizes": _sizes(shape),
                     **packed,
                 }
             )
     return found
+
+
+def _sizes(shape: Shape) -> list[float]:
+    """Its measures in the order of a problem's file [m]."""
+    return [float(size) for measure in shape.measures for size in np.ravel(getattr(shape, measure.name))]
 
 
 def _packed_shape(body: Body) -> dict[str, Any] | None:
@@ -218,6 +171,6 @@ def _packed_shape(body: Body) -> dict[str, Any] | None:
     }
 
 
-def _packed(data: bytes) -> str:
+def packed(data: bytes) -> str:
     """Bytes as text that a page unpacks."""
     return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode("ascii")

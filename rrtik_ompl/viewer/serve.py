@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import socketserver
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
 from typing import TypeAlias
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.viewer.page import POLICY
+from rrtik_ompl.viewer.page import ASKING_POLICY, POLICY
 
 ADDRESS = "127.0.0.1"
 MOST_OPEN = 64  # connections at a time; a browser has some six
 OPEN_SECONDS = 60.0  # of a connection at most, however slowly its bytes trickle
 LOOK_SECONDS = 0.5
+QUESTIONS = "/opinion"
+LONGEST_QUESTION = 1 << 24  # bytes
 
 Taken: TypeAlias = socket.socket | tuple[bytes, socket.socket]  # the second of packets, of which there are none here
 
@@ -31,18 +35,19 @@ class PageServer:
     Args:
         text: The page.
         port: Port to listen on; a free one if 0.
+        answer: Answers what the page asks (POST): the body to what can be written as JSON. One question at a time.
 
     Raises:
         InputError: If the port cannot be used.
     """
 
-    def __init__(self, text: str, port: int = 0) -> None:
+    def __init__(self, text: str, port: int = 0, answer: Callable[[bytes], object] | None = None) -> None:
         try:
             self._server = _Server((ADDRESS, port), _Handler)
         except (OSError, OverflowError, TypeError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"port {port}: cannot be used: {reason}; choose another one, or 0 for any") from error
-        self._server.body = text.encode("utf-8")
+        self._server.body, self._server.answer = text.encode("utf-8"), answer
         self._thread = threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
 
     @property
@@ -83,9 +88,11 @@ class _Server(socketserver.ThreadingTCPServer):
     daemon_threads = True
     request_queue_size = MOST_OPEN  # of those who wait to be taken; whoever finds no place waits a second
     body = b""
+    answer: Callable[[bytes], object] | None = None
 
     def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:
         self._open: dict[Taken, float] = {}
+        self.answering = threading.Lock()
         super().__init__(address, handler)
 
     def process_request(self, request: Taken, client_address: object) -> None:
@@ -126,21 +133,40 @@ class _Handler(BaseHTTPRequestHandler):
         """Answer with the page's headers."""
         self._answer(send_body=False)
 
+    def do_POST(self) -> None:
+        """Answer a question of the page, in JSON."""
+        length = self.headers.get("Content-Length", "")
+        if not self._is_local() or self.headers.get("Origin") is None:
+            self.send_error(HTTPStatus.FORBIDDEN)
+        elif self.server.answer is None or self.path != QUESTIONS:
+            self.send_error(HTTPStatus.NOT_FOUND)
+        elif not length.isdecimal() or int(length) > LONGEST_QUESTION:
+            self.send_error(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+        else:
+            asked = self.rfile.read(int(length))
+            with self.server.answering:
+                answer = json.dumps(self.server.answer(asked))
+            self._send("application/json", answer.encode("utf-8"), send_body=True)
+
     def _answer(self, send_body: bool) -> None:
         if not self._is_local():
             self.send_error(HTTPStatus.FORBIDDEN)
         elif self.path.split("?")[0] != "/":
             self.send_error(HTTPStatus.NOT_FOUND)
         else:
-            self.send_response(HTTPStatus.OK)
-            self.send_header("Content-Type", "text/html; charset=utf-8")
-            self.send_header("Content-Length", str(len(self.server.body)))
-            self.send_header("Content-Security-Policy", f"{POLICY}; frame-ancestors 'none'")
-            self.send_header("X-Content-Type-Options", "nosniff")
-            self.send_header("Cache-Control", "no-store")
-            self.end_headers()
-            if send_body:
-                self.wfile.write(self.server.body)
+            self._send("text/html; charset=utf-8", self.server.body, send_body)
+
+    def _send(self, kind: str, body: bytes, send_body: bool) -> None:
+        policy = POLICY if self.server.answer is None else ASKING_POLICY
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.send_header("Content-Security-Policy", f"{policy}; frame-ancestors 'none'")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        if send_body:
+            self.wfile.write(body)
 
     def _is_local(self) -> bool:
         port = self.server.server_address[1]

@@ -5,8 +5,10 @@ import shutil
 import subprocess
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -15,12 +17,17 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.fast.search.connect import ConnectSearch
+from rrtik_ompl.fast.search.crdt.rules import CrdtRules
+from rrtik_ompl.fast.search.crdt.search import CrdtSearch
+from rrtik_ompl.fast.search.motions.motion_table import step_counts
 from rrtik_ompl.fast.tables.layout import FREE
 from rrtik_ompl.generated_problems import generated_problem
+from rrtik_ompl.moves.axis_cut import double_axis_cut
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.viewer.page import page
-from rrtik_ompl.viewer.page_planner import SAMPLES, VERTICES, page_planner
+from rrtik_ompl.viewer.page_planner import SAMPLES, page_planner
+from rrtik_ompl.viewer.page_tables import VERTICES
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
 from rrtik_tests.browser import CHROMIUM, DRAWING_3D, Browser
 
@@ -30,25 +37,28 @@ ASSETS = files("rrtik_ompl.viewer").joinpath("assets")
 RUN = """
 const fs = require("fs");
 const read = (name) => fs.readFileSync(`${process.argv[2]}/${name}`, "utf8");
-const source = ["kernels.js", "obstacles.js"].map(read).join("");
-const shown = "{ Kernels, placeObstacle, hasKernels }";
-const { Kernels, placeObstacle, hasKernels } = new Function(`${source}; return ${shown}`)();
+const source = ["unpack.js", "kernels.js", "obstacles.js", "moves.js", "shapes.js"].map(read).join("");
+const shown = "{ Kernels, placeObstacle, hasKernels, searchMoves, fewerMoves, resized }";
+const parts = new Function(`${source}; return ${shown}`)();
+const { Kernels, placeObstacle, hasKernels, searchMoves, fewerMoves, resized } = parts;
+const result = (work) => {
+  let step = work.next();
+  while (!step.done) step = work.next();
+  return step.value;
+};
 (async () => {
   const { plan, seeds, moves, poses } = JSON.parse(fs.readFileSync(0, "utf8"));
   const kernels = await Kernels.load(plan);
-  const paths = seeds.map((seed) => kernels.search_path(plan.start, plan.goal, seed));
-  const short = paths.map((path, k) => {
-    if (path === null) return null;
-    kernels.beginShortening(path, seeds[k]);
-    while (!kernels.goOnShortening(5));
-    return kernels.shortened();
-  });
+  const paths = seeds.map((seed) => result(kernels.searchPath(plan.start, plan.goal, seed)));
+  const short = paths.map((path, k) => (path === null ? null : [...kernels.shortened(path, seeds[k])].pop()));
+  const moved = seeds.map((seed) => result(searchMoves(kernels, plan.start, plan.goal, seed)));
+  const fewer = moved.map((path) => (path === null ? null : result(fewerMoves(kernels, path))));
   const reached = poses.map(({ pose, from }) => kernels.reach(pose, from));
-  const free = moves.map(({ obstacle, pose, Q }) => {
-    placeObstacle(kernels, plan.obstacles[obstacle], pose);
+  const free = moves.map(({ obstacle, pose, sizes, Q }) => {
+    placeObstacle(kernels, sizes ? resized(plan.obstacles[obstacle], sizes) : plan.obstacles[obstacle], pose);
     return Q.map((q) => kernels.free(q));
   });
-  console.log(JSON.stringify({ has: hasKernels(), paths, short, reached, free }));
+  console.log(JSON.stringify({ has: hasKernels(), paths, short, moved, fewer, reached, free }));
 })();
 """
 
@@ -70,6 +80,12 @@ def searched_world(problem: Problem) -> rrtik.World:
 
 def refused(A: Matrix, B: Matrix) -> np.ndarray:
     return np.zeros(len(A), dtype=bool)
+
+
+def proven(world: rrtik.World, A: Matrix, B: Matrix) -> np.ndarray:
+    """Which motions the kernels prove free."""
+    values, steps = world.robot.joint_values, step_counts(A, B, world.weights, world.motion_resolution)
+    return world.fast.classify_edges(values(A), values(B), steps) == FREE
 
 
 PROBLEMS = {
@@ -98,6 +114,24 @@ def test_searches_in_the_page_find_pythons_paths(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
+def test_searches_of_single_joint_moves_find_pythons_paths(name, tmp_path):
+    problem, seeds = PROBLEMS[name](), [1, 2, 3]
+    found = in_node(page_planner(problem, problem.goal.q, 0.1), tmp_path, seeds=seeds)
+    world = searched_world(problem)
+    same, none = np.ones(problem.robot.dof), np.zeros(problem.robot.dof)
+    refusing = SimpleNamespace(motions=world.motions, robot=problem.robot, motion_valid_batch=refused)
+    rules = CrdtRules(*problem.robot.finite_range(), same, none, same)
+    for seed, path, fewer in zip(seeds, found["moved"], found["fewer"], strict=True):
+        search = CrdtSearch(refusing, rules, seed, SAMPLES, problem.start[None], problem.goal.q[None])
+        assert search.advance(lambda: False)
+        one, two = search.meeting()
+        np.testing.assert_array_equal(path, np.vstack([one, two[-2::-1]]))
+        cut = double_axis_cut(path, partial(proven, world))
+        np.testing.assert_array_equal(fewer, cut)
+        assert rrtik.JointPath.of(problem.robot, np.array(fewer)).one_joint_at_a_time
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_moved_obstacles_are_packed_as_python_packs_them(name, tmp_path):
     problem, rng = PROBLEMS[name](), np.random.default_rng(3)
     plan = page_planner(problem, problem.goal.q, 0.1)
@@ -118,13 +152,19 @@ def test_moved_obstacles_are_packed_as_python_packs_them(name, tmp_path):
     np.testing.assert_array_equal(in_node(plan, tmp_path, moves=moves)["free"], wanted)
 
 
-def test_every_kind_of_obstacle_that_can_be_dragged_is_packed_alike(tmp_path):
+def test_every_kind_of_obstacle_is_packed_alike_wherever_and_however_large(tmp_path):
     robot, rng = rrtik.load_robot("ur5"), np.random.default_rng(4)
     solids = {
         "ball": rrtik.Sphere(0.15),
         "capsule": rrtik.Capsule(0.06, 0.5),
         "can": rrtik.Cylinder(0.1, 0.4),
         "box": rrtik.Box([0.3, 0.2, 0.1]),
+    }
+    resized = {
+        "ball": (rrtik.Sphere(0.25), [0.25]),
+        "capsule": (rrtik.Capsule(0.1, 0.3), [0.1, 0.3]),
+        "can": (rrtik.Cylinder(0.2, 0.15), [0.2, 0.15]),
+        "box": (rrtik.Box([0.1, 0.35, 0.4]), [0.1, 0.35, 0.4]),
     }
     far = pin.SE3(np.eye(3), np.array([2.0, 2.0, 0.0]))
     scene = Scene(tuple(rrtik.Obstacle(name, solid, far, margin=0.01) for name, solid in solids.items()))
@@ -134,14 +174,13 @@ def test_every_kind_of_obstacle_that_can_be_dragged_is_packed_alike(tmp_path):
     room = room_between(problem.world, np.stack(ends), None)
     moves, wanted = [], []
     for k, each in enumerate(plan["obstacles"][: len(solids)]):
-        placed = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.3, 3))
-        Q = rng.uniform(-3.0, 3.0, (200, 6))
-        scene = scene.without(each["name"]).with_(
-            rrtik.Obstacle(each["name"], solids[each["name"]], placed, margin=0.01)
-        )
-        world = rrtik.World(robot, scene).with_clearance(room.searched)
-        wanted.append(world.fast.classify(robot.joint_values(Q)) == FREE)
-        moves.append({"obstacle": k, "pose": placed.homogeneous.ravel().tolist(), "Q": Q.tolist()})
+        for solid, sizes in ((solids[each["name"]], None), resized[each["name"]]):
+            placed = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.3, 3))
+            Q = rng.uniform(-3.0, 3.0, (200, 6))
+            scene = scene.without(each["name"]).with_(rrtik.Obstacle(each["name"], solid, placed, margin=0.01))
+            world = rrtik.World(robot, scene).with_clearance(room.searched)
+            wanted.append(world.fast.classify(robot.joint_values(Q)) == FREE)
+            moves.append({"obstacle": k, "pose": placed.homogeneous.ravel().tolist(), "sizes": sizes, "Q": Q.tolist()})
     assert all(0.05 < share.mean() < 0.95 for share in wanted)
     np.testing.assert_array_equal(in_node(plan, tmp_path, moves=moves)["free"], wanted)
 
@@ -184,6 +223,15 @@ SPOT = """(() => {
 })()"""
 
 
+def type_in(browser: Browser, name: str, value: float) -> None:
+    """Type a number of what is selected."""
+    browser.ask(
+        "(() => { const input = [...document.querySelectorAll('#plan-fields input')]"
+        f".find((each) => each.ariaLabel.includes(': {name} ')); input.value = {value};"
+        " input.dispatchEvent(new Event('change')); })()"
+    )
+
+
 @needs_chromium
 def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tmp_path):
     crate = rrtik.Obstacle("crate", rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([0.6, 0.6, 0.6]))
@@ -202,21 +250,31 @@ def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tm
         browser.drag(spot, [spot[0] + 10.0, spot[1] - 40.0])
         browser.ask(FRAMES)
         moved = browser.ask("[state.obstacles[0].pose[3], state.obstacles[0].pose[7], state.obstacles[0].pose[11]]")
-        browser.ask("document.getElementById('plan-add').click()")
-        browser.ask("moveSelected(new THREE.Vector3(0, 0, 0.9), 0.3)")
+        for shape in ("box", "capsule"):
+            browser.ask(f"addShape('{shape}')")
+            browser.ask("moveSelected(new THREE.Vector3(0, 0, 0.9), 0.3)")
+        type_in(browser, "pitch", 30)
+        type_in(browser, "length", 0.4)
+        type_in(browser, "radius", 0)
+        refused = browser.ask("document.getElementById('plan-state').textContent")
+        browser.ask("changed()")
         browser.ask(FRAMES)
         status = browser.ask("document.getElementById('plan-state').textContent")
         assert "length" in status, status
         (tmp_path / "path.json").write_text(browser.ask("pathText()"), encoding="utf-8")
         (tmp_path / "problem.yaml").write_text(browser.ask("problemText()"), encoding="utf-8")
-        for _ in range(4):
+        for _ in range(8):
             browser.ask("document.getElementById('plan-undo').click()")
         assert browser.ask("state.goal") == problem.goal.q.tolist()
     assert chosen == "goal"
     assert np.abs(goal - problem.goal.q).max() > 1e-3
     saved = rrtik.load_problem(tmp_path / "problem.yaml")
     path = rrtik.load_path(tmp_path / "path.json", saved.robot)
-    assert [each.name for each in saved.world.scene.obstacles] == ["crate", "box 1"]
+    assert "radius must be above 0" in refused
+    assert [each.name for each in saved.world.scene.obstacles] == ["crate", "box 1", "capsule 1"]
+    assert saved.world.scene.obstacles[2].shape.length == 0.4
+    turned = saved.world.scene.obstacles[2].pose.rotation
+    np.testing.assert_allclose(turned, pin.rpy.rpyToMatrix(0.0, np.pi / 6.0, 0.3), atol=1e-9)
     np.testing.assert_allclose(saved.world.scene.obstacles[0].pose.translation, moved, atol=1e-9)
     assert np.linalg.norm(np.array(moved) - 0.6) > 0.01
     assert path.violations(saved.world) == ()

@@ -166,6 +166,11 @@ class PlannedTable:
         """One of the arrays, its words as float64; not set."""
         return self._words[self._plan.spans[place]]
 
+    @property
+    def arrays(self) -> dict[int, NDArray[Any]]:
+        """The arrays that have words, by the places of their addresses."""
+        return {place: self[place] for place in self._plan.spans if self._plan.pointing[place]}
+
     def intact(self) -> bool:
         """Whether nothing has been written beyond an array or the fields."""
         return bool((self._words[self._plan.guards] == GUARD_WORD).all())

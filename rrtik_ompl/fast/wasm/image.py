@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.fast.tables.layout import ALIGNMENT
-from rrtik_ompl.fast.tables.memory import Table
+from rrtik_ompl.fast.tables.memory import PlannedTable, Table
 
-Block: TypeAlias = Table | NDArray[Any]
+Block: TypeAlias = Table | PlannedTable | NDArray[Any]
 
 
 class MemoryImage:
@@ -56,7 +56,7 @@ class MemoryImage:
         if address in self._places:
             return self._places[address]
         self._blocks.append(block)
-        if not isinstance(block, Table):
+        if isinstance(block, np.ndarray):
             return self._append(address, block)
         header = block.header.copy()
         for place, array in block.arrays.items():
@@ -83,4 +83,4 @@ class MemoryImage:
 
 
 def _address(block: Block) -> int:
-    return block.address if isinstance(block, Table) else int(block.ctypes.data)
+    return int(block.ctypes.data) if isinstance(block, np.ndarray) else block.address

@@ -14,6 +14,7 @@ from rrtik_ompl.files.notice import tell_once
 LIBRARIES = {
     "connect": "search.connect_kernels",
     "shortcut": "search.shortcut_kernels",
+    "crdt": "search.crdt.kernels",
     "ik": "ik.ik_kernels",
     "check": "checks.check_kernels",
     "distance": "checks.distance_kernels",

@@ -4,17 +4,13 @@ const LANE_BYTES = 4;
 const NUMBER_BYTES = 8;
 const STACK_ROOM = 64;  // bytes between the stack and the image
 const FREE_ROOM = 1 << 20;  // bytes behind the image
-
-async function unpacked(text) {
-  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
+const MOTIONS_AT_ONCE = 256n;  // of a search, until it may be left: about a millisecond
+const TRIES_AT_ONCE = 16n;  // of shortcuts
 
 /** Whether this browser has what the kernels need: vectors in WebAssembly and whole numbers of 64 bits. */
 function hasKernels() {
   const vectors = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];
-  return typeof DecompressionStream === "function" && typeof BigInt64Array === "function"
+  return typeof BigInt64Array === "function"
     && typeof WebAssembly === "object" && WebAssembly.validate(new Uint8Array(vectors));
 }
 
@@ -39,11 +35,12 @@ class Kernels {
     const { places, names } = plan;
     this.search = this.table(places.search, names.connect);
     this.shortcuts = this.table(places.shortcuts, names.shortcut);
+    this.crdt = this.table(places.crdt, names.crdt);
     this.motions = this.table(places.motions, names.motion);
     this.world = this.table(places.world, names.table);
     this.spare = plan.end;
     const joints = this.motions.get("JOINTS");
-    this.room = { values: this.reserve(NUMBER_BYTES * joints), found: this.reserve(NUMBER_BYTES), pair: this.reserve(LANE_BYTES), answer: this.reserve(LANE_BYTES) };
+    this.room = { values: this.reserve(2 * NUMBER_BYTES * joints), steps: this.reserve(LANE_BYTES), found: this.reserve(NUMBER_BYTES), pair: this.reserve(LANE_BYTES), answer: this.reserve(LANE_BYTES) };
   }
 
   /** The fields of a table by their names: table.get("COUNT"), table.set("COUNT", 3). */
@@ -86,19 +83,38 @@ class Kernels {
     return this.ints[answer / LANE_BYTES] === this.plan.names.table.FREE;
   }
 
-  /** Write the joint values of a configuration where single answers are found. */
-  setValues(q) {
+  /** Whether a straight motion is proven free at the configurations at which Python checks it. */
+  motionFree(a, b) {
+    if (!this.inBox(a) || !this.inBox(b)) return false;
+    const { values, steps, answer } = this.room;
+    this.setValues(a);
+    this.setValues(b, 1);
+    this.ints[steps / LANE_BYTES] = this.stepCount(a, b);
+    const ends = [values, values + NUMBER_BYTES * this.motions.get("JOINTS")];
+    this.entries.check_classify_edges(...[this.world.address, ...ends, steps, 1, answer, 1].map(BigInt));
+    return this.ints[answer / LANE_BYTES] === this.plan.names.table.FREE;
+  }
+
+  /** In how many steps a motion is checked; see motion_table.py. */
+  stepCount(a, b) {
+    const [weights, numbers] = ["WEIGHTS", "NUMBERS"].map((name) => this.motions.get(name) / NUMBER_BYTES);
+    const travel = a.reduce((sum, value, k) => sum + this.doubles[weights + k] * Math.abs(b[k] - value), 0);
+    return Math.max(1, Math.ceil(travel / this.doubles[numbers + this.plan.names.motion.RESOLUTION] - STEP_TOLERANCE));
+  }
+
+  /** Write the joint values of a configuration where single answers are found, or behind it (row 1). */
+  setValues(q, row = 0) {
     const joints = this.motions.get("JOINTS");
     const [gain, offset] = ["GAIN", "OFFSET"].map((name) => this.motions.get(name) / NUMBER_BYTES);
     for (let j = 0; j < joints; j += 1) {
       let sum = this.doubles[offset + j];
       for (let k = 0; k < this.dof; k += 1) sum += this.doubles[gain + j * this.dof + k] * q[k];
-      this.doubles[this.room.values / NUMBER_BYTES + j] = sum;
+      this.doubles[this.room.values / NUMBER_BYTES + row * joints + j] = sum;
     }
   }
 
-  /** A path from start to goal, rows of joint values, or null; `seed` as in Python. */
-  search_path(start, goal, seed) {
+  /** A path from start to goal, rows of joint values, or null; `seed` as in Python. It stops where it may be left. */
+  * searchPath(start, goal, seed) {
     const { search, plan } = this;
     const names = plan.names.connect;
     this.writeRow(search.get("START_ROWS"), start);
@@ -108,10 +124,11 @@ class Kernels {
     search.set("LIMIT", plan.samples);
     search.set("PATH_CAPACITY", plan.places.pathRows);
     const address = BigInt(search.address);
-    let status = Number(this.entries.connect_solve(address, 1n, 1n, BigInt(seed), 4096n));
+    let status = Number(this.entries.connect_solve(address, 1n, 1n, BigInt(seed), MOTIONS_AT_ONCE));
     while (status === names.RUNNING || status === names.ASKING) {
+      yield;
       if (status === names.ASKING) this.refuse(search);
-      status = Number(this.entries.connect_resume(address, 4096n));
+      status = Number(this.entries.connect_resume(address, MOTIONS_AT_ONCE));
     }
     const count = search.get("PATH_ROWS");
     return status === names.SOLVED && count <= plan.places.pathRows ? this.readRows(search.get("PATH"), count) : null;
@@ -123,9 +140,10 @@ class Kernels {
     this.ints.fill(0, first, first + search.get("QUESTIONS"));
   }
 
-  /** Begin to make a path shorter by random shortcuts. */
-  beginShortening(rows, seed) {
+  /** Make a path shorter by random shortcuts; gives what it is by then wherever it may be left. The seed as in Python. */
+  * shortened(rows, seed) {
     const { shortcuts, plan } = this;
+    const names = plan.names.shortcut;
     const route = shortcuts.get("ROUTE");
     rows.forEach((row, k) => this.writeRow(route + k * this.dof * NUMBER_BYTES, row));
     for (const name of ["TRIES", "FAILURES", "GAINS", "QUESTIONS", "FIRST", "SECOND", "CUTS"]) shortcuts.set(name, 0);
@@ -134,25 +152,13 @@ class Kernels {
     shortcuts.set("RANDOM", seed);
     shortcuts.set("MAX_TRIES", rows.length < 3 ? 0 : plan.tries);
     shortcuts.set("PATIENCE", Math.ceil(plan.tries / 4));
-    shortcuts.set("ANSWERED", plan.names.shortcut.NO_ANSWER);
-  }
-
-  /** Go on with that for about so long; whether it is done. The same seed gives the same path, however it is divided. */
-  goOnShortening(milliseconds) {
-    const { shortcuts, plan } = this;
-    const names = plan.names.shortcut;
-    const end = performance.now() + milliseconds;
-    do {
-      const status = Number(this.entries.shortcut_resume(BigInt(shortcuts.address), 16n));
-      if (status === names.DONE) return true;
+    shortcuts.set("ANSWERED", names.NO_ANSWER);
+    let status = names.RUNNING;
+    while (status !== names.DONE) {
+      status = Number(this.entries.shortcut_resume(BigInt(shortcuts.address), TRIES_AT_ONCE));
       if (status === names.ASKING) shortcuts.set("ANSWERED", names.ANSWER_NO);
-    } while (performance.now() < end);
-    return false;
-  }
-
-  /** The path as short as it is by now. */
-  shortened() {
-    return this.readRows(this.shortcuts.get("ROUTE"), this.shortcuts.get("COUNT"));
+      yield this.readRows(route, shortcuts.get("COUNT"));
+    }
   }
 
   /** Joint values near `from` that bring the tip to a pose (12 numbers: the rotation row by row, the origin), or null. */

@@ -88,7 +88,6 @@ function placeSolid(kernels, obstacle, pose) {
 
 /** Put an obstacle of the planner's list elsewhere, or make it another size, in the tables. */
 function placeObstacle(kernels, obstacle, pose) {
-  obstacle.pose = pose;
   placePrimitive(kernels, "OUTER_PRIMITIVES", obstacle, pose, 1);
   placePrimitive(kernels, "INNER_PRIMITIVES", obstacle, pose, -1);
   placeSolid(kernels, obstacle, pose);

@@ -6,7 +6,7 @@ const CLEARANCE_SAMPLES = 200;
 const UNDO_STEPS = 200;
 const ENDS = { start: "start ghost", goal: "goal ghost" };
 let kernels = null;
-let state = null;  // { start, goal, seed, obstacles: [{ pose, shown }] }
+let state = null;  // { start, goal, planner, seed, obstacles: [{ pose, shown, sizes }] }
 let shortening = 0;  // number of the path that is being made shorter
 const past = [];
 
@@ -28,14 +28,26 @@ function moveGhost(end, q, free) {
   }
 }
 
+/** Draw an obstacle where it is; anew if the page has added it or made it another size. */
 function moveDrawing(k) {
-  const { pose, shown } = state.obstacles[k];
+  const { pose, shown, sizes } = state.obstacles[k];
   const obstacle = planning.obstacles[k];
+  const drawnSizes = obstacle.drawnSizes ?? (obstacle.spare ? [] : obstacle.first.sizes);
+  if (shown && !sameNumbers(sizes, drawnSizes)) drawShape(obstacle, sizes);
   const group = node("obstacles", obstacle.node);
-  obstacle.drawn ??= obstacle.spare ? new THREE.Matrix4() : rowMajor(obstacle.first).invert().multiply(group.matrix);
+  obstacle.drawn ??= obstacle.spare ? new THREE.Matrix4() : rowMajor(obstacle.first.pose).invert().multiply(group.matrix);
   new THREE.Matrix4().multiplyMatrices(rowMajor(pose), obstacle.drawn).decompose(group.position, group.quaternion, new THREE.Vector3());
   group.updateMatrix();
   group.visible = shown;
+}
+
+function drawShape(obstacle, sizes) {
+  const group = new THREE.Group();
+  group.add(new THREE.Mesh(shapeGeometry(obstacle.shape, sizes), new THREE.MeshPhongMaterial({ color: story.colors.obstacle })));
+  viewer.delete_path([...ROOT, "obstacles", obstacle.node]);
+  viewer.set_object([...ROOT, "obstacles", obstacle.node], group);
+  outline(group, 0x7a5a1e);
+  Object.assign(obstacle, { drawnSizes: sizes.slice(), drawn: new THREE.Matrix4() });
 }
 
 function pathTimes(rows) {
@@ -47,8 +59,6 @@ function pathTimes(rows) {
   const scale = whole > 0 ? Math.min(Math.max(whole, planning.seconds[0]), planning.seconds[1]) / whole : 1;
   return times.map((time) => time * scale);
 }
-
-const lengthOf = (rows) => rows.slice(1).reduce((sum, row, k) => sum + Math.hypot(...row.map((value, j) => value - rows[k][j])), 0);
 
 function drawTrail(rows) {
   const trail = new THREE.Group();
@@ -76,6 +86,7 @@ function replacePath(rows) {
   document.getElementById("clearance-section").hidden = true;
   showClearance = () => {};
   newPath();
+  askOpinion();
 }
 
 // The state --------------------------------------------------------------------------------------------------------
@@ -88,14 +99,14 @@ function undo() {
   if (past.length === 0) return;
   state = past.pop();
   state.obstacles.forEach((_, k) => applyObstacle(k));
-  showSelected();
+  showState();
   changed();
 }
 
 function applyObstacle(k) {
   const kept = state.obstacles[k];
   const pose = kept.shown ? kept.pose : kept.pose.map((value, n) => (n === 11 ? value - AWAY : value));
-  placeObstacle(kernels, planning.obstacles[k], pose);
+  placeObstacle(kernels, resized(planning.obstacles[k], kept.sizes), pose);
   moveDrawing(k);
 }
 
@@ -120,25 +131,49 @@ function plan() {
     planStatus(blocked.map((end) => `${end}: ${kernels.blame(state[end])}`).join("; "), true);
     return;
   }
-  const found = kernels.search_path(state.start, state.goal, state.seed);
-  if (!found) {
-    replacePath([]);
-    planStatus(`no path found in ${planning.samples.toLocaleString("en")} samples; another seed may find one`, true);
-    return;
-  }
-  const searched = performance.now() - begin;
-  if (document.getElementById("plan-shorten").checked) {
-    kernels.beginShortening(found, state.seed);
-    shortenOn(searched, shortening);
-  } else finish(found, searched);
+  const { search, shorten } = PLANNERS[state.planner];
+  inFrames(search(state.seed), shortening, {
+    each: () => planStatus("searching ..."),
+    end: (found) => {
+      if (!found) {
+        replacePath([]);
+        planStatus(`no path found in ${planning.samples.toLocaleString("en")} samples; another seed may find one`, true);
+        return;
+      }
+      const searched = performance.now() - begin;
+      if (!document.getElementById("plan-shorten").checked) finish(found, searched);
+      else inFrames(shorten(found), shortening, { each: (rows) => finish(rows, searched), end: () => {} });
+    },
+  });
 }
 
-/** Shorten on in every frame until the path is as short as it gets, or another one is wanted. */
-function shortenOn(searched, number) {
+// Searches, and how their paths are made shorter.
+const PLANNERS = {
+  RRTConnect: {
+    label: "RRT-Connect",
+    search: (seed) => kernels.searchPath(state.start, state.goal, seed),
+    shorten: (rows) => kernels.shortened(rows, state.seed),
+  },
+  BiCRDT: {
+    label: "one joint at a time",
+    search: (seed) => searchMoves(kernels, state.start, state.goal, seed),
+    shorten: (rows) => bestMoves(kernels, rows, state.seed),
+  },
+};
+
+/** Let work go on for some milliseconds a frame, until it is done or another path is wanted: the page never stands still. */
+function inFrames(work, number, { each, end }, last = undefined) {
   if (number !== shortening) return;
-  const done = kernels.goOnShortening(LIVE_MILLISECONDS);
-  finish(kernels.shortened(), searched);
-  if (!done) requestAnimationFrame(() => shortenOn(searched, number));
+  const until = performance.now() + LIVE_MILLISECONDS;
+  let step = work.next();
+  let given = step.done ? last : step.value;
+  while (!step.done && performance.now() < until) {
+    step = work.next();
+    if (!step.done) given = step.value;
+  }
+  if (given !== last || !step.done) each(given);
+  if (step.done) end(step.value);
+  else requestAnimationFrame(() => inFrames(work, number, { each, end }, given));
 }
 
 function finish(rows, searched) {

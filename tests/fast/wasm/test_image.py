@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.tables.memory import table
 from rrtik_ompl.fast.wasm.image import MemoryImage
 
@@ -39,16 +38,12 @@ def test_what_is_there_already_is_not_added_again_and_what_is_not_cannot_be_poin
 
 @pytest.mark.kernels
 def test_no_address_of_this_process_is_left_in_the_image_of_a_world():
-    from rrtik_ompl.fast.search.shortcut import ShortcutSearch
-    from rrtik_ompl.viewer.page_planner import _add_searches  # what a page is given
+    from rrtik_ompl.viewer.page_tables import page_tables  # what a page is given
 
     problem = rrtik.load_problem("titan4_sdu")
-    motions, robot = problem.world.motions, problem.robot
-    search = ConnectSearch(motions, robot.lower, robot.upper)
-    shortcuts = ShortcutSearch(motions, np.stack([problem.start, problem.goal.q]))
-    image = MemoryImage(BASE)
-    _add_searches(image, motions, search, shortcuts)
+    motions = problem.world.motions
+    image, _ = page_tables(problem, problem.world, motions)
     words = np.frombuffer(image.bytes(), dtype=np.int64)
-    tables = [*motions.fast.tables, motions.fast.table, motions.table, *search.trees, search.table, shortcuts.table]
-    here = {each.address for each in tables} | {a.ctypes.data for each in tables for a in each.arrays.values()}
+    here = set(image._places)  # of every table and array that was added
+    assert len(here) > 100
     assert here.isdisjoint(words.tolist())

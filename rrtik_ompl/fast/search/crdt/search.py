@@ -22,7 +22,7 @@ from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.layout import COLLIDING, FREE, UNDECIDED
-from rrtik_ompl.fast.tables.memory import PlannedTable, TablePlan
+from rrtik_ompl.fast.tables.memory import PlannedTable, Table, TablePlan
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
 FIRST_CAPACITY = 256  # vertices
@@ -41,6 +41,7 @@ class CrdtSearch:
         roots: Of each of the two trees, shapes (r, n); or of the only one.
         goals: For a single tree: what vertices near them try to reach, shape (g, n).
         tolerance: How near [unit of the space].
+        vertices: For which each tree has room at first.
     """
 
     def __init__(
@@ -52,13 +53,14 @@ class CrdtSearch:
         *roots: Matrix,
         goals: Matrix | None = None,
         tolerance: float = 0.0,
+        vertices: int = FIRST_CAPACITY,
     ) -> None:
         kernels, motions = library(KERNELS), world.motions
         if kernels is None or motions is None:
             raise PlannerError("there are no kernels for this processor; see has_kernels")
         self._world, self._motions = world, motions  # they own the tables
         self._resume = kernels.resume_pair if goals is None else kernels.resume_single
-        self._trees = [TreeMemory(rows, FIRST_CAPACITY) for rows in roots]
+        self._trees = [TreeMemory(rows, vertices) for rows in roots]
         aims = np.zeros((0, motions.dof)) if goals is None else goals
         self._table = _search_table(motions, world.robot, rules, aims)
         header = self._table.header
@@ -70,6 +72,11 @@ class CrdtSearch:
         for side, tree in enumerate(self._trees):
             header[crdt_layout.TREE + side] = tree.address
         self._budget = FIRST_BUDGET
+
+    @property
+    def tables(self) -> tuple[PlannedTable, tuple[Table, ...]]:
+        """What the kernels read: the table of the search, and those of its trees."""
+        return self._table, tuple(tree.table for tree in self._trees)
 
     @property
     def iterations(self) -> int:

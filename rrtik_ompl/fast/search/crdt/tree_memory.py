@@ -16,7 +16,8 @@ class TreeMemory:
     """Vertices of a C-RDT tree, with room for more.
 
     Attributes:
-        address: Of the tree's table, for kernels; stays when the tree is given more room.
+        table: What kernels read.
+        address: Of that table; stays when the tree is given more room.
 
     Args:
         roots: Its first vertices, shape (r, n).
@@ -27,15 +28,15 @@ class TreeMemory:
         count, self._dof = roots.shape
         while capacity < count + self._dof:
             capacity *= 2
-        self._table = table({crdt_layout.SIZE: count, crdt_layout.CAPACITY: capacity, **self._arrays(capacity)})
+        self.table = table({crdt_layout.SIZE: count, crdt_layout.CAPACITY: capacity, **self._arrays(capacity)})
         self._runs[:, :count] = roots.T
         self._parents[:count] = crdt_layout.ROOT
-        self.address = self._table.address
+        self.address = self.table.address
 
     @property
     def size(self) -> int:
         """Number of vertices."""
-        return int(self._table.header[crdt_layout.SIZE])
+        return int(self.table.header[crdt_layout.SIZE])
 
     @property
     def vertices(self) -> Matrix:
@@ -56,27 +57,27 @@ class TreeMemory:
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond this memory."""
-        return self._table.intact()
+        return self.table.intact()
 
     def grow(self) -> None:
         """Give the tree twice the room."""
         vertices, parents = self.vertices, self._parents[: self.size]
-        capacity = 2 * int(self._table.header[crdt_layout.CAPACITY])
+        capacity = 2 * int(self.table.header[crdt_layout.CAPACITY])
         for place, larger in self._arrays(capacity).items():
-            self._table.arrays[place] = roomy = aligned(larger)
-            self._table.header[place] = roomy.ctypes.data
-        self._table.header[crdt_layout.CAPACITY] = capacity
+            self.table.arrays[place] = roomy = aligned(larger)
+            self.table.header[place] = roomy.ctypes.data
+        self.table.header[crdt_layout.CAPACITY] = capacity
         self._runs[:, : self.size] = vertices.T
         self._parents[: self.size] = parents
 
     @property
     def _runs(self) -> Matrix:
         """Coordinates, shape (n, capacity)."""
-        return self._table[crdt_layout.COORDINATES].reshape(self._dof, -1)
+        return self.table[crdt_layout.COORDINATES].reshape(self._dof, -1)
 
     @property
     def _parents(self) -> NDArray[Any]:
-        return self._table[crdt_layout.PARENTS]
+        return self.table[crdt_layout.PARENTS]
 
     def _arrays(self, capacity: int) -> dict[int, NDArray[Any]]:
         return {

@@ -1,4 +1,4 @@
-"""The command `rrtik overlay`."""
+"""Commands that draw the arm: `rrtik overlay` over pictures, `rrtik play` in a page where things are dragged."""
 
 from __future__ import annotations
 
@@ -22,6 +22,24 @@ if TYPE_CHECKING:
     from rrtik_ompl.sensing.cameras.pictures import Picture
 
 ENDINGS = (".mp4", ".avi", ".png", ".jpg")
+
+
+def play(
+    problem: Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")],
+    path: Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")] = None,
+    port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
+) -> int:
+    """Drag start, goal and obstacles in 3-D: the page plans at once, and this process proves each path.
+
+    A live page on 127.0.0.1, until Ctrl-C.
+    """
+    from rrtik_ompl import load_path, load_problem
+    from rrtik_ompl.viewer import play as serve
+
+    question = load_problem(problem)
+    route = None if path is None else load_path(path, question.world.robot)
+    serve(question, route, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
+    return 0
 
 
 def overlay(

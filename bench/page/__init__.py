@@ -1,0 +1,1 @@
+"""Pages that plan by themselves: a gallery of them, and what is measured of them."""

@@ -1,0 +1,95 @@
+// What a person moves in the picture: ghosts by their tips, obstacles, by mouse or finger; with the shift key they turn.
+const TURN_PER_PIXEL = 0.01;  // [rad], with the shift key
+const GHOSTS_FIRST = 0.05;  // of the picture's size: so much nearer a ghost counts than it is
+let selected = "goal";
+
+function tipFrame(q) {
+  return jointFrames(q)[robot.tip.joint].multiply(rowMajor(robot.tip.placement));
+}
+
+/** Move the tip of an end by a shift [m] and a turn about z [rad], through inverse kinematics. */
+function moveEnd(end, shift, turn) {
+  const frame = tipFrame(state[end]);
+  const e = new THREE.Matrix4().makeRotationZ(turn).multiply(new THREE.Matrix4().extractRotation(frame)).elements;
+  const at = new THREE.Vector3().setFromMatrixPosition(frame).add(shift);
+  const pose = [e[0], e[4], e[8], e[1], e[5], e[9], e[2], e[6], e[10], at.x, at.y, at.z];
+  const q = kernels.reach(pose, state[end]);
+  if (q !== null) state[end] = q;
+  return q !== null;
+}
+
+function moveObstacle(k, shift, turn) {
+  const turned = new THREE.Matrix4().makeRotationZ(turn).multiply(rowMajor(state.obstacles[k].pose).setPosition(0, 0, 0));
+  const old = state.obstacles[k].pose;
+  turned.setPosition(old[3] + shift.x, old[7] + shift.y, old[11] + shift.z);
+  state.obstacles[k].pose = turned.clone().transpose().elements.slice();
+  applyObstacle(k);
+}
+
+const numberOf = (name) => planning.obstacles.findIndex((obstacle) => obstacle.name === name);
+
+function moveSelected(shift, turn) {
+  const moved = ENDS[selected] ? moveEnd(selected, shift, turn) : (moveObstacle(numberOf(selected), shift, turn), true);
+  if (moved) {
+    showSelected();
+    changed();
+  }
+}
+
+const ray = new THREE.Raycaster();
+ray.params.Line.threshold = 0;  // edges are drawn as lines, and count as a metre thick by default
+function pointerAt(event) {
+  const box = pane.getBoundingClientRect();
+  const place = { x: (2 * (event.clientX - box.left)) / box.width - 1, y: 1 - (2 * (event.clientY - box.top)) / box.height };
+  viewer.camera.updateMatrixWorld();
+  ray.setFromCamera(place, viewer.camera);
+}
+
+function thingsToDrag() {
+  const ends = Object.keys(ENDS).map((end) => ({ name: end, object: node(ENDS[end]) }));
+  const solids = planning.obstacles.map((obstacle, k) => ({ name: obstacle.name, object: node("obstacles", obstacle.node), shown: state.obstacles[k].shown }));
+  return [...ends, ...solids].filter(({ object, shown }) => shown !== false && object.visible);
+}
+
+function hitThing() {
+  const hits = thingsToDrag().flatMap(({ name, object }) => ray.intersectObject(object, true).slice(0, 1).map((hit) => ({ name, hit })));
+  const away = ({ name, hit }) => hit.distance - (ENDS[name] ? GHOSTS_FIRST * size : 0);
+  return hits.sort((a, b) => away(a) - away(b))[0];
+}
+
+let drag = null;
+function startDrag(event) {
+  if (event.button !== 0 || !event.isPrimary) return;
+  pointerAt(event);
+  const found = hitThing();
+  if (!found) return;
+  event.stopPropagation();
+  event.preventDefault();
+  remember();
+  select(found.name);
+  const away = viewer.camera.getWorldDirection(new THREE.Vector3());
+  drag = { plane: new THREE.Plane().setFromNormalAndCoplanarPoint(away, found.hit.point), last: found.hit.point.clone(), x: event.clientX };
+  pane.setPointerCapture(event.pointerId);
+}
+
+function goOnDragging(event) {
+  if (drag === null) return;
+  event.stopPropagation();
+  if (event.shiftKey) {
+    moveSelected(new THREE.Vector3(), (event.clientX - drag.x) * TURN_PER_PIXEL);
+  } else {
+    pointerAt(event);
+    const point = ray.ray.intersectPlane(drag.plane, new THREE.Vector3());
+    if (point === null) return;
+    const way = point.clone().sub(drag.last);
+    moveSelected(new THREE.Vector3(way.x, -way.z, story.planar ? 0 : way.y), 0);  // meshcat's picture has y up
+    drag.last = point;
+  }
+  drag.x = event.clientX;
+}
+
+function endDrag(event) {
+  if (drag === null) return;
+  event.stopPropagation();
+  drag = null;
+}

@@ -1,0 +1,97 @@
+"""A second opinion on what a page has found: this process proves the path in the scene that the page was left with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pinocchio as pin
+from pydantic import Field, ValidationError
+
+from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.files.sections import Name, Number, Section
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import SHAPES, Box, Shape
+from rrtik_ompl.world.clearance_curve import clearance_along
+from rrtik_ompl.world.route_check import how_checked
+
+Row = list[Number]
+
+
+class _Placed(Section):
+    """An obstacle that the page can move, as it is there."""
+
+    name: Name
+    shape: Literal["box", "sphere", "cylinder", "capsule"]
+    sizes: Annotated[Row, Field(min_length=1, max_length=3)]
+    pose: Annotated[Row, Field(min_length=16, max_length=16)]
+    shown: bool
+
+
+class _Found(Section):
+    """What a page asks about: its problem, and the path that it has found."""
+
+    start: Row
+    goal: Row
+    obstacles: list[_Placed]
+    waypoints: Annotated[list[Row], Field(min_length=1, max_length=100_000)]
+
+
+def opinion(problem: Problem, asked: bytes) -> dict[str, Any]:
+    """What this process says of a path.
+
+    Args:
+        problem: The problem that the page was made of.
+        asked: JSON: start, goal, obstacles that can be moved as they are now, and the path's rows.
+
+    Returns:
+        ``verdict`` ("proven", "checked": free in steps but not proven, or "refused") and ``text``, one line.
+    """
+    try:
+        found = _Found.model_validate_json(asked)
+        world = problem.world.with_scene(_scene(problem, found.obstacles))
+        Problem(world, found.start, found.goal)
+        path = JointPath.of(problem.robot, np.array(found.waypoints))
+        faults = path.violations(world)
+        if faults:
+            return {"verdict": "refused", "text": f"refused: move {faults[0].edge + 1}: {faults[0].reason}"}
+        ends = np.stack([path.start, path.end]) - np.array([found.start, found.goal])
+        if np.abs(ends).max() > 0.0:
+            return {"verdict": "refused", "text": "refused: the path does not lead from the start to the goal"}
+        how, proven = how_checked(world, path.waypoints), path.proved(world).proven
+        words = f"{how}; {clearance_along(world, path.waypoints)}" if world.scene.obstacles else how
+        return {"verdict": "proven" if proven else "checked", "text": words}
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        return {"verdict": "refused", "text": f"refused: {where or 'what was asked'}: {first['msg']}"}
+    except (RrtikError, ValueError) as error:
+        return {"verdict": "refused", "text": f"refused: {error}"}
+
+
+def _scene(problem: Problem, placed: list[_Placed]) -> Scene:
+    """The scene of the problem with obstacles where the page has them, without those that were removed."""
+    scene, there = problem.world.scene, {each.name: each for each in placed}
+    known = {obstacle.name for obstacle in scene.obstacles}
+    scene = scene.without(*(name for name, each in there.items() if name in known and not each.shown))
+    moved = [_moved(obstacle, there.get(obstacle.name)) for obstacle in scene.obstacles]
+    added = [
+        _moved(Obstacle(each.name, _shape(each)), each) for each in placed if each.shown and each.name not in known
+    ]
+    return replace(scene, obstacles=(*moved, *added))
+
+
+def _moved(obstacle: Obstacle, placed: _Placed | None) -> Obstacle:
+    if placed is None:
+        return obstacle
+    rows = np.array(placed.pose).reshape(4, 4)
+    return replace(obstacle, shape=_shape(placed), pose=pin.SE3(rows[:3, :3], rows[:3, 3]))
+
+
+def _shape(each: _Placed) -> Shape:
+    kind: Any = SHAPES[each.shape]
+    made: Shape = kind(each.sizes) if kind is Box else kind(*each.sizes)
+    return made

@@ -1,0 +1,107 @@
+"""The tables that a page plans with, as an image of its memory: a world, searches in it, inverse kinematics."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.fast.ik import ik_layout
+from rrtik_ompl.fast.search import connect_layout, shortcut_layout, tree_layout
+from rrtik_ompl.fast.search.connect import ConnectSearch
+from rrtik_ompl.fast.search.crdt import layout as crdt_layout
+from rrtik_ompl.fast.search.crdt.rules import CrdtRules
+from rrtik_ompl.fast.search.crdt.search import CrdtSearch
+from rrtik_ompl.fast.search.motions import motion_layout
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.fast.search.shortcut import ShortcutSearch
+from rrtik_ompl.fast.tables import layout
+from rrtik_ompl.fast.tables.scratch import probe_table
+from rrtik_ompl.fast.wasm.image import MemoryImage
+from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
+from rrtik_ompl.ik.numeric.kernel_call import call_table
+from rrtik_ompl.ik.serial_chain import limb_of
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.world import World
+
+BASE = 1 << 20  # where the image begins; the stack of the kernels lies below
+VERTICES = 1 << 14  # of each tree
+PATH_ROWS = 2048
+LAYOUTS: dict[str, ModuleType] = {
+    "table": layout,
+    "motion": motion_layout,
+    "tree": tree_layout,
+    "connect": connect_layout,
+    "shortcut": shortcut_layout,
+    "crdt": crdt_layout,
+    "ik": ik_layout,
+}
+
+
+def layout_numbers() -> dict[str, dict[str, int]]:
+    """The whole numbers that the layouts of these tables name, by layout."""
+
+    def numbers(module: ModuleType) -> dict[str, int]:
+        return {name: value for name, value in vars(module).items() if name.isupper() and type(value) is int}
+
+    return {name: numbers(module) for name, module in LAYOUTS.items()}
+
+
+def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[MemoryImage, dict[str, int]]:
+    """The image, and where in it the page finds each table.
+
+    Args:
+        problem: Its start is where searches begin at first.
+        world: In which they search.
+        motions: The motion table of that world.
+
+    Raises:
+        InputError: If joints go farther than the kernels cover.
+    """
+    image, fast, limb = MemoryImage(BASE), motions.fast, limb_of(problem.robot)
+    for each in fast.tables:
+        image.add(each)
+    places = {
+        "world": image.add(fast.table, links=dict(enumerate(fast.tables))),
+        "motions": image.add(motions.table, links={motion_layout.WORLD: fast.table}),
+        "probe": image.add(probe_table(fast.tables[layout.OUTER_PRIMITIVES : layout.INNER_PRIMITIVES + 1])),
+        "pathRows": PATH_ROWS,
+    }
+    places["search"] = _add_connect(image, problem, motions)
+    shortcuts = ShortcutSearch(motions, np.zeros((PATH_ROWS, problem.robot.dof)) + problem.start, asking=False)
+    places["shortcuts"] = image.add(shortcuts.table, links={shortcut_layout.MOTIONS: motions.table})
+    places["crdt"] = _add_crdt(image, problem, world, motions)
+    if limb is not None:
+        places |= {"limb": image.add(limb), "ik": image.add(call_table(limb, STEPS, PATIENCE))}
+    return image, places
+
+
+def _add_connect(image: MemoryImage, problem: Problem, motions: FastMotions) -> int:
+    """RRT-Connect, with its trees, its ends and the path that it finds."""
+    search = ConnectSearch(motions, *problem.robot.finite_range(), vertices=VERTICES)
+    starts, goals, _ = search.rows
+    path: Matrix = np.zeros((PATH_ROWS, motions.dof))
+    alias = {tree_layout.VALUES: tree_layout.ROWS} if motions.identity else {}
+    for tree in search.trees:
+        image.add(tree, same=alias)
+    for rows in (starts, goals, path):
+        image.add(rows)
+    links: dict[int, Any] = {connect_layout.MOTIONS: motions.table, connect_layout.PATH: path}
+    links |= {connect_layout.START_TREE + side: tree for side, tree in enumerate(search.trees)}
+    links |= {connect_layout.START_ROWS: starts, connect_layout.GOAL_ROWS: goals}
+    values = {connect_layout.ROW_VALUES: connect_layout.ROW} if motions.identity else {}
+    return image.add(search.table, links=links, same=values)
+
+
+def _add_crdt(image: MemoryImage, problem: Problem, world: World, motions: FastMotions) -> int:
+    """The search that moves one joint at a time, with its trees."""
+    same, none = np.ones(motions.dof), np.zeros(motions.dof)
+    rules = CrdtRules(*problem.robot.finite_range(), same, none, same)
+    root = problem.start[None]
+    table, trees = CrdtSearch(world, rules, 1, None, root, root, vertices=VERTICES).tables
+    for tree in trees:
+        image.add(tree)
+    links: dict[int, Any] = {crdt_layout.MOTIONS: motions.table}
+    return image.add(table, links=links | {crdt_layout.TREE + side: tree for side, tree in enumerate(trees)})
