@@ -282,6 +282,26 @@ def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tm
     np.testing.assert_array_equal(saved.goal.q, goal)
 
 
+TEMPTED = """<script>
+window.broken = [];
+addEventListener("securitypolicyviolation", (event) => window.broken.push(event.effectiveDirective));
+try { eval("1"); window.evaluated = "ran"; } catch (error) { window.evaluated = error.name; }
+fetch("http://127.0.0.1:9/").then(() => { window.fetched = "sent"; }, (error) => { window.fetched = error.name; });
+</script></body>"""
+
+
+@needs_chromium
+def test_the_page_runs_no_text_as_script_and_connects_to_nobody(tmp_path: Path) -> None:
+    file = tmp_path / "page.html"
+    file.write_text(page(rrtik.load_problem("planar3_a")).replace("</body>", TEMPTED), encoding="utf-8")
+    with closing(Browser(tmp_path / "browser", DRAWING_3D)) as browser:
+        browser.open(file.as_uri())
+        browser.wait("document.documentElement.dataset.plans && window.fetched")
+        assert browser.ask("[window.evaluated, window.fetched]") == ["EvalError", "TypeError"]
+        assert browser.ask("window.broken.includes('connect-src')")
+        assert browser.ask("window.broken.includes('script-src')")
+
+
 @needs_chromium
 def test_the_page_says_what_it_cannot_plan(tmp_path: Path) -> None:
     problem = rrtik.load_problem("planar3_a")

@@ -1,0 +1,91 @@
+// What the report does in a page: random drags whose files are sent home, and drags that are timed until a path is drawn.
+(() => {  // the names of the page's own script are not ours
+  let drawnAt = null;  // when the page first drew the path of a drag
+
+  function randomNumbers(seed) {  // a linear congruential generator: the same drags every time
+    let value = seed;
+    return () => {
+      value = (Math.imul(value, 1664525) + 1013904223) >>> 0;
+      return value / 2 ** 32;
+    };
+  }
+
+  /** Move, turn, add, remove or resize something. */
+  function drag(random) {
+    const gap = () => 0.25 * size * (random() - 0.5);
+    const choice = random();
+    if (choice < 0.5) select(choice < 0.25 ? "goal" : "start");
+    else if (choice < 0.58) addShape(["box", "sphere", "cylinder", "capsule"][Math.floor(4 * random())]);
+    else {
+      const shown = planning.obstacles.filter((_, k) => state.obstacles[k].shown);
+      if (shown.length) select(shown[Math.floor(shown.length * random())].name);
+      if (choice < 0.62 && !ENDS[selected]) removeSelected();
+      else if (choice < 0.7 && !ENDS[selected]) {
+        const k = numberOf(selected);
+        state.obstacles[k].sizes = state.obstacles[k].sizes.map((length) => length * (0.5 + random()));
+        applyObstacle(k);
+      }
+    }
+    moveSelected(new THREE.Vector3(gap(), gap(), gap()), random() - 0.5);
+  }
+
+  function last(work, result) {
+    let [step, given] = [work.next(), null];
+    for (; !step.done; step = work.next()) given = step.value;
+    return result ? step.value : given;
+  }
+
+  /** The files of what the page finds now, without waiting for frames; null where an end is blocked or no path is found. */
+  function filesNow() {
+    shortening += 1;
+    if (Object.keys(ENDS).some((end) => !kernels.free(state[end]))) return null;
+    const { search, shorten } = PLANNERS[state.planner];
+    const found = last(search(state.seed), true);
+    if (!found) return null;
+    replacePath(last(shorten(found), false) ?? found);
+    return { path: pathText(), problem: problemText() };
+  }
+
+  function randomDrags(count, seed) {
+    const random = randomNumbers(seed);
+    const files = [];
+    for (let n = 0; n < count; n += 1) {
+      remember();
+      drag(random);
+      files.push(filesNow());
+      if (files[n] === null) undo();
+    }
+    return files;
+  }
+
+  const frame = () => new Promise((done) => { requestAnimationFrame(done); });
+
+  async function timedDrags(count, seed) {
+    const [random, times] = [randomNumbers(seed), []];
+    const draw = replacePath;
+    window.replacePath = (rows) => { draw(rows); drawnAt ??= performance.now(); };
+    for (let n = 0; n < count; n += 1) {
+      const begin = performance.now();
+      drawnAt = null;
+      remember();
+      select("goal");
+      moveSelected(new THREE.Vector3(...[0, 1, 2].map(() => 0.04 * size * (random() - 0.5))), 0);
+      for (let k = 0; k < 200 && drawnAt === null; k += 1) await frame();
+      if (drawnAt !== null && story.moves.length) times.push(drawnAt - begin);
+      else undo();
+    }
+    window.replacePath = draw;
+    return times;
+  }
+
+  async function work() {
+    const { drags, timed, seed } = JSON.parse(document.getElementById("work").textContent);
+    while (document.documentElement.dataset.plans !== "yes") await frame();
+    const loaded = performance.now();
+    const times = await timedDrags(timed, seed);
+    const files = randomDrags(drags, seed);
+    await fetch("opinion", { method: "POST", body: JSON.stringify({ loaded, times, files }) });
+  }
+
+  work();
+})();
