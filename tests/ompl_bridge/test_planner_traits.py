@@ -30,7 +30,8 @@ from rrtik_ompl.shortening import METHODS
 from rrtik_ompl.world import ACCURACIES
 
 LIBRARY = Path(rrtik_ompl.__file__).parent
-# Replanners and methods of shortening have names of their own, some of them those of planners.
+# Replanners, methods of shortening and of improving have names of their own, some of them those of planners; a page has
+# the kernels of two planners, and says in its paths which of them ran.
 BY_NAME: tuple[str, ...] = (
     "ompl_bridge/planner_traits.py",
     "replanning/",
@@ -40,6 +41,11 @@ BY_NAME: tuple[str, ...] = (
     "choices.py",
     "problem_files/run.py",
     "replanning/scenario.py",
+    "planning/__init__.py",
+    "planning/improving.py",
+    "fast/wasm/page_kernels.py",
+    "viewer/page_planner.py",
+    "viewer/page_tables.py",
 )
 
 
