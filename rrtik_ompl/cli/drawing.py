@@ -29,7 +29,9 @@ def play(
     path: Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")] = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
 ) -> int:
-    """Drag start, goal and obstacles in 3-D: the page plans at once, and this process proves each path.
+    """Drag start, goal and obstacles in 3-D.
+
+    The page plans at once, and this process proves each path.
 
     A live page on 127.0.0.1, until Ctrl-C.
     """
