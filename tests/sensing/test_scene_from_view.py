@@ -24,7 +24,7 @@ def test_two_markers_of_an_object_give_a_steadier_rotation_than_one():
             (sight,) = detect_objects(gray, CAMERA, MarkerMap("4x4_50", (BOX,), pin.SE3.Identity()))
             assert len(sight.markers) == count
             spread[count].append(pin.log3(sight.pose.T_camera_object.rotation @ T.rotation.T))
-    assert np.std(spread[2], axis=0)[0] < 0.5 * np.std(spread[1], axis=0)[0]
+    assert np.std(spread[2], axis=0)[0] < 0.6 * np.std(spread[1], axis=0)[0] < 5e-4
 
 
 def test_both_ways_to_the_tip_agree():
