@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -99,21 +100,14 @@ def planned(arm: str, family: str, seed: int) -> Judged:
 
 
 def shortened(arm: str, family: str, seed: int) -> list[Judged]:
-    """A path shortened by every method; those for single-joint moves take BiCRDT's, the others RRT-Connect's."""
+    """A path in a generated scene with thin obstacles, shortened by every method."""
     problem = thin_problem(arm, family, seed)
     if problem is None:
         return [Judged(found=False)] * len(METHODS)
-    paths = {
-        single: rrtik.plan(problem, "bicrdt" if single else "fastrrtconnect", seed=seed, seconds=SECONDS).path
-        for single in (False, True)
-    }
-    return [_shortened(problem, paths[METHODS[method].keeps_moves], method, seed) for method in METHODS]
+    return [Judged(found=False) if both is None else _judged(problem, *both) for both in by_every_method(problem, seed)]
 
 
-def _shortened(problem: Problem, raw: JointPath | None, method: ShorteningMethod, seed: int) -> Judged:
-    if raw is None or len(raw.waypoints) < 3:
-        return Judged(found=False)
-    short, old = before_and_after(problem, raw, method, seed)
+def _judged(problem: Problem, short: JointPath, old: JointPath) -> Judged:
     proof = short.proof
     return Judged(
         found=True,
@@ -126,10 +120,24 @@ def _shortened(problem: Problem, raw: JointPath | None, method: ShorteningMethod
     )
 
 
-def before_and_after(
+def by_every_method(problem: Problem, seed: int) -> Iterator[tuple[JointPath, JointPath] | None]:
+    """A path as each method shortens it, and as that was done before there were proofs; None where there is no path.
+
+    Methods for single-joint moves take a path of BiCRDT, the others one of RRT-Connect.
+    """
+    paths = {
+        single: rrtik.plan(problem, "bicrdt" if single else "fastrrtconnect", seed=seed, seconds=SECONDS).path
+        for single in (False, True)
+    }
+    for method in METHODS:
+        raw = paths[METHODS[method].keeps_moves]
+        yield None if raw is None or len(raw.waypoints) < 3 else _before_and_after(problem, raw, method, seed)
+
+
+def _before_and_after(
     problem: Problem, raw: JointPath, method: ShorteningMethod, seed: int
 ) -> tuple[JointPath, JointPath]:
-    """A path as a method shortens it, and as it was done before there were proofs: densely checked, no clearance."""
+    """A path shortened, and as it was before there were proofs: densely checked, no clearance."""
     seconds = FEWEST if METHODS[method].moves_only else None
     short = rrtik.shorten(raw, problem, method=method, seed=seed, seconds=seconds)
     dense = densely_checked(problem)

@@ -14,11 +14,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-import rrtik_ompl as rrtik
 from bench.moves.fewest_moves_oracle import ROOM, drawn_arm, world_of
-from bench.proofs.measurements import SECONDS, before_and_after
+from bench.proofs.measurements import by_every_method
 from rrtik_bench.shortening.plane_arms import PlaneArm
-from rrtik_ompl.choices import ShorteningMethod
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import METHODS
@@ -51,7 +49,7 @@ def deepest_cut(arm: PlaneArm, route: NDArray[np.float64]) -> float:
         most = [float(np.abs(b - a)[: k + 1] @ np.cumsum(arm.lengths[: k + 1][::-1])[::-1]) for k in range(len(a))]
         for link, way in enumerate(most):
             least = _least(arm, (a, b), link, way, least)
-    return max(-least, 0.0)
+    return max(0.0, -least)
 
 
 def _least(arm: PlaneArm, ends: Motion, link: int, way: float, least: float) -> float:
@@ -75,11 +73,8 @@ def plane_shortened(number: int) -> list[PlaneJudged]:
     problem = _problem(arm, rng)
     if problem is None:
         return [PlaneJudged(found=False)] * len(METHODS)
-    paths = {
-        single: rrtik.plan(problem, "bicrdt" if single else "fastrrtconnect", seed=number, seconds=SECONDS).path
-        for single in (False, True)
-    }
-    return [_judged(arm, problem, paths[METHODS[method].keeps_moves], method, number) for method in METHODS]
+    both = by_every_method(problem, number)
+    return [PlaneJudged(found=False) if each is None else _judged(arm, *each) for each in both]
 
 
 def _problem(arm: PlaneArm, rng: np.random.Generator) -> Problem | None:
@@ -92,9 +87,6 @@ def _problem(arm: PlaneArm, rng: np.random.Generator) -> Problem | None:
     return None
 
 
-def _judged(arm: PlaneArm, problem: Problem, raw: JointPath | None, method: ShorteningMethod, seed: int) -> PlaneJudged:
-    if raw is None or len(raw.waypoints) < 3:
-        return PlaneJudged(found=False)
-    short, old = before_and_after(problem, raw, method, seed)
+def _judged(arm: PlaneArm, short: JointPath, old: JointPath) -> PlaneJudged:
     proven = short.proof is not None and short.proof.proven
     return PlaneJudged(True, proven, deepest_cut(arm, short.waypoints), deepest_cut(arm, old.waypoints))
