@@ -6,10 +6,8 @@ from typing import ClassVar
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, Stop
+from rrtik_ompl.shortening.restarts import BOUND, BOUNDED_SAMPLES
 from rrtik_planners.restart_shorten import RestartShorten
-
-SAMPLES = 3000  # that are drawn to find another path, times how many were looked for in vain
-ROOM = 0.5  # of the best length, by which the first path may be longer before it is shortened
 
 
 class FastAORRTC(RestartShorten):
@@ -27,5 +25,5 @@ class FastAORRTC(RestartShorten):
         self, starts: Matrix, goals: Matrix, best: float, idle: int, checker: MotionChecker, ptc: Stop
     ) -> SearchResult:
         """See :meth:`RestartShorten.another`."""
-        bound = best * (1.0 + ROOM / idle)
-        return self.between(starts, goals, checker, ptc, bound=bound, max_iterations=SAMPLES * idle)
+        bound = best * (1.0 + (BOUND - 1.0) / idle)
+        return self.between(starts, goals, checker, ptc, bound=bound, max_iterations=BOUNDED_SAMPLES * idle)

@@ -16,16 +16,11 @@ from rrtik_ompl.fast.search.shortcut_layout import KERNELS as SHORTCUTS
 from rrtik_ompl.fast.search.taut.layout import KERNELS as TAUT
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.shortening.best import best_in_time
+from rrtik_ompl.shortening.restarts import GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
 from rrtik_ompl.shortening.task import Task
 from rrtik_ompl.transitions import route_length
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
-
-PATIENCE = 60
-QUICK_CHECKS = 120  # motions that are checked to see what a path is worth
-WORTH = 1.2  # times the length of the best path, above which one is not shortened further
-SETTLED = 1e-2  # of the length, gained less than which a path is not shortened again
-GAIN = 1e-4  # of the length, below which nothing is gained
 
 
 class RestartShorten(FastRRTConnect):

@@ -22,16 +22,10 @@ from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.planning.path_costs import COSTS, least_cost
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import shorten
+from rrtik_ompl.shortening.restarts import BOUND, BOUNDED_SAMPLES, GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
 
-PATIENCE = 60  # plans of which nothing is gained, after which the search has converged
-GAIN = 1e-4  # of the cost, below which nothing is gained
 LEAST_SECONDS = 1e-3  # for which another round is begun
-QUICK_CHECKS = 120  # motions that are checked to see what a path is worth; some 3 ms
-PLANS = 4  # of which the best is shortened further ...
-SETTLED = 1e-2  # of the cost, gained less than which a path is not shortened again
-WORTH = 1.2  # ... if it costs no more than so many times the best one
-BOUND = 1.5  # times the length of the best path are further ones to stay below, before they are shortened
-BOUNDED_SAMPLES = 3000  # that are drawn to find one
+PLANS = 4  # of which the best is shortened further, if it is worth it
 
 
 @dataclass(frozen=True, slots=True)
