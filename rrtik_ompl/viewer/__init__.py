@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import write_text
 
 if TYPE_CHECKING:
@@ -108,12 +107,6 @@ def play(
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
 
-    text = page(problem, path, asks=True)
-    if '"plan":null' in text:
-        raise InputError(
-            f"{problem.name}: its page cannot plan: give a path or a goal of joint values, no path constraints and "
-            "no obstacles that move; or use rrtik show"
-        )
-    with PageServer(text, port, lambda asked: opinion(problem, asked)) as server:
+    with PageServer(page(problem, path, asks=True), port, lambda asked: opinion(problem, asked)) as server:
         on_ready(server.url)
         server.wait()

@@ -61,9 +61,10 @@ def opinion(problem: Problem, asked: bytes) -> dict[str, Any]:
         ends = np.stack([path.start, path.end]) - np.array([found.start, found.goal])
         if np.abs(ends).max() > 0.0:
             return {"verdict": "refused", "text": "refused: the path does not lead from the start to the goal"}
-        how, proven = how_checked(world, path.waypoints), path.proved(world).proven
+        proof = world.prove(path.waypoints)
+        how = how_checked(world, path.waypoints, proof)
         words = f"{how}; {clearance_along(world, path.waypoints)}" if world.scene.obstacles else how
-        return {"verdict": "proven" if proven else "checked", "text": words}
+        return {"verdict": "proven" if proof.proven else "checked", "text": words}
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

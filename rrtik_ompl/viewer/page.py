@@ -78,7 +78,7 @@ def page(
         asks: Whether the page asks whoever serves it about each path that it finds.
 
     Raises:
-        InputError: If that cannot be shown.
+        InputError: If that cannot be shown, or the page asks and cannot plan.
     """
     if isinstance(path, TaskPlan):
         subject = replace(subject_of_run(shown, run_of(path)), held=held_in(path))
@@ -90,6 +90,11 @@ def page(
     told["plan"] = None if still else _planning(shown, subject, frame)
     if told["plan"]:
         told["plan"]["asks"] = asks
+    elif asks:
+        raise InputError(
+            f"{subject.name}: its page cannot plan: give a path or a goal of joint values, no path constraints and "
+            "no obstacles that move; or use rrtik show"
+        )
     story = json.dumps(told, allow_nan=False, separators=(",", ":"))
     return Template(_asset("page.html")).substitute(
         title=html.escape(heading),
