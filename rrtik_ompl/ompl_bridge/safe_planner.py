@@ -29,6 +29,7 @@ from rrtik_ompl.ompl_bridge.results import Failure, IllPosed, SearchResult, expl
 from rrtik_ompl.ompl_bridge.spaces.coordinates import coordinates_of
 from rrtik_ompl.ompl_bridge.spaces.unrolled import Unrolled
 from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.transitions import route_length
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, turning_joints
 
 
@@ -278,7 +279,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             return found if near is None else replace(found, path=near[0], difference=near[1])
         self._graph = found.graph or graph_of_path(found.path)
         if found.difference <= 0.0:
-            self.progress = found.progress or ((seconds, float(graph_of_path(found.path).costs.sum())),)
+            self.progress = found.progress or ((seconds, route_length(found.path)),)
         return found
 
     def _between(self, starts: Matrix, goals: Matrix, stop: Stop, *, known_free: bool = False) -> SearchResult:
