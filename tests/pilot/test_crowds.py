@@ -9,7 +9,7 @@ from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_tests.page_by_hand import UPGRADE, Page, answer
-from rrtik_tests.waiting import until
+from rrtik_tests.waiting import cut_off, until
 
 
 @pytest.fixture
@@ -54,17 +54,7 @@ def test_a_request_that_trickles_in_has_one_deadline(monkeypatch):
     with PilotServer() as server, socket.create_connection(("127.0.0.1", server.port), timeout=30) as line:
         line.sendall(b"GET / HTTP/1.1\r\n")
         line.settimeout(0.1)
-
-        def cut():
-            try:
-                line.sendall(b"A")
-                return line.recv(1) == b""
-            except TimeoutError:
-                return False
-            except OSError:
-                return True
-
-        until(cut, 60.0)
+        until(lambda: cut_off(line), 60.0)
 
 
 def test_answers_to_pages_that_have_left_do_not_pile_up(monkeypatch):

@@ -15,7 +15,7 @@ import pytest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.viewer import serve
 from rrtik_ompl.viewer.serve import PageServer
-from rrtik_tests.waiting import until
+from rrtik_tests.waiting import cut_off, until
 
 
 @pytest.fixture
@@ -75,17 +75,7 @@ def test_a_request_that_trickles_in_has_one_deadline(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(serve, "OPEN_SECONDS", 0.3)
     with PageServer("page") as server, socket.create_connection(("127.0.0.1", server.port), timeout=5) as line:
         line.settimeout(0.05)
-
-        def cut() -> bool:
-            try:
-                line.sendall(b"G")
-                return line.recv(1) == b""
-            except TimeoutError:
-                return False
-            except OSError:
-                return True
-
-        until(cut, 30.0)
+        until(lambda: cut_off(line), 30.0)
 
 
 def test_more_connections_than_a_browser_has_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
