@@ -159,7 +159,7 @@ async function startPlanning() {
   section.hidden = false;
   if (!hasKernels()) {
     section.querySelectorAll(".control").forEach((element) => { element.hidden = true; });
-    planStatus("this browser cannot plan in the page: it lacks WebAssembly with SIMD, or DecompressionStream", true);
+    planStatus("this browser cannot plan in the page: it lacks WebAssembly with SIMD", true);
     return;
   }
   try {
