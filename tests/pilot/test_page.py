@@ -84,9 +84,7 @@ def type_a_value(browser, running):
     browser.press("Enter")
     browser.wait("state.message.includes('hold Enter')")
     assert abs(browser.ask("state.joints[4].value") - browser.ask("state.joints[4].desired")) > 1.0
-    browser.key_down("Enter")
-    browser.wait("Math.abs(state.joints[4].value + 20) < 0.03")
-    browser.key_up("Enter")
+    browser.hold("Enter", "Math.abs(state.joints[4].value + 20) < 0.03")
     browser.press("1")
     browser.wait("state.selected === 0")
 
@@ -99,11 +97,9 @@ def follow(browser, running):
         if browser.ask("state.mode") != "following":
             return
         now = browser.ask("state.route.moves.findIndex(m => m.status === 'current')")
-        browser.key_down("n")
-        browser.wait(
-            f"state.mode !== 'following' || (state.route.moves[{now}].status === 'done' && !state.driving)", 20.0
+        browser.hold(
+            "n", f"state.mode !== 'following' || (state.route.moves[{now}].status === 'done' && !state.driving)"
         )
-        browser.key_up("n")
         browser.wait("!state.driving")
         browser.wait("state.mode !== 'following' || state.route.moves.some(m => m.status === 'current')")
     raise AssertionError("too many moves")

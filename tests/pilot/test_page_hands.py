@@ -49,45 +49,60 @@ def page(tab, running):
     return tab
 
 
-def azimuth(browser):
-    return browser.ask("state.joints[0].value")
+def azimuth(running):
+    """Where the azimuth is [deg], by the arm itself."""
+    return float(np.degrees(running.opened.engine.session.arm.read()[0]))
 
 
-def settled(browser, seconds=0.5):
-    """Where the azimuth is after a while [deg], by the arm itself."""
+def settled(running, seconds=0.5):
+    """The same after a while."""
     time.sleep(seconds)
-    return azimuth(browser)
+    return azimuth(running)
 
 
-def test_a_joint_moves_while_its_key_is_held_and_a_degree_farther_at_most(page, running):
-    arm = running.opened.engine.session.arm
+@pytest.fixture
+def releases(running, monkeypatch):
+    """Where the azimuth was [deg] whenever the server was told that a key is let go."""
+    noted, session = [], running.opened.engine.session
+    command = session.command
+
+    def noting(verb, *arguments, **named):
+        if verb == "release":
+            noted.append(azimuth(running))
+        return command(verb, *arguments, **named)
+
+    monkeypatch.setattr(session, "command", noting)
+    return noted
+
+
+def test_a_joint_moves_while_its_key_is_held_and_a_degree_farther_at_most(page, running, releases):
     page.press("1")
-    before = azimuth(page)
-    page.key_down("ArrowRight")
-    page.wait(f"state.joints[0].value > {before} + 5")
-    let_go = float(np.degrees(arm.read()[0]))
-    page.key_up("ArrowRight")
+    before = azimuth(running)
+    page.hold("ArrowRight", f"state.joints[0].value > {before} + 5")
     page.wait("!state.driving")
-    assert settled(page) == azimuth(page)
-    # The key is let go in the browser, after `let_go` was read: that takes a little of the way, too.
-    assert azimuth(page) - let_go < 4.0
-    there = azimuth(page)
-    page.key_down("ArrowRight")
-    page.wait(f"state.joints[0].value > {there} + 1")
-    page.ask("window.dispatchEvent(new Event('blur'))")  # another window is in front
+    page.wait("sequence === state.answered[me]")
+    there = settled(running)
+    assert settled(running, 0.2) == there
+    assert len(releases) > 0
+    assert there - releases[-1] <= 1.0
+    page.keep(
+        lambda: page.key_down("ArrowRight"),
+        lambda: page.ask("window.dispatchEvent(new Event('blur'))"),  # another window is in front
+        f"state.joints[0].value > {there} + 1",
+    )
     page.wait("!state.driving")
+    there = settled(running, 0.2)
+    assert settled(running) == there
     page.key_up("ArrowRight")
 
 
-def test_space_stops_although_the_arrow_is_still_held(page):
+def test_space_stops_although_the_arrow_is_still_held(page, running):
     page.press("1")
-    before = azimuth(page)
-    page.key_down("ArrowRight")
-    page.wait(f"state.joints[0].value > {before} + 2")
-    page.press(" ")
+    before = azimuth(running)
+    page.keep(lambda: page.key_down("ArrowRight"), lambda: page.press(" "), f"state.joints[0].value > {before} + 2")
     page.wait("state.message.startsWith('stopped') && !state.driving")
-    there = settled(page, 0.2)
-    assert settled(page) == there
+    there = settled(running, 0.2)
+    assert settled(running) == there
     page.key_up("ArrowRight")
 
 
@@ -111,20 +126,32 @@ def test_who_watches_may_stop_the_arm_and_the_button_is_large(page):
         assert page.ask(CUT_OFF) == [], (width, height)
 
 
-def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is_pulled_out(page):
+def keep_pushed(page, button, script, end=None):
+    """Push a button of the gamepad until something is so; `end` is what ends it then, if it is not let go."""
+
+    def let_go():
+        page.ask(f"push({button}, false)")
+        page.wait(f"held === null && !padBefore[{button}]")
+
+    page.keep(
+        lambda: page.ask(f"push({button}, true)"),
+        lambda: page.ask(end) if end and page.ask(script) else let_go(),
+        script,
+    )
+
+
+def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is_pulled_out(page, running):
     page.ask(PAD)
     page.wait("!document.getElementById('pad').hidden")
     page.press("1")
     page.wait("state.selected === 0")
-    before = azimuth(page)
+    before = azimuth(running)
     page.ask("pad.axes[0] = 1; 0")
-    assert settled(page, 0.3) == before  # not without the shoulder button
-    page.ask("push(4, true)")
-    page.wait(f"state.joints[0].value > {before} + 3")
-    page.ask("window.pad = null; 0")
+    assert settled(running, 0.3) == before  # not without the shoulder button
+    keep_pushed(page, 4, f"state.joints[0].value > {before} + 3", "window.pad = null; 0")
     page.wait("!state.driving && document.getElementById('pad').hidden")
-    there = settled(page, 0.2)
-    assert settled(page, 0.3) == there
+    there = settled(running, 0.2)
+    assert settled(running, 0.3) == there
     page.ask(PAD)
     for button, wanted in ((13, "state.selected === 1"), (12, "state.selected === 0"), (14, "state.speed === 0.5"),
                            (15, "state.speed === 1")):  # fmt: skip
@@ -159,10 +186,9 @@ def test_a_whole_route_by_a_gamepad_alone(page, running):
         if page.ask("state.mode") != "following":
             break
         now = page.ask("state.route.moves.findIndex(m => m.status === 'current')")
-        page.ask("push(0, true)")
-        page.wait(f"state.mode !== 'following' || (state.route.moves[{now}].status === 'done' && !state.driving)", 20.0)
-        page.ask("push(0, false)")
-        time.sleep(0.1)  # the page looks at it every 40 ms
+        keep_pushed(
+            page, 0, f"state.mode !== 'following' || (state.route.moves[{now}].status === 'done' && !state.driving)"
+        )
         page.wait("state.mode !== 'following' || state.route.moves.some(m => m.status === 'current')")
     page.wait("state.message === 'all moves are done'")
     assert page.ask("state.aim.distance") < 0.002

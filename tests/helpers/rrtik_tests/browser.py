@@ -89,6 +89,30 @@ class Browser:
     def key_up(self, key):
         self.call("Input.dispatchKeyEvent", type="keyUp", **self._words(key))
 
+    def hold(self, key, script, seconds=90.0):
+        """Hold a key until something is so, and let it go."""
+        self.keep(lambda: self.key_down(key), lambda: self.key_up(key), script, seconds)
+
+    def keep(self, press, release, script, seconds=90.0):
+        """Press something until something is so, and release it.
+
+        A machine that pauses renews what is held too late, and the arm rightly stops: pressed again, as a pilot does.
+        """
+        end, patience = time.monotonic() + seconds, 1.0
+        press()
+        began = time.monotonic()
+        while not self.ask(f"document.readyState === 'complete' && ({script})"):
+            now = time.monotonic()
+            assert now < end, f"{script}: held in vain; message: {self.text('message')}"
+            if self.ask("state.driving"):
+                began = now
+            elif now - began > patience:
+                release()
+                press()
+                began, patience = time.monotonic(), 1.5 * patience
+            time.sleep(0.03)
+        release()
+
     def drag(self, begin, end, steps=8):
         """Press the mouse at one place [pixels], move it to another, let go."""
         places = [[a + (b - a) * k / steps for a, b in zip(begin, end, strict=True)] for k in range(steps + 1)]
@@ -113,6 +137,24 @@ class Browser:
         self._loop.close()
 
 
+class PatientLoop(Loop):
+    """A loop whose clock waits for a machine that pauses: from picture to picture it advances by 0.1 s at most."""
+
+    _now = _real = 0.0
+    _latest = 0.1
+
+    @property
+    def time(self):
+        real = super().time
+        self._now = min(self._now + max(real - self._real, 0.0), self._latest)
+        self._real = real
+        return self._now
+
+    def _step(self):
+        self._latest = self.time + 0.1
+        super()._step()
+
+
 class Running:
     """A session with its server, in a thread of its own."""
 
@@ -126,7 +168,7 @@ class Running:
         with PilotServer(title="test") as server:
             self.server = server
             self._ready.set()
-            Loop(self.opened.engine, server, watch_only=self._wanted.replay is not None).run(self._ended.is_set)
+            PatientLoop(self.opened.engine, server, watch_only=self._wanted.replay is not None).run(self._ended.is_set)
         self.opened.close()
 
     def __enter__(self):
