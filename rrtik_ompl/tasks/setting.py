@@ -52,7 +52,7 @@ class Setting:
             return Setting(self._like, with_gripper(self.robot, stage), self.scene)
         if isinstance(stage, Attach):
             pose = self.robot.fk(q, stage.link).actInv(self.scene.obstacle(stage.object).pose)
-            scene = self.scene.attaching(stage.object, stage.link, stage.allow, pose=pose)
+            scene = self.scene.attaching(stage.object, stage.link, stage.allow, pose=pose, padding=stage.padding)
             return Setting(self._like, self.robot, scene)
         held = next(item for item in self.scene.attached if item.name == stage.object)
         pose = self.robot.fk(q, held.link) * held.pose

@@ -108,20 +108,23 @@ class Attach:
         object: Name of the obstacle.
         link: That holds it.
         allow: Links and obstacles that it may touch while it is held, beside that link.
+        padding: What it keeps while it is held from all that it may not touch [m].
 
     Example:
-        >>> rrtik.Attach("box", "panda_hand", allow=["table"]).allow
+        >>> rrtik.Attach("box", "panda_hand", allow=["table"], padding=0.005).allow
         ('table',)
     """
 
     object: str
     link: str
     allow: tuple[str, ...] = ()
+    padding: float = 0.0
 
     def __post_init__(self) -> None:
         require(self.object, str, "object of Attach")
         require(self.link, str, "link of Attach")
         object.__setattr__(self, "allow", _names(self.allow, "allow of Attach"))
+        object.__setattr__(self, "padding", not_negative(self.padding, "padding of Attach"))
 
     def __str__(self) -> str:
         return f"Attach '{self.object}'"

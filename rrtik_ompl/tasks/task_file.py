@@ -84,6 +84,7 @@ class HoldEntry(Section):
     object: Name
     link: Name
     allow: list[Name] = Field(default=[], description="links and obstacles that it may touch while it is held")
+    padding: NotNegative = Field(0.0, description="what it keeps while it is held from all that it may not touch [m]")
 
 
 class AttachEntry(Section):
@@ -94,7 +95,7 @@ class AttachEntry(Section):
     def build(self, robot: Robot) -> Attach:
         """The stage."""
         del robot
-        return Attach(self.attach.object, self.attach.link, tuple(self.attach.allow))
+        return Attach(self.attach.object, self.attach.link, tuple(self.attach.allow), self.attach.padding)
 
 
 class DetachEntry(Section):
@@ -231,7 +232,8 @@ def stage_data(stage: Stage) -> dict[str, Any]:
             raise InputError("Straight: a task file cannot say to=[x, y, z]; give a pose, or by=[dx, dy, dz]")
         return {"straight": {"to": pose_data(stage.to)}}
     if isinstance(stage, Attach):
-        return {"attach": {"object": stage.object, "link": stage.link, "allow": list(stage.allow)}}
+        thick = {"padding": stage.padding} if stage.padding else {}
+        return {"attach": {"object": stage.object, "link": stage.link, "allow": list(stage.allow), **thick}}
     if isinstance(stage, Detach):
         return {"detach": stage.object}
     return {"gripper": stage.state} | ({} if stage.width is None else {"width": stage.width})

@@ -6,7 +6,6 @@ import base64
 import html
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from importlib.util import find_spec
@@ -27,7 +26,7 @@ from rrtik_ompl.viewer.page_planner import packed, page_planner
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import play_pace, story_of
 from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
-from rrtik_ompl.viewer.task_story import held_in, run_of
+from rrtik_ompl.viewer.task_story import subject_of_task
 
 # The page may run its own script and nothing else: no request leaves the machine that shows it.
 # WebAssembly may be compiled, text may not be run as script.
@@ -81,7 +80,7 @@ def page(
         InputError: If that cannot be shown, or the page asks and cannot plan.
     """
     if isinstance(path, TaskPlan):
-        subject = replace(subject_of_run(shown, run_of(path)), held=held_in(path))
+        subject = subject_of_task(shown, path)
     else:
         subject = subject_of(shown, path, before, ghosts, tuple(marks)) if run is None else subject_of_run(shown, run)
     recording, frame = draw(subject)

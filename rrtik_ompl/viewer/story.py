@@ -53,6 +53,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "timed": subject.times is not None,
         "clearance": None if robot is None or subject.curve is None else _clearance(subject.curve),
         "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene, frame),
+        "fingers": None if subject.fingers is None else subject.fingers.story(),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
         "overview": _numbers(overview(_places(subject), subject.scene)),
         "planar": robot is not None and robot.planar,

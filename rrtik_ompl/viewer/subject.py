@@ -18,6 +18,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory import Trajectory
 from rrtik_ompl.viewer.drawing.marks import Mark
+from rrtik_ompl.viewer.fingers import Fingers
 from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import ClearanceCurve, clearance_along
 from rrtik_ompl.world.holding_world import HoldingWorld
@@ -49,6 +50,7 @@ class Subject:
         curve: How far the path stays from obstacles, or None if that is not known.
         times: When the waypoints of a timed motion are reached [s], shape (k,), or None.
         held: Regions of path constraints, and the configurations, shape (dof,), in which they begin to be held.
+        fingers: Of a task: where the gripper's fingers are in the ticks of the run, or None.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Subject:
     curve: ClearanceCurve | None = None
     times: Vector | None = None
     held: tuple[tuple[HeldRegion, Vector], ...] = ()
+    fingers: Fingers | None = None
 
     @property
     def start(self) -> Vector | None:

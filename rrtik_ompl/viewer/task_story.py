@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.errors import InputError
@@ -12,10 +14,25 @@ from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.replanning.record import ReplanRun, Tick
 from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.timed import time_task
+from rrtik_ompl.viewer.fingers import fingers_of
+from rrtik_ompl.viewer.subject import Showable, Subject, subject_of_run
 from rrtik_ompl.world import World
 
 TASK = "task"  # the planner of a run that shows one
 RATE = 25.0  # ticks per second
+
+
+def subject_of_task(shown: Showable, plan: TaskPlan) -> Subject:
+    """What a page shows of a plan: its run, the regions that are kept on the way, and the gripper at work.
+
+    Raises:
+        InputError: If there is no plan to show, or it does not fit what is shown.
+    """
+    rows = _timed(plan)
+    subject = subject_of_run(shown, _run(plan, rows))
+    assert subject.robot is not None, "a run has one"
+    at = np.array([number + share for number, _, share in rows])
+    return replace(subject, held=held_in(plan), fingers=fingers_of(plan, subject.robot, at))
 
 
 def run_of(plan: TaskPlan) -> ReplanRun:
@@ -24,12 +41,14 @@ def run_of(plan: TaskPlan) -> ReplanRun:
     Raises:
         InputError: If there is no plan to show.
     """
-    if not plan.paths:
-        raise InputError("task plan to show: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
+    return _run(plan, _timed(plan))
+
+
+def _run(plan: TaskPlan, rows: list[tuple[int, Vector, float]]) -> ReplanRun:
     robot = plan.worlds[0].robot
     held_first = {item.name for item in plan.worlds[0].scene.attached}
     ticks: list[Tick] = []
-    for number, q in _timed(plan):
+    for number, q, _ in rows:
         path, world = plan.paths[number], plan.worlds[number]
         text = f"motion {number + 1} of {len(plan.paths)}: {plan.stages[number]}"
         poses = {name: pose for name, pose in _poses(world, q).items() if name not in held_first}
@@ -59,16 +78,32 @@ def held_in(plan: TaskPlan) -> tuple[tuple[HeldRegion, Vector], ...]:
     return tuple(found)
 
 
-def _timed(plan: TaskPlan) -> list[tuple[int, Vector]]:
-    """Number of the motion and configuration, tick after tick; a motion that leads nowhere has one too."""
+def _timed(plan: TaskPlan) -> list[tuple[int, Vector, float]]:
+    """Number of the motion, configuration and share of the rest before the next motion that is over, tick after tick.
+
+    A motion that leads nowhere has a tick too.
+
+    Raises:
+        InputError: If there is no motion.
+    """
+    if not plan.paths:
+        raise InputError("task plan to show: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
     if not any(path.length > 0.0 for path in plan.paths):
-        return [(number, path.start) for number, path in enumerate(plan.paths)]
+        return [(number, path.start, 0.0) for number, path in enumerate(plan.paths)]
     timed = time_task(plan)
     clock, states = timed.trajectory.sampled(RATE)
     numbers = np.searchsorted(timed.begins, clock, side="right") - 1
     missing = np.setdiff1d(np.arange(len(plan.paths)), numbers).tolist()  # what leads nowhere takes no time
-    rows = [*zip(numbers.tolist(), states.positions, strict=True), *((k, plan.paths[k].start) for k in missing)]
-    return [(number, frozen(q)) for number, q in sorted(rows, key=lambda row: row[0])]
+    rests = [_share_of_rest(timed.pauses, time) for time in clock.tolist()]
+    rows = [*zip(numbers.tolist(), states.positions, rests, strict=True)]
+    rows += [(k, plan.paths[k].start, 0.0) for k in missing]
+    return [(number, frozen(q), share) for number, q, share in sorted(rows, key=lambda row: row[0])]
+
+
+def _share_of_rest(pauses: Matrix, time: float) -> float:
+    """How much is over of the rest, of some rests (begin, end), in which a time lies; 0 between them."""
+    resting = pauses[(pauses[:, 0] < time) & (time < pauses[:, 1])]
+    return float((time - resting[0, 0]) / (resting[0, 1] - resting[0, 0])) if len(resting) else 0.0
 
 
 def _poses(world: World, q: Vector) -> dict[str, Vector]:

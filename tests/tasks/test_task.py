@@ -191,6 +191,7 @@ def test_a_robot_without_gripper_joints_and_a_start_in_collision(titan):
         (lambda: Task([MoveTo("ready"), "open"]), "each stage of a task"),
         (lambda: Task(MoveTo("ready")), "expected a list of stages"),
         (lambda: Attach("cup", 3), "link of Attach"),
+        (lambda: Attach("cup", "panda_hand", padding=-0.01), "padding of Attach must not be negative"),
         (lambda: MoveTo(np.diag([1.0, 1.0, -1.0, 1.0])), "mirrors"),
     ],
 )
@@ -306,3 +307,29 @@ def test_every_argument_of_a_stage_is_taken_or_refused_in_a_line(value):
     for make in made:
         with suppress(InputError):  # whose text is a line, always; nothing else may be raised
             make()
+
+
+@pytest.mark.kernels
+def test_what_is_held_keeps_its_padding_and_what_is_let_go_has_none():
+    robot = rrtik.load_robot("ur5")
+    start = np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+    tip = robot.fk(start).translation
+    part = rrtik.Obstacle("part", rrtik.Sphere(0.02), tip - np.array([0.0, 0.0, 0.1]))
+    shelf = rrtik.Obstacle("shelf", rrtik.Box([0.2, 0.2, 0.02]), tip - np.array([0.0, 0.0, 0.15]))  # 20 mm lower
+    world = rrtik.World(
+        robot, rrtik.Scene([part, shelf], allowed_collisions=[("part", "ee_link"), ("part", "wrist_3_link")])
+    )
+
+    def taken(padding):
+        return Task(
+            [Attach("part", "ee_link", ["wrist_3_link"], padding=padding), Straight(by=[0.0, 0.1, 0.0]), Detach("part")]
+        )
+
+    plan = taken(0.015).plan(world, start, seed=1)
+    assert plan.found, plan.reason
+    assert plan.worlds[0].scene.attached[0].padding == 0.015
+    again = Task([Attach("part", "ee_link", padding=0.0), Straight(by=[0.0, -0.1, 0.0])])
+    assert again.plan(plan.end, plan.paths[-1].end, seed=1).found
+    refused = taken(0.025).plan(world, start, seed=1)
+    assert not refused.found
+    assert "shelf" in refused.reason

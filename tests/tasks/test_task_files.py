@@ -22,7 +22,7 @@ scene:
 start: {joints: [0.0, -1.6, 1.8, -0.2, 1.6, 0.0]}
 task:
   - straight: {by: [0, 0, 0.05]}
-  - attach: {object: part, link: ee_link, allow: [forearm_link]}
+  - attach: {object: part, link: ee_link, allow: [forearm_link], padding: 0.004}
   - alternatives:
       - - move_to: {position: [5.0, 0.0, 0.0]}
       - - move_to: {joints: [0.5, -1.6, 1.8, -0.2, 1.6, 0.0]}
@@ -75,7 +75,8 @@ def test_a_plan_comes_back_from_its_file_as_it_was(small, tmp_path):
         assert np.array_equal(one.waypoints, other.waypoints)
     for one, other, path in zip(plan.worlds, again.worlds, plan.paths, strict=True):
         assert one.scene.names == other.scene.names
-        assert [a.link for a in one.scene.attached] == [a.link for a in other.scene.attached]
+        for a, b in zip(one.scene.attached, other.scene.attached, strict=True):
+            assert (a.link, a.padding) == (b.link, b.padding) == ("ee_link", 0.004)
         assert path.violations(other) == ()
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -15,34 +13,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.crane import WAYPOINTS
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-PANE = np.s_[50:700, 0:860]  # of a window of 1280 x 800: where the 3-D picture is
-
-
-def chromium(url: str, *options: str) -> str:
-    if CHROMIUM is None:
-        pytest.skip("no chromium on PATH: pages cannot be looked at")
-    common = (
-        "--headless=new",
-        "--no-sandbox",
-        "--hide-scrollbars",
-        "--window-size=1280,800",
-        "--virtual-time-budget=8000",
-    )
-    graphics = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-    ended = subprocess.run(
-        [CHROMIUM, *common, *graphics, *options, url], capture_output=True, text=True, timeout=120, check=True
-    )
-    return ended.stdout
-
-
-def screenshot(target: Path, fragment: str) -> np.ndarray:
-    import cv2
-
-    picture = target.with_suffix(".png")
-    chromium(f"{target.as_uri()}{fragment}", f"--screenshot={picture}")
-    return cv2.imread(str(picture))[PANE][..., ::-1].astype(float)
+from rrtik_tests.page_pictures import chromium, screenshot
 
 
 def share_of(color: str, picture: np.ndarray, likeness: float) -> float:

@@ -18,15 +18,35 @@ function showLine(name, number, color, radius) {
   viewer.set_object([...ROOT, name], group);
 }
 
-function showRun(time, tick, share) {
-  for (const [name, { placement, poses }] of Object.entries(run.moving)) {
-    const [a, b] = [poses[tick], poses[Math.min(tick + 1, poses.length - 1)]];
-    const place = new THREE.Vector3(...a.slice(0, 3)).lerp(new THREE.Vector3(...b.slice(0, 3)), share);
-    const turn = new THREE.Quaternion(...a.slice(3)).slerp(new THREE.Quaternion(...b.slice(3)), share);
-    const pose = new THREE.Matrix4().compose(place, turn, new THREE.Vector3(1, 1, 1)).multiply(rowMajor(placement));
-    const group = node("obstacles", name);
+/** The pose between two of a list, at a place such as 2.5. */
+function poseBetween(poses, place) {
+  const k = Math.min(Math.floor(place), poses.length - 1);
+  const [a, b] = [poses[k], poses[Math.min(k + 1, poses.length - 1)]];
+  const spot = new THREE.Vector3(...a.slice(0, 3)).lerp(new THREE.Vector3(...b.slice(0, 3)), place - k);
+  const turn = new THREE.Quaternion(...a.slice(3)).slerp(new THREE.Quaternion(...b.slice(3)), place - k);
+  return new THREE.Matrix4().compose(spot, turn, new THREE.Vector3(1, 1, 1));
+}
+
+/** Fingers where they are in a tick: what is drawn is moved on its joint. */
+const drawnFingers = new Map();
+function showFingers(tick, share) {
+  const { bodies, at } = story.fingers;
+  const place = at[tick] + share * (at[Math.min(tick + 1, at.length - 1)] - at[tick]);
+  for (const { joint, name, poses } of bodies) {
+    const group = node("robot", joint, name);
+    if (!drawnFingers.has(group)) drawnFingers.set(group, group.matrix.clone());
+    const pose = poseBetween(poses, place).multiply(drawnFingers.get(group));
     pose.decompose(group.position, group.quaternion, group.scale);
   }
+}
+
+function showRun(time, tick, share) {
+  for (const [name, { placement, poses }] of Object.entries(run.moving)) {
+    const group = node("obstacles", name);
+    const pose = poseBetween(poses, tick + share).multiply(rowMajor(placement));
+    pose.decompose(group.position, group.quaternion, group.scale);
+  }
+  if (story.fingers) showFingers(tick, share);
   const wanted = `${run.line[tick]} ${run.replaced[tick]}`;
   if (wanted !== shownLines) {
     shownLines = wanted;
