@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from urllib.parse import unquote
@@ -9,13 +10,14 @@ from urllib.parse import unquote
 from rrtik_ompl.errors import InputError, MissingFileError
 
 MESH_SUFFIXES = (".stl", ".obj", ".dae")
+_FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)/*(.*)")
 
 
 def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where: str) -> Path:
     """Absolute path of an existing mesh file.
 
     ``package://NAME/REST`` is sought as DIR/NAME/REST in ``packages``, in the URDF's folder and in every folder
-    above it, and as DIR/REST where DIR itself is called NAME.
+    above it, and as DIR/REST where DIR itself is called NAME; ``file://$(find NAME)/REST`` of xacro likewise.
 
     Args:
         uri: What the URDF says.
@@ -30,6 +32,8 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
     scheme, _, rest = uri.rpartition("://")
     if scheme not in ("", "file", "package", "model"):
         raise InputError(f"{where}: mesh '{uri}' is not a file; use package://, file:// or a path")
+    if inside := _FIND.match(rest):
+        scheme, rest = "package", f"{inside[1]}/{inside[2]}"
     roots = [Path(p) for p in packages]
     roots += [] if folder is None else [folder, *folder.parents]
     name = unquote(rest) if scheme else rest

@@ -96,6 +96,19 @@ def test_parameters_may_stand_within_their_names_on_the_parameter_server(folder,
         load_robot(folder)
 
 
+def test_meshes_may_be_named_as_xacro_finds_packages(folder):
+    """As in the URDF of MoveIt's own resources, which is named .urdf all the same."""
+    text = (data_folder() / PACKAGE / "urdf" / "panda.urdf").read_text()
+    named = text.replace("package://example-robot-data/robots/panda_description", "file://$(find panda_description)")
+    assert named != text
+    (folder / "config" / "panda.urdf").write_text(named)
+    q = np.array(READY)
+    assert load_robot(folder).fk(q).isApprox(load_robot("panda").fk(q, "panda_link8"), 1e-12)
+    (folder / "config" / "panda.urdf").write_text(named.replace("find panda_description", "find panda_parts"))
+    with pytest.raises(InputError, match=r"packages=\[the folder that holds 'panda_parts'\]"):
+        load_robot(folder)
+
+
 def test_the_gripper_is_that_of_the_end_effectors_states(folder):
     hand = load_robot(folder).gripper
     assert hand.posture("open") == {"panda_finger_joint1": 0.04}
