@@ -32,6 +32,7 @@ FilePath = str | os.PathLike[str]
 
 ONLY_PATHS = (".csv", ".txt")  # endings; a .json may be either
 NO_GOAL = "it has stages and no goal"
+OF_TASKS = {"task": NO_GOAL, "goals": "it has several goals, to be reached in order"}  # by keys
 OF_PATHS = ("waypoints", "points")  # keys of files of paths and of trajectories
 
 
@@ -108,8 +109,10 @@ def _read(path: Path) -> YamlDocument:
     if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
         name = path.name
         raise InputError(f"{path}: a path, not a problem; name its problem before it: rrtik check PROBLEM {name}")
-    if isinstance(document.data, dict) and "task" in document.data and "goal" not in document.data:
-        raise InputError(f"{path}: a task, not a problem: {NO_GOAL}; use rrtik task {path.name}")
+    if isinstance(document.data, dict) and "goal" not in document.data:
+        for key, what in OF_TASKS.items():
+            if key in document.data:
+                raise InputError(f"{path}: a task, not a problem: {what}; use rrtik task {path.name}")
     return document
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import list_problems, robot_from_entry, task_files
@@ -24,19 +26,22 @@ from rrtik_ompl.files.sections import (
     tag,
     told_apart_by,
 )
-from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.goal import Goal
 from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, build_goal, goal_data
-from rrtik_ompl.problem_files.path_constraints import ConstraintSection, constraint_data
+from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.robot import RobotEntry
 from rrtik_ompl.problem_files.scene import PoseEntry, SceneEntry, pose_data
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight
+from rrtik_ompl.tasks.through import placed_constraints
 from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
 
 NO_STAGES = "it has a goal and no stages"
+OF_TASKS = ("task", "goals")  # keys, one of which a task file has
 
 
 class MoveToEntry(Section):
@@ -49,8 +54,12 @@ class MoveToEntry(Section):
 
     def build(self, robot: Robot) -> MoveTo:
         """The stage."""
-        goal = self.move_to.posture if isinstance(self.move_to, Posture) else build_goal(self.move_to, robot)
-        return MoveTo(goal, tuple(section.build(robot) for section in self.path_constraints))
+        return _move_to(self.move_to, robot, [section.build(robot) for section in self.path_constraints])
+
+
+def _move_to(section: GoalSection, robot: Robot, held: Iterable[TaskRegion]) -> MoveTo:
+    goal = section.posture if isinstance(section, Posture) else build_goal(section, robot)
+    return MoveTo(goal, tuple(held))
 
 
 class LineEntry(Section):
@@ -150,9 +159,21 @@ class TaskFile(Section):
     robot: RobotEntry
     scene: SceneEntry = Field(default=SceneEntry())
     start: StartSection
-    task: Annotated[list[StageEntry], Field(min_length=1)]
+    task: Annotated[list[StageEntry], Field(min_length=1)] | None = None
+    goals: Annotated[list[GoalSection], Field(min_length=1)] | None = Field(
+        None, description="in place of task: goals that are reached one after the other"
+    )
+    path_constraints: list[ConstraintSection] = Field(
+        default=[], description="regions that a frame must not leave on the way through all goals"
+    )
     motion_resolution: Positive = Field(MOTION_RESOLUTION, ge=FINEST_RESOLUTION, description="[m]")
     self_margin: NotNegative = Field(0.0, description="[m]")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> TaskFile:
+        if exactly_one(self, ("task", "goals"), "a task") == "task" and self.path_constraints:
+            raise PydanticCustomError("kept", "path_constraints of a task stand beside its move_to stages")
+        return self
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,7 +220,7 @@ def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
             raise UnknownNameError("task", name_or_file, shipped)
         path = shipped[name_or_file]
     document = read_yaml(path)
-    if isinstance(document.data, dict) and "task" not in document.data and "goal" in document.data:
+    if isinstance(document.data, dict) and "goal" in document.data and document.data.keys().isdisjoint(OF_TASKS):
         raise InputError(f"{path}: a problem, not a task: {NO_STAGES}; use rrtik plan {path.name}")
     entry = parse(document, TaskFile)
     with document.at(("robot",)):
@@ -209,9 +230,22 @@ def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
         world = World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
     with document.at(("start",)):
         start = entry.start.configuration(robot)
-    with document.at(("task",)):
-        task = Task([stage.build(robot) for stage in entry.task])
-    return LoadedTask(world, start, task, path.stem)
+    return LoadedTask(world, start, Task(_stages(document, entry, world, start)), path.stem)
+
+
+def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector) -> list[Stage]:
+    """The stages that a file lists, or one for each of its goals."""
+    if entry.task is not None:
+        with document.at(("task",)):
+            return [stage.build(world.robot) for stage in entry.task]
+    held = build_constraints(document, entry.path_constraints, world.robot)
+    with document.at(("path_constraints",)):
+        placed = placed_constraints(world, start, held)
+    stages: list[Stage] = []
+    for number, goal in enumerate(entry.goals or ()):
+        with document.at(("goals", number)):
+            stages.append(_move_to(goal, world.robot, placed))
+    return stages
 
 
 def stage_data(stage: Stage) -> dict[str, Any]:

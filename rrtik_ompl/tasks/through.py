@@ -42,6 +42,18 @@ class PlanThrough:
     reason: str
 
 
+def placed_constraints(
+    world: World, start: ArrayLike | str, constraints: Iterable[TaskRegion]
+) -> tuple[TaskRegion, ...]:
+    """Path constraints as seen from a start, for stages that begin elsewhere.
+
+    Raises:
+        ProblemError: If the start does not keep them, or cannot be used.
+    """
+    held = tuple(constraints)
+    return Problem(world, start, start, constraints=held).constraints if held else ()
+
+
 def plan_through(
     world: World,
     start: ArrayLike | str,
@@ -78,8 +90,7 @@ def plan_through(
         raise InputError(
             "goals to be reached in order: there is none; give at least one, such as PoseGoal(T_world_tip)"
         )
-    held = tuple(constraints)
-    placed = Problem(world, start, start, constraints=held).constraints if held else ()
+    placed = placed_constraints(world, start, constraints)
     if dimensions(goals) == 1 and all(isinstance(goal, Real) for goal in wanted):
         raise InputError("goals to be reached in order: this is one configuration; put it into a list: [q]")
     stages = [MoveTo(goal, constraints=placed) for goal in wanted]

@@ -1,6 +1,7 @@
 """Task files, plans in files, the commands and the page."""
 
 import json
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -179,3 +180,68 @@ def test_what_is_no_task_and_what_is_no_plan(tmp_path, small, capsys):
     assert "a task, not a problem" in capsys.readouterr().err
     assert run(["straight", "titan4_sdu"]) == 2
     assert "only one of them" in capsys.readouterr().err
+
+
+TOUR = """\
+version: 1
+robot: ur5
+start: {joints: [0.0, -1.6, 1.8, -0.2, 1.6, 0.0]}
+goals:
+  - {joints: [0.8, -1.6, 1.8, -0.2, 1.6, 0.0]}
+  - {position: [0.3, 0.3, 0.4]}
+  - {joints: [0.0, -1.6, 1.8, -0.2, 1.6, 0.0]}
+path_constraints:
+  - {upright: {axis: y, tolerance_deg: 20}}
+"""
+
+
+@pytest.mark.kernels
+def test_goals_in_order_are_the_tour_that_python_plans(tmp_path, capsys):
+    file = tmp_path / "tour.yaml"
+    file.write_text(TOUR)
+    loaded = rrtik.load_task(file)
+    plan = loaded.task.plan(loaded.world, loaded.start, seed=2)
+    assert plan.found, plan.reason
+    goals = [np.add(loaded.start, [0.8, 0, 0, 0, 0, 0]), rrtik.PositionGoal([0.3, 0.3, 0.4]), loaded.start]
+    cup = rrtik.upright(loaded.world.robot, "y", tolerance_deg=20.0)
+    tour = rrtik.plan_through(loaded.world, loaded.start, goals, constraints=[cup], seed=2)
+    rows = [plan.paths[0].waypoints, *(path.waypoints[1:] for path in plan.paths[1:])]
+    assert np.array_equal(np.vstack(rows), tour.path.waypoints)
+    rrtik.save_task_plan(plan, tmp_path / "plan.json")
+    assert len(rrtik.load_task_plan(tmp_path / "plan.json").paths) == 3
+    assert run(["task", str(file), "--seed", "2", "--trajectory", str(tmp_path / "tour.json")]) == 0
+    assert "tour: 3 motions" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "goals:",
+            "task: [{move_to: {posture: up}}]\ngoals:",
+            "needs exactly one of task, goals; found task and goals",
+        ),
+        ("{position: [0.3", "{place: [0.3", "tour.yaml:6: goals"),
+        ("joints: [0.8, ", "joints: [", r"tour.yaml:5: .*joints.*6 joints"),
+        ("upright: {axis: y", "on_plane: {axis: y", "tour.yaml:9: path_constraints"),
+    ],
+)
+def test_a_bad_tour_is_refused_with_file_and_line(tmp_path, capsys, old, new, words):
+    file = tmp_path / "tour.yaml"
+    assert old in TOUR
+    file.write_text(TOUR.replace(old, new))
+    code = run(["task", str(file)])
+    said = capsys.readouterr()
+    assert code == 2
+    assert re.search(words, said.err), said.err
+    assert said.err.count("\n") == 1
+
+
+def test_a_list_of_goals_is_no_problem_and_says_what_it_is(tmp_path, capsys):
+    file = tmp_path / "tour.yaml"
+    file.write_text(TOUR)
+    assert run(["plan", str(file)]) == 2
+    assert "it has several goals, to be reached in order; use rrtik task tour.yaml" in capsys.readouterr().err
+    file.write_text(TOUR.replace("goals:", "task:").replace("- {", "- move_to: {", 3))
+    assert run(["task", str(file)]) == 2
+    assert "path_constraints of a task stand beside its move_to stages" in capsys.readouterr().err
