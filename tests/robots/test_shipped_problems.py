@@ -7,6 +7,7 @@ import pytest
 from rrtik_ompl.catalog import find_problem, list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.goal import JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.planning import plan
 from rrtik_ompl.problem_files.problem import load_problem, problem_schema, save_problem
 
 NAMES = [
@@ -17,6 +18,8 @@ NAMES = [
     *("titan4_regular", "titan4_sdu", "titan4_valve_level", "titan4_wrist", "ur5_upright"),
     *("panda_upright", "two_titan4"),
 ]
+ARMS = ["panda_shelf", "ur5_table", "ur10_bin", "xarm7_cage", "kinova_table", "so101_bin"]  # a visitor's first plans
+NAMES += ARMS
 SINGULAR = {
     "titan4_axis1": (11.4592, 80, 43.9549, -33.9549, 0, 17.1887),
     "titan4_p_axis1": (11.4592, 80, 40.8559, -20.8559, 22.9183, 17.1887),
@@ -65,6 +68,17 @@ def test_every_problem_survives_writing_and_reading(name, tmp_path):
     q = np.random.default_rng(0).uniform(-0.5, 0.5, (10, problem.robot.dof))
     np.testing.assert_allclose(copy.goal.distance(copy.robot, q), problem.goal.distance(problem.robot, q), rtol=1e-9)
     np.testing.assert_array_equal(copy.world.valid_batch(q), problem.world.valid_batch(q))
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", ARMS)
+def test_a_problem_of_an_arm_that_people_have_is_solved_and_proven(name):
+    problem = load_problem(name)
+    found = plan(problem, seed=1, seconds=20.0)
+    assert found.found, found.reason
+    assert found.proven
+    assert len(found.path.waypoints) > 2, "the straight motion must not solve it"
+    assert problem.reached(found.path.end)
 
 
 @pytest.mark.parametrize("name", [*SINGULAR, *REGULAR])
