@@ -178,6 +178,12 @@ else:
     }
     _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
     __all__ = sorted(_HOME_OF)
+    _NOTEBOOK = "viewer.notebook"
+
+    def html_of(value: object) -> str | None:
+        """What a notebook shows of a value (`_repr_html_`), or None."""
+        drawn: str | None = import_module(f"rrtik_ompl.{_NOTEBOOK}").html_of(value)
+        return drawn
 
     RENAMED = {"GoalRegion": "GoalSet", "Run": "ReplanRun", "Waypoints": "TimedPoses", "timed": "time_parameterize"}
 

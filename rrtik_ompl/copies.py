@@ -1,7 +1,8 @@
-"""Copies of objects: variants of them that share all but a few attributes, and copies for other processes."""
+"""Copies of objects and views of them: variants that share most, copies for other processes, lines, pictures."""
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields, is_dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import frozen
 
 Thing = TypeVar("Thing")
+MOST_SHOWN = 8  # numbers of an array, or items of a tuple, in one line
+LONGEST_TEXT = 100  # letters of an item in one line
 
 
 def shallow_copy(thing: Thing) -> Thing:
@@ -77,3 +80,45 @@ def unpacked(value: object) -> object:
     if isinstance(value, _ReadOnlyMapping):
         return MappingProxyType({key: unpacked(item) for key, item in value.values.items()})
     return frozen(value.values, value.values.dtype) if isinstance(value, _ReadOnlyArray) else value
+
+
+def in_one_line(thing: Any) -> str:
+    """``__repr__`` of a dataclass: long arrays by their shape, long tuples by their number of items.
+
+    Example:
+        >>> @dataclass(frozen=True, slots=True)
+        ... class Points:
+        ...     places: Matrix
+        ...     __repr__ = in_one_line
+    """
+    shown = (f"{field.name}={_short(getattr(thing, field.name))}" for field in fields(thing) if field.repr)
+    return f"{type(thing).__name__}({', '.join(shown)})"
+
+
+def _short(value: object) -> str:
+    """A value in some ten words."""
+    if isinstance(value, np.ndarray):
+        if value.size > MOST_SHOWN:
+            return f"<array of shape {value.shape}>"
+        return np.array2string(value, precision=6, separator=", ", max_line_width=1000).replace("\n", "")
+    if isinstance(value, (tuple, list)):
+        if len(value) > MOST_SHOWN:
+            return f"<{len(value)} of {type(value[0]).__name__}>"
+        inside = ", ".join(map(_short, value))
+        return f"({inside}{',' * (len(value) == 1)})" if isinstance(value, tuple) else f"[{inside}]"
+    text = repr(value)
+    short = "\n" not in text and len(text) <= LONGEST_TEXT
+    if short or isinstance(value, (str, int, float)):
+        return text
+    sized = f" of {len(value)}" if hasattr(value, "__len__") else ""
+    return f"<{type(value).__name__}{sized}>"
+
+
+def in_notebook(thing: object) -> str | None:
+    """``_repr_html_`` of what a notebook shows as a 3-D page.
+
+    The page stands above all values; the package itself knows where.
+    """
+    package: Any = sys.modules[__package__]
+    drawn: str | None = package.html_of(thing)
+    return drawn

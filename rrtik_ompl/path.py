@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, number_rows, positive, usable_waypoints
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_notebook
 from rrtik_ompl.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
@@ -75,7 +75,7 @@ class JointPath:
     continuous: Mask
     proof: Proof | None
 
-    __reduce__ = as_value
+    __reduce__, _repr_html_ = as_value, in_notebook
 
     def __init__(
         self,

@@ -12,7 +12,7 @@ from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
-from rrtik_ompl.copies import as_value, shallow_copy
+from rrtik_ompl.copies import as_value, in_notebook, shallow_copy
 from rrtik_ompl.errors import InputError, ProblemError, Renamed, require
 from rrtik_ompl.goal import Goal, JointGoal, MultiGoal, parts_of
 from rrtik_ompl.robot import Robot
@@ -92,7 +92,7 @@ class Problem:
             goal_regions(world.robot, world.scene, wanted)  # refuses links that do not exist
         self.goal: Goal = wanted
 
-    __copy__, __reduce__ = shallow_copy, as_value
+    __copy__, __reduce__, _repr_html_ = shallow_copy, as_value, in_notebook
 
     def __repr__(self) -> str:
         return f"Problem('{self.name}', {self.world}, to a {type(self.goal).__name__})"

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, finite_array, finite_number, frozen, not_negative
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError, in_file
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import known_ending, read_text, write_text
@@ -48,7 +48,7 @@ class MotionEntries:
     intervals: NDArray[np.int64]
     normals: Matrix
 
-    __reduce__ = as_value
+    __reduce__, __repr__ = as_value, in_one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +83,7 @@ class Certificate:
     motions: tuple[MotionEntries, ...]
     version: int = VERSION
 
-    __reduce__ = as_value
+    __reduce__, __repr__ = as_value, in_one_line
 
     @property
     def entries(self) -> int:

@@ -15,7 +15,7 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.cloud_solid import Ends, cloud_gap, has_cloud, nearest_of_cloud
 from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.solids import is_mesh
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class Contact:
     point_second: Vector
     margin: float = 0.0
 
-    __reduce__ = as_value
+    __reduce__, __repr__ = as_value, in_one_line
 
     @property
     def clearance(self) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
 from rrtik_ompl.choices import IkMethod
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
 from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
@@ -49,7 +49,7 @@ class IkBatch:
     reasons: tuple[str, ...]
     details: tuple[str, ...]
 
-    __reduce__ = as_value
+    __reduce__, __repr__ = as_value, in_one_line
 
 
 def solve_ik_batch(

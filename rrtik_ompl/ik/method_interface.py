@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.choices import IkMethod
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
@@ -112,7 +112,7 @@ class IkResult:
     method: IkMethod
     seconds: float
 
-    __reduce__ = as_value
+    __reduce__, __repr__ = as_value, in_one_line
 
     @property
     def found(self) -> bool:

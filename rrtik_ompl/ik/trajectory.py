@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, positive
 from rrtik_ompl.choices import FrameAxis, GeneticPreset, IkMethod, TrajectoryIkMethod, one_of
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors
 from rrtik_ompl.ik.analytic.branch_choice import JUMP, follow
@@ -59,7 +59,7 @@ class IkTrajectory:
     iterations: int
     seconds: float
 
-    __reduce__ = as_value
+    __reduce__, __repr__ = as_value, in_one_line
 
     @property
     def found(self) -> bool:

@@ -53,7 +53,8 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
         attempts = search.totals["attempts"]
         tried = f"{attempts} attempt{'s' * (attempts != 1)}"
         reason = f"no path within {request.seconds:g} s of wall time ({tried}; the last one: {reason or 'out of time'})"
-    return Plan(path is not None, path, reason, elapsed, name, request.seed, MappingProxyType(search.totals))
+    counts = MappingProxyType(search.totals)
+    return Plan(path is not None, path, reason, elapsed, name, request.seed, counts, problem=problem)
 
 
 def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:

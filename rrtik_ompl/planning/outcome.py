@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rrtik_ompl.choices import ProofMode
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_notebook, in_one_line
 from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +51,7 @@ class Plan:
             that describe the path (``path_statistics`` of the planner's class) are the last attempt's. With
             ``improve=`` also the course of the length.
         member: Of a goal set, the number of the member that the path reaches, from 0; None for other goals.
+        problem: What was solved; None in a plan from another process, which is sent without it.
 
     Example:
         >>> plan = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1)
@@ -65,8 +67,12 @@ class Plan:
     seed: int
     statistics: Mapping[str, Any]
     member: int | None = None
+    problem: Problem | None = field(default=None, repr=False)
 
-    __reduce__ = as_value
+    __repr__, _repr_html_ = in_one_line, in_notebook
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return as_value(replace(self, problem=None))
 
     @property
     def proven(self) -> bool | None:

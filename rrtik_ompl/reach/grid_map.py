@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import known_ending, read_bytes, write_bytes, write_text
 
@@ -47,7 +47,7 @@ class ReachMap:
     samples: int
     base: Vector
 
-    __reduce__ = as_value
+    __reduce__, __repr__ = as_value, in_one_line
 
     @property
     def reached(self) -> NDArray[np.bool_]:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
 from rrtik_ompl.choices import RunOutcome, TickEvent, one_of
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError, in_file, require
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
@@ -88,6 +88,8 @@ class ReplanRun:
     margin: float
     speed_bound: float | None
     ticks: list[Tick] = field(default_factory=list)
+
+    __repr__ = in_one_line
     outcome: RunOutcome = "interrupted"
     reason: str = ""
 

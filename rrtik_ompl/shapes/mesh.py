@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, bounded_array, finite_array, frozen, number_rows, positive
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.shapes.shape import Shape
 from rrtik_ompl.shapes.surfaces import Triangles
@@ -42,7 +42,7 @@ class Mesh(Shape):
     scale: float = 1.0
     open_edges: int = field(default=0)
 
-    __reduce__ = as_value
+    __reduce__, __repr__ = as_value, in_one_line
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike, source: str = "", scale: float = 1.0) -> None:
         require(source, str, "source of a mesh")

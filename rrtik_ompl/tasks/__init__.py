@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import positive, whole_number
+from rrtik_ompl.copies import in_one_line
 from rrtik_ompl.errors import require
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import usable_configuration
@@ -60,6 +61,8 @@ class TaskPlan:
     reason: str
     end: World | None = None
     notes: tuple[str, ...] = ()
+
+    __repr__ = in_one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False)

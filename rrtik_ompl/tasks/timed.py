@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.arrays import Vector, frozen, not_negative
+from rrtik_ompl.copies import in_one_line
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
@@ -39,6 +40,8 @@ class TimedTask:
     trajectory: Trajectory
     begins: Vector
     pauses: Vector
+
+    __repr__ = in_one_line
 
 
 def time_task(

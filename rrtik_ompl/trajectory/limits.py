@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.robot import Robot
 
@@ -42,7 +42,7 @@ class RateLimits:
     acceleration: Vector
     jerk: Vector
 
-    __reduce__ = as_value
+    __reduce__, __repr__ = as_value, in_one_line
 
     def __init__(self, velocity: ArrayLike, acceleration: ArrayLike, jerk: ArrayLike = np.inf) -> None:
         """Take limits, one number per joint; one number alone is for all joints.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.copies import as_value, in_notebook
 from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.files.text import known_ending, write_text
 from rrtik_ompl.path import JointPath
@@ -71,7 +71,7 @@ class Trajectory:
     prismatic: Mask
     robot_name: str = ""
 
-    __reduce__ = as_value
+    __reduce__, _repr_html_ = as_value, in_notebook
 
     def __init__(
         self,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Vector
+from rrtik_ompl.copies import in_one_line
 from rrtik_ompl.errors import require
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.trajectory.motion import JUMP_SHARE, Trajectory
@@ -38,6 +39,8 @@ class MotionReport:
     jerk: Vector
     switches: Vector
     jump: Vector
+
+    __repr__ = in_one_line
 
     @property
     def kept(self) -> bool:

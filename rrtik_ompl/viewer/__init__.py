@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import write_text
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.replanning.record import ReplanRun
     from rrtik_ompl.tasks import TaskPlan
     from rrtik_ompl.viewer.drawing.marks import Mark
+    from rrtik_ompl.viewer.notebook import InlinePage
     from rrtik_ompl.viewer.subject import Showable, ShownPath
 
 __all__ = ["play", "view"]
@@ -36,9 +38,10 @@ def view(
     html: str | os.PathLike[str] | None = None,
     title: str | None = None,
     still: bool = False,
+    inline: bool | None = None,
     port: int = 0,
     on_ready: Callable[[str], object] = webbrowser.open,
-) -> Path | None:
+) -> Path | InlinePage | None:
     """Show a problem and a path: robot, obstacles, start and goal as ghosts, the tip's trail, and a player.
 
     Args:
@@ -55,11 +58,12 @@ def view(
         title: Heading of the page; made from the problem's or the robot's name if None.
         still: Whether to leave out what plans in the page: with it, start, goal and obstacles of a problem can be
             dragged, and the page finds new paths by itself, without a network.
+        inline: Whether to return the page for the output of a notebook's cell; None: if this runs in a notebook.
         port: Port to serve on; a free one if 0.
         on_ready: Called with the URL once the page is being served; opens the browser unless something else is given.
 
     Returns:
-        The file that was written, or None after serving.
+        The file that was written, the page that a notebook shows, or None after serving.
 
     Raises:
         InputError: If that cannot be shown, the file cannot be written or the port cannot be used.
@@ -69,6 +73,7 @@ def view(
         >>> rrtik.view(problem, rrtik.plan(problem, seed=1).path, html="plan.html").name
         'plan.html'
     """
+    from rrtik_ompl.viewer.notebook import InlinePage, in_kernel
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
 
@@ -76,6 +81,8 @@ def view(
     if html is not None:
         write_text(html, text)
         return Path(html)
+    if in_kernel() if inline is None else inline:
+        return InlinePage(text)
     with PageServer(text, port) as server:
         on_ready(server.url)
         server.wait()
@@ -101,12 +108,15 @@ def play(
         on_ready: Called with the URL once the page is being served; opens the browser unless something else is given.
 
     Raises:
-        InputError: If the page of this problem cannot plan, or the port cannot be used.
+        InputError: If the page of this problem cannot plan, the port cannot be used, or this runs in a notebook.
     """
+    from rrtik_ompl.viewer.notebook import in_kernel
     from rrtik_ompl.viewer.opinion import opinion
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
 
+    if in_kernel():
+        raise InputError("play: it would serve its page until Ctrl-C and stop the notebook; use view(problem, path)")
     with PageServer(page(problem, path, asks=True), port, lambda asked: opinion(problem, asked)) as server:
         on_ready(server.url)
         server.wait()

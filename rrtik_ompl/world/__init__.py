@@ -18,7 +18,7 @@ from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights
-from rrtik_ompl.copies import shallow_copy
+from rrtik_ompl.copies import in_notebook, shallow_copy
 from rrtik_ompl.errors import InputError, MeshWarning, Renamed, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
@@ -144,7 +144,7 @@ class World:
         return other
 
     refined = Renamed("with_resolution")
-    __copy__, __reduce__ = shallow_copy, reduce_world
+    __copy__, __reduce__, _repr_html_ = shallow_copy, reduce_world, in_notebook
 
     def with_clearance(self, clearance: float) -> World:
         """The same world for searches that leave room: its checks keep a distance [m] on top of obstacles' margins.
