@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 markers = typer.Typer(help="Print markers, calibrate a camera, sense what it sees.")
 
 Dictionary = Annotated[str, typer.Option(help="4x4_50 sees farthest; aruco_mip_36h12 confuses least; apriltag_36h11.")]
+BOARD_MARKER = 0.73  # side of a board's markers, of a chess square, where it is not said
 PICTURES, SCENES = (".png", ".jpg"), (".yaml", ".yml")
 
 
@@ -49,7 +50,7 @@ def print_sheet(
     from rrtik_ompl.sensing.markers import sheets
 
     if kind is Kind.board:
-        small = 0.73 * side if marker is None else marker
+        small = BOARD_MARKER * side if marker is None else marker
         square, inner = 1e-3 * side, 1e-3 * small
         sheets.print_board(
             out, columns=columns, rows=rows, square=square, marker=inner, dictionary=dictionary, paper=paper
@@ -68,20 +69,25 @@ def calibrate_camera(
     columns: Annotated[int, typer.Option(help="Chess squares of the board across.")] = 6,
     rows: Annotated[int, typer.Option(help="Chess squares of the board down.")] = 8,
     square: Annotated[float, typer.Option(help="Side of a chess square as printed [mm].")] = 30.0,
-    marker: Annotated[float, typer.Option(help="Side of a marker as printed [mm].")] = 22.0,
+    marker: Annotated[float | None, typer.Option(help="Side of a marker as printed [mm]; 0.73 of a square.")] = None,
     dictionary: Dictionary = "4x4_50",
+    chessboard: Annotated[bool, typer.Option("--chessboard", help="The board has no markers.")] = False,
 ) -> int:
     """Calibrate a camera.
 
-    From photographs of a printed board; writes the camera file.
+    From photographs of a printed board, with markers or without; writes the camera file.
     """
     check_target(out, SCENES)
     from rrtik_ompl.sensing.cameras.calibration import calibrate
     from rrtik_ompl.sensing.cameras.camera_file import save_camera
     from rrtik_ompl.sensing.cameras.pictures import pictures_from
+    from rrtik_ompl.sensing.markers.chessboard import Chessboard
     from rrtik_ompl.sensing.markers.detection import charuco_board
 
-    board = charuco_board(columns, rows, 1e-3 * square, 1e-3 * marker, dictionary)
+    board: Any = Chessboard(columns, rows, 1e-3 * square)
+    if not chessboard:
+        small = BOARD_MARKER * square if marker is None else marker
+        board = charuco_board(columns, rows, 1e-3 * square, 1e-3 * small, dictionary)
     with progress("detecting the board"):
         taken = list(pictures_from(photographs))
         found = calibrate([picture.pixels for picture in taken], board)
@@ -91,6 +97,8 @@ def calibrate_camera(
     names = ("fx", "fy", "cx", "cy")
     values = found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
     say(", ".join(f"{n} {v:.2f} +- {s:.2f}" for n, v, s in zip(names, values, found.sigmas, strict=True)))
+    if found.camera.tone is not None:
+        say(f"tone {found.camera.tone:.2f} (0: grey values are light, 1: coded as sRGB)")
     say(f"error {found.error:.3f} px over {sum(not r for r in found.unused)} photographs; wrote {out}")
     return 0
 

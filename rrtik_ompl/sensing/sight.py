@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from rrtik_ompl.arrays import frozen
+from rrtik_ompl.arrays import Matrix, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
@@ -27,6 +27,8 @@ from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, Mount
 
 MIN_SIDE_PIXELS = 12.0  # two a cell of the coarsest dictionaries
 MAX_REPROJECTION_ERROR = 2.0  # [pixels] of a corner; a larger one means a wrong map or a wrong number
+
+MAX_CONTRADICTION = 5.0  # `surprise` of markers together; wrong sides by 0.5 % make 6 to 40, right ones 0.2 to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +89,7 @@ def detect_objects(
     """
     gray = as_gray(picture)
     check_size(gray, camera)
-    seen = find_markers(gray, marker_map.dictionary, align=align)
+    seen = find_markers(gray, marker_map.dictionary, align=align, tone=camera.tone)
     sightings = (sighting(camera, each, seen) for each in marker_map.objects)
     return tuple(found for found in sightings if found is not None)
 
@@ -121,7 +123,8 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
     else:
         points = np.vstack([mounted[m.number].corners for m in usable])
         spread = None if any(m.spread is None for m in usable) else block_diag(*(m.spread for m in usable))
-        pose = pose_of_points(camera, np.vstack([m.corners for m in usable]), points, sigma, spread)
+        shifts = _side_shifts([mounted[m.number] for m in usable])
+        pose = pose_of_points(camera, np.vstack([m.corners for m in usable]), points, sigma, spread, shifts)
     return Sighting(thing, pose, own, _refusal(pose, usable))
 
 
@@ -136,7 +139,7 @@ def _straightened(camera: Camera, marker: SeenMarker, side: float) -> SeenMarker
 
 def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: float) -> CornerPose:
     """The pose of the object from that of its only visible marker."""
-    found = pose_of_square(camera, marker.corners, mounted.side, sigma, marker.spread)
+    found = pose_of_square(camera, marker.corners, mounted.side, sigma, marker.spread, mounted.side_sigma)
     T_marker_object = mounted.T_object_marker.inverse()
     first = found.T_camera_object * T_marker_object
     second = None if found.other is None else found.other * T_marker_object
@@ -144,6 +147,18 @@ def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: f
     lever = np.eye(6)
     lever[:3, 3:] = -pin.skew(arm)
     return CornerPose(first, second, found.error, found.other_error, lever @ found.covariance @ lever.T)
+
+
+def _side_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
+    """Of all their corners, by the standard deviation of each marker's side. Each of shape (4 markers, 3)."""
+    shifts = []
+    for k, marker in enumerate(markers):
+        if marker.side_sigma > 0.0:
+            shift = np.zeros((4 * len(markers), 3))
+            around = marker.corners - marker.T_object_marker.translation
+            shift[4 * k : 4 * k + 4] = around * marker.side_sigma / marker.side
+            shifts.append(shift)
+    return shifts
 
 
 def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
@@ -155,4 +170,9 @@ def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
         return f"covered or blurred: {likeness:.2f} like the marker, {MIN_LIKENESS:g} is needed; free it, hold still"
     if pose.error > MAX_REPROJECTION_ERROR:
         return f"corners lie {pose.error:.1f} pixels off: check the marker map, the side of the markers and the camera"
+    if len(markers) > 1 and pose.surprise > MAX_CONTRADICTION:
+        return (
+            f"its markers contradict each other, corners lie {pose.error:.2f} pixels off: measure their sides and "
+            "places again, calibrate the camera, or state what is not certain (side_sigma, sigmas_px)"
+        )
     return ""

@@ -1,4 +1,4 @@
-"""Intrinsics of a camera from photographs of a ChArUco board, with the uncertainty of every number."""
+"""Intrinsics of a camera from photographs of a board, with the uncertainty of every number; its tone by markers."""
 
 from __future__ import annotations
 
@@ -13,10 +13,14 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.markers.detection import charuco_corners
+from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
+from rrtik_ompl.sensing.markers.chessboard import Chessboard
+from rrtik_ompl.sensing.markers.detection import charuco_corners, dictionary_of, find_markers
 from rrtik_ompl.sensing.sight import as_gray
 
 MIN_CORNERS, MIN_VIEWS = 8, 5
+TONE_VIEWS, TONE_MARKERS = 3, 12  # photographs in which the tone is looked at; markers that are enough
+MIN_TONE_SIDE = 20.0  # [pixels] of a marker
 MAX_VIEW_ERROR = 1.0  # [pixels]; a view with a larger error is blurred, bent or mismatched
 
 
@@ -39,10 +43,11 @@ class Calibration:
     unused: tuple[str, ...]
 
 
-def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoard) -> Calibration:
-    """Calibrate from photographs of one board (`markers.charuco_board`) under different angles.
+def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoard | Chessboard) -> Calibration:
+    """Calibrate from photographs of one board (`detection.charuco_board`, `Chessboard`) under different angles.
 
-    The third radial coefficient stays 0: with it the second one is not stable.
+    The third radial coefficient stays 0: with it the second one is not stable. The camera's tone is known from a
+    board with markers; a chessboard does not say it.
 
     Raises:
         InputError: If the photographs differ in size, or fewer than five show the board well enough.
@@ -50,7 +55,8 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoa
     grays = [as_gray(picture) for picture in pictures]
     if len({gray.shape for gray in grays}) > 1:
         raise InputError("the photographs differ in size; take all of them with the same camera and settings")
-    found = [charuco_corners(gray, board) for gray in grays]
+    plain = isinstance(board, Chessboard)
+    found = [board.corners(gray) if plain else charuco_corners(gray, board) for gray in grays]
     unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
     used = [k for k, reason in enumerate(unused) if not reason]
     result = None
@@ -66,14 +72,16 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoa
         reasons = "; ".join(sorted({reason for reason in unused if reason})) or "there are no more"
         raise InputError(
             f"{len(used)} of {len(grays)} photographs show the board well, at least {MIN_VIEWS} must ({reasons}); "
-            "take more, the board filling a third of the picture or more, sharp, under different angles"
+            f"take more, the {'whole chessboard' if plain else 'board'} filling a third of the picture or more, sharp, "
+            "under different angles; a chessboard without markers is another kind of board"
         )
     error, matrix, distortion, _, _, sigmas, _, each = result
     view_errors = np.full(len(grays), np.nan)
     view_errors[used] = np.ravel(each)
     height, width = grays[0].shape
     doubts = np.ravel(sigmas)[:9]
-    camera = Camera(matrix, width, height, np.ravel(distortion)[:5], sigmas=doubts)
+    tone = None if plain else _tone([grays[k] for k in used[:TONE_VIEWS]], dictionary_of(board))
+    camera = Camera(matrix, width, height, np.ravel(distortion)[:5], sigmas=doubts, tone=tone)
     return Calibration(camera, frozen(doubts[:4]), float(error), frozen(view_errors), tuple(unused))
 
 
@@ -86,3 +94,12 @@ def _solve(views: Sequence[tuple[Any, Any]], shape: tuple[int, ...]) -> Any:
 
 def _too_few(count: int) -> str:
     return f"{count} corners of the board seen, {MIN_CORNERS} are needed: too small, blurred, or another board"
+
+
+def _tone(grays: Sequence[NDArray[np.uint8]], dictionary: str | None) -> float | None:
+    """Median tone of a board's markers; None where too few are large and clear enough."""
+    if dictionary is None:
+        return None
+    seen = [marker for gray in grays for marker in find_markers(gray, dictionary)]
+    tones = [each.tone for each in seen if each.likeness >= MIN_LIKENESS and each.side >= MIN_TONE_SIDE]
+    return round(float(np.median(tones)), 3) if len(tones) >= TONE_MARKERS else None

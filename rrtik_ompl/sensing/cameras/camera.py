@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, frozen
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError
 
@@ -28,6 +28,7 @@ class Camera:
         height: Of the picture, in pixels.
         sigmas: Standard deviations of fx, fy, cx, cy [pixels] and of the five numbers of the lens: what the
             calibration is not sure of, 0 where it says nothing. Shape (9,).
+        tone: How it codes light as grey values (`cameras.tone`); None: estimated for each marker.
     """
 
     matrix: Matrix
@@ -35,6 +36,7 @@ class Camera:
     width: int
     height: int
     sigmas: Vector
+    tone: float | None
 
     __reduce__ = as_value
 
@@ -46,6 +48,7 @@ class Camera:
         distortion: ArrayLike = (0.0,) * 5,
         *,
         sigmas: ArrayLike = (0.0,) * 9,
+        tone: float | None = None,
     ) -> None:
         """Check and copy the intrinsics.
 
@@ -65,6 +68,7 @@ class Camera:
         object.__setattr__(self, "matrix", frozen(given))
         object.__setattr__(self, "sigmas", frozen(doubts))
         object.__setattr__(self, "distortion", frozen(finite_array(distortion, (5,), "camera distortion")))
+        object.__setattr__(self, "tone", None if tone is None else finite_number(tone, "camera tone"))
         object.__setattr__(self, "width", int(width))
         object.__setattr__(self, "height", int(height))
 

@@ -8,6 +8,7 @@ true pose somewhere in it. Covariance: first-order propagation of the error of a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -37,6 +38,8 @@ class CornerPose:
         error: Root mean square distance of a point from its pixel, in pixels.
         other_error: That of the second pose; infinite if there is none.
         covariance: Of (position [m], small rotation about the axes of the camera [rad]). Shape (6, 6).
+        surprise: Squared deviations of the points from their pixels, by what is known of both, for each number that
+            they have more than a pose: 1 is usual; far more is a contradiction.
     """
 
     T_camera_object: pin.SE3
@@ -44,6 +47,7 @@ class CornerPose:
     error: float
     other_error: float
     covariance: Matrix
+    surprise: float = 1.0
 
     @property
     def ambiguous(self) -> bool:
@@ -73,7 +77,12 @@ def square_corners(side: float) -> Matrix:
 
 
 def pose_of_square(
-    camera: Camera, pixels: Matrix, side: float, sigma: float = ALIGNED_SIGMA, spread: Matrix | None = None
+    camera: Camera,
+    pixels: Matrix,
+    side: float,
+    sigma: float = ALIGNED_SIGMA,
+    spread: Matrix | None = None,
+    side_sigma: float = 0.0,
 ) -> CornerPose:
     """Pose of one marker from its four corners.
 
@@ -83,8 +92,10 @@ def pose_of_square(
         side: Of the marker [m].
         sigma: Error of a corner [pixels].
         spread: Covariance of the corners in place of it, shape (8, 8) [pixels^2].
+        side_sigma: Standard deviation of the side [m].
     """
     points = square_corners(side)
+    shifts = [points * side_sigma / side] if side_sigma else []
     # Exactly in front of the camera the closed form fails: not a number, or a marker that faces away.
     guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE_SQUARE) or _guesses(camera, points, pixels)
     refined = [_refined(camera, points, pixels, guess) for guess in guesses]
@@ -95,19 +106,27 @@ def pose_of_square(
         merged = turn_between(first, refined[1 - best]) < MIN_BRANCH_ANGLE
         other = max(guesses, key=lambda guess: turn_between(first, guess)) if merged else refined[1 - best]
         other_error = _error(camera, points, pixels, other)
-    return CornerPose(first, other, error, other_error, _covariance(camera, points, pixels, first, sigma, spread))
+    known = _of_pixels(len(points), sigma, spread), _of_points(camera, points, first, shifts)
+    return CornerPose(first, other, error, other_error, *_covariance(camera, points, pixels, first, known))
 
 
 def pose_of_points(
-    camera: Camera, pixels: Matrix, points: Matrix, sigma: float = ALIGNED_SIGMA, spread: Matrix | None = None
+    camera: Camera,
+    pixels: Matrix,
+    points: Matrix,
+    sigma: float = ALIGNED_SIGMA,
+    spread: Matrix | None = None,
+    shifts: Sequence[Matrix] = (),
 ) -> CornerPose:
     """Pose of an object from points on it that are known in its frame. Shapes (m, 2) and (m, 3), m at least 4.
 
-    ``sigma`` or ``spread``, shape (2 m, 2 m), as in `pose_of_square`.
+    ``sigma`` or ``spread``, shape (2 m, 2 m), as in `pose_of_square`; ``shifts``: by how much the points may be
+    elsewhere on the object, one standard deviation of each independent reason, shape (m, 3) [m].
     """
     best = _refined(camera, points, pixels, _guesses(camera, points, pixels)[0])
     error = _error(camera, points, pixels, best)
-    return CornerPose(best, None, error, np.inf, _covariance(camera, points, pixels, best, sigma, spread))
+    known = _of_pixels(len(points), sigma, spread), _of_points(camera, points, best, shifts)
+    return CornerPose(best, None, error, np.inf, *_covariance(camera, points, pixels, best, known))
 
 
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
@@ -151,19 +170,32 @@ def _error(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> flo
     return float(np.sqrt((away**2).sum(axis=1).mean()))
 
 
-def _covariance(
-    camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, sigma: float, spread: Matrix | None
-) -> Matrix:
-    """Of (position, rotation), larger where the points deviate from their pixels by more than they should."""
+def _of_pixels(count: int, sigma: float, spread: Matrix | None) -> Matrix:
+    """Covariance of the pixels as they were found. Shape (2 m, 2 m)."""
+    return sigma**2 * np.eye(2 * count) if spread is None else spread
+
+
+def _of_points(camera: Camera, points: Matrix, pose: pin.SE3, shifts: Sequence[Matrix]) -> Matrix:
+    """Covariance of the pixels of what is not known of lens and object. Shape (2 m, 2 m)."""
     turned = points @ pose.rotation.T
+    found = camera.doubt(turned + pose.translation)
+    slopes = camera.jacobian(turned, pose.translation)[:, :3].reshape(-1, 2, 3)
+    for shift in shifts:
+        moved = np.einsum("kij,kj->ki", slopes, shift @ pose.rotation.T).ravel()
+        found = found + np.outer(moved, moved)
+    return found
+
+
+def _covariance(
+    camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, known: tuple[Matrix, Matrix]
+) -> tuple[Matrix, float]:
+    """Of (position, rotation), larger where the points deviate from their pixels by more than they should; how much."""
+    turned, (found, doubted) = points @ pose.rotation.T, known
     slopes = camera.jacobian(turned, pose.translation)
     back = np.linalg.pinv(slopes)
     away = (camera.project(turned + pose.translation) - pixels).ravel()
-    if spread is None:
-        found = max(sigma**2, float(away @ away) / len(points)) * (back @ back.T)
-    else:
-        surprise = float(away @ np.linalg.solve(spread, away)) / MAX_SURPRISE
-        found = max(surprise, 1.0) * (back @ spread @ back.T)
-    if camera.sigmas.any():
-        found = found + back @ camera.doubt(turned + pose.translation) @ back.T
-    return frozen(found)
+    weighed = np.linalg.solve(found + doubted, np.c_[away, slopes])
+    lever = slopes.T @ weighed  # of a pose near this one that explains the pixels best by what is known of them
+    squares = float(away @ weighed[:, 0] - lever[:, 0] @ np.linalg.solve(lever[:, 1:], lever[:, 0]))
+    covariance = max(squares / MAX_SURPRISE, 1.0) * (back @ found @ back.T) + back @ doubted @ back.T
+    return frozen(covariance), max(squares, 0.0) / (2 * len(points) - 6)

@@ -1,4 +1,7 @@
-"""Square markers [50]: dictionaries, pictures and detection. OpenCV's ``aruco`` is used in this module only."""
+"""Square markers [50]: dictionaries, pictures and detection. OpenCV's ``aruco`` is used in this module only.
+
+OpenCV stores AprilTag families turned by half a turn; here top is where the AprilTag library's own prints have it.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +59,7 @@ class SeenMarker:
 
 
 def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
-    """The ideal marker, one number a cell: 0 black, 255 white, its black border included. Shape (n, n).
+    """The ideal marker, upright: one number a cell, 0 black, 255 white, its black border included. Shape (n, n).
 
     Raises:
         InputError: If there is no such marker.
@@ -65,7 +68,8 @@ def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
     count = len(table.bytesList)
     if not 0 <= number < count:
         raise InputError(f"dictionary {dictionary} has markers 0 to {count - 1}, not {number}")
-    return np.asarray(cv2.aruco.generateImageMarker(table, number, table.markerSize + 2), dtype=np.uint8)
+    cells = cv2.aruco.generateImageMarker(table, number, table.markerSize + 2)
+    return np.ascontiguousarray(np.rot90(cells, 2 if _is_turned(dictionary) else 0), dtype=np.uint8)
 
 
 def find_markers(
@@ -87,6 +91,7 @@ def find_markers(
         return ()
     for k in np.argsort(np.ravel(numbers), kind="stable"):
         number, rough = int(np.ravel(numbers)[k]), corners[k].reshape(4, 2).astype(np.float64)
+        rough = np.roll(rough, 2 if _is_turned(dictionary) else 0, axis=0)
         if not align:
             found.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
             continue
@@ -124,6 +129,12 @@ def charuco_board(columns: int, rows: int, square: float, marker: float, diction
     return cv2.aruco.CharucoBoard((columns, rows), square, marker, _table(dictionary))
 
 
+def dictionary_of(board: cv2.aruco.CharucoBoard) -> str | None:
+    """Name of the dictionary of a board's markers, None if it is none of `DICTIONARIES`."""
+    cells = board.getDictionary().bytesList
+    return next((name for name in DICTIONARIES if np.array_equal(_table(name).bytesList, cells)), None)
+
+
 def charuco_corners(gray: NDArray[np.uint8], board: cv2.aruco.CharucoBoard) -> tuple[Matrix, Matrix]:
     """Corners of a board in a picture: points on the board [m], shape (k, 3), and their pixels, shape (k, 2)."""
     pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(gray)
@@ -132,6 +143,10 @@ def charuco_corners(gray: NDArray[np.uint8], board: cv2.aruco.CharucoBoard) -> t
     match: Any = board.matchImagePoints  # its type requires a sequence where an array is allowed
     points, seen = match(np.asarray(pixels).reshape(-1, 1, 2), np.ravel(numbers))
     return np.reshape(points, (-1, 3)).astype(np.float64), np.reshape(seen, (-1, 2)).astype(np.float64)
+
+
+def _is_turned(dictionary: str) -> bool:
+    return dictionary.startswith("apriltag_")
 
 
 @lru_cache

@@ -21,17 +21,23 @@ ROLES = ("base", "target", "obstacle")
 class MountedMarker:
     """A marker on an object: its number, the side of its black square [m], and ``T_object_marker``.
 
-    The marker's frame has x to its right, y to its top and z out of the paper, the origin in its middle.
+    The marker's frame has x to its right, y to its top and z out of the paper, the origin in its middle. What
+    is not known of its side is stated by ``side_sigma``, a standard deviation [m].
     """
 
     number: int
     side: float
     T_object_marker: pin.SE3 = field(default_factory=pin.SE3.Identity)
+    side_sigma: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_object_marker", rigid(self.T_object_marker, f"marker {self.number}: its pose"))
         if not 0.0 < self.side < 100.0:
             raise InputError(f"marker {self.number}: side must be between 0 and 100 m, got {self.side:g}")
+        if not 0.0 <= self.side_sigma < self.side:
+            raise InputError(
+                f"marker {self.number}: side_sigma must be 0 or more and below side, got {self.side_sigma:g}"
+            )
 
     @property
     def corners(self) -> Matrix:

@@ -21,11 +21,13 @@ class MarkerEntry(Section):
 
     id: Annotated[int, Field(strict=True, ge=0)]
     side: Length = Field(description="of the black square [m]; measure the print")
+    side_sigma: NotNegative = Field(0.0, description="standard deviation of the side [m]")
     pose: PoseEntry | None = Field(None, description="in the frame of the object; its origin if absent")
 
     def build(self) -> MountedMarker:
         """The marker."""
-        return MountedMarker(self.id, self.side, pin.SE3.Identity() if self.pose is None else self.pose.build())
+        place = pin.SE3.Identity() if self.pose is None else self.pose.build()
+        return MountedMarker(self.id, self.side, place, self.side_sigma)
 
 
 class GraspEntry(Section):

@@ -18,6 +18,7 @@ from rrtik_ompl.sensing.markers.detection import charuco_board, marker_cells
 PAPERS = {"a4": (0.210, 0.297), "a3": (0.297, 0.420), "letter": (0.2159, 0.2794)}  # width, height [m]
 EDGE, GAP, CAPTION = 0.010, 0.008, 0.006  # [m]
 RULE = 0.100  # length of the printed rule [m]
+UP = "\u25b2 up"  # the y axis of the marker
 SHEET_FORMATS = (".pdf", ".png")
 
 
@@ -67,7 +68,7 @@ def print_markers(
         row, column = divmod(place % (rows * columns), columns)
         x = EDGE + column * (outer + GAP) + cell
         y = height - EDGE - (row + 1) * (outer + CAPTION) - row * GAP + CAPTION + cell
-        caption = f"{dictionary}  id {number}  side {1e3 * side:g} mm"
+        caption = f"{UP}  {dictionary}  id {number}  side {1e3 * side:g} mm"
         tiles.append(_Tile(each, x, y, cell, caption, y - cell - 0.5 * CAPTION))
     pages = [tiles[k : k + rows * columns] for k in range(0, len(tiles), rows * columns)]
     _write(path, pages, (width, height), dots_per_inch)

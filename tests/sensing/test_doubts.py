@@ -1,0 +1,129 @@
+"""What is not certain of markers is in the covariance; markers that contradict each other are refused. Tags upright."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.poses import pose
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph
+from rrtik_ompl.sensing.markers import sheets
+from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
+from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers, marker_cells
+from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MountedMarker
+from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+from rrtik_ompl.sensing.sight import sighting
+from rrtik_tests.marker_views import CAMERA, SIDE, facing
+
+# The first codes of the families as their library lists them [50]: cells row by row, the first one top left, 1 white.
+CODES = {
+    "apriltag_36h11": (0xD5D628584, 0xD97F18B49, 0xDD280910E),
+    "apriltag_25h9": (0x155CBF1, 0x1E4D1B6, 0x17B0B68),
+    "apriltag_16h5": (0x231B, 0x2EA5, 0x346A),
+}
+APART = (pose([-0.075, 0.0, 0.0]), pose([0.075, 0.0, -0.2]))  # two markers on a step
+SPREAD = 0.02**2 * np.eye(8)
+
+
+def official(family, number):
+    count = int(family.removeprefix("apriltag_").split("h")[0])
+    bits = [(CODES[family][number] >> (count - 1 - k)) & 1 for k in range(count)]
+    side = int(count**0.5)
+    return np.pad(np.array(bits).reshape(side, side) * 255, 1).astype(np.uint8)
+
+
+@pytest.mark.parametrize("family", CODES)
+def test_april_tags_are_upright_as_their_library_prints_them(family):
+    for number in range(3):
+        assert np.array_equal(marker_cells(family, number), official(family, number))
+    T = facing([0.5, 0.2, 0.3], [0.02, -0.03, 0.5])
+    clean = clean_picture(CAMERA, [(T, marker_print(official(family, 1), SIDE))], rays=6)
+    (seen,) = find_markers(photograph(clean, np.random.default_rng(0)), family)
+    found = pose_of_square(CAMERA, seen.corners, SIDE)
+    assert np.linalg.norm(pin.log3(found.T_camera_object.rotation.T @ T.rotation)) < np.deg2rad(0.5)
+
+
+def test_a_sheet_says_where_up_is(monkeypatch):
+    pages = []
+    monkeypatch.setattr(sheets, "_write", lambda _path, made, *_: pages.extend(made))
+    sheets.print_markers("sheet.pdf", [1], side=0.08, dictionary="apriltag_36h11")
+    ((tile,),) = pages
+    assert np.array_equal(tile.cells, official("apriltag_36h11", 1))
+    assert tile.caption.startswith("\u25b2 up")
+
+
+@pytest.mark.parametrize("doubt", [0.005, 0.02])
+def test_a_side_that_is_not_certain_is_in_the_covariance(doubt):
+    rng, within, blind = np.random.default_rng(4), [], []
+    for _ in range(150):
+        T = facing(rng.uniform(-0.6, 0.6, 3), [*rng.uniform(-0.15, 0.15, 2), rng.uniform(0.5, 1.2)])
+        true = SIDE * (1.0 + doubt * rng.standard_normal())
+        pixels = CAMERA.project(square_corners(true) @ T.rotation.T + T.translation)
+        for side_sigma, inside in ((doubt * SIDE, within), (0.0, blind)):
+            found = pose_of_square(CAMERA, pixels, SIDE, side_sigma=side_sigma)
+            away = found.T_camera_object.translation - T.translation
+            inside.append(away @ np.linalg.solve(found.covariance[:3, :3], away) <= 9.0)
+    assert np.mean(within) >= 0.95
+    assert np.mean(blind) < 0.8
+
+
+def two(rng, *, side=1.0, doubt=0.0, true=CAMERA, believed=CAMERA):
+    """A sighting of two markers of known places whose sides are another, and how far off it is in its covariance."""
+    T = facing(rng.uniform(-0.4, 0.4, 3), [*rng.uniform(-0.1, 0.1, 2), rng.uniform(0.6, 1.0)])
+    places = (place.act for place in APART)
+    corners = [np.array([place(p) for p in square_corners(SIDE)]) for place in places]
+    seen = []
+    for number, each in enumerate(corners):
+        pixels = true.project(each @ T.rotation.T + T.translation) + 0.02 * rng.standard_normal((4, 2))
+        seen.append(SeenMarker("4x4_50", number, pixels, 1.0, SPREAD))
+    markers = tuple(MountedMarker(k, side * SIDE, place, doubt * SIDE) for k, place in enumerate(APART))
+    found = sighting(believed, MarkedObject("step", "target", markers), seen)
+    away = found.pose.T_camera_object.translation - T.translation
+    return found, away @ np.linalg.solve(found.pose.covariance[:3, :3], away)
+
+
+def several(count=60, **how):
+    rng = np.random.default_rng(8)
+    found = [two(rng, **how) for _ in range(count)]
+    refused = [each.refused for each, _ in found]
+    return np.mean([bool(each) for each in refused]), np.mean([square <= 9.0 for _, square in found]), refused
+
+
+def test_two_markers_that_agree_are_taken_and_such_whose_sides_are_wrong_are_refused():
+    refused, within, _ = several()
+    assert refused == 0.0
+    assert within >= 0.95
+    refused, _, reasons = several(side=1.02)
+    assert refused == 1.0
+    assert "contradict each other" in reasons[0]
+    assert "side_sigma" in reasons[0]
+
+
+def test_a_wrong_focal_length_contradicts_two_markers_of_different_distance():
+    matrix = CAMERA.matrix.copy()
+    matrix[[0, 1], [0, 1]] *= 1.05
+    wrong = Camera(matrix, 640, 480, CAMERA.distortion)
+    assert several(believed=wrong)[0] >= 0.9
+
+
+def test_what_is_stated_is_no_contradiction_and_in_the_covariance():
+    refused, within, _ = several(side=1.02, doubt=0.015)
+    assert refused == 0.0
+    assert within >= 0.95
+    matrix, sigmas = CAMERA.matrix.copy(), np.zeros(9)
+    matrix[[0, 1], [0, 1]] *= 1.01
+    sigmas[:2] = 0.008 * matrix[0, 0]
+    refused, within, _ = several(believed=Camera(matrix, 640, 480, CAMERA.distortion, sigmas=sigmas))
+    assert refused == 0.0
+    assert within >= 0.95
+
+
+def test_a_map_states_the_uncertainty_of_a_side(tmp_path):
+    text = "version: 1\ndictionary: 4x4_50\ncamera_pose: {xyz: [0, 0, 0]}\nobjects:\n- name: a\n  role: target\n"
+    file = tmp_path / "map.yaml"
+    file.write_text(text + "  markers:\n  - {id: 1, side: 0.08, side_sigma: 0.0004}\n")
+    assert load_marker_map(file).objects[0].markers[0].side_sigma == 0.0004
+    file.write_text(text + "  markers:\n  - {id: 1, side: 0.08, side_sigma: 0.1}\n")
+    with pytest.raises(InputError, match="side_sigma must be 0 or more and below side"):
+        load_marker_map(file)

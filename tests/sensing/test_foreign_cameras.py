@@ -1,0 +1,130 @@
+"""Camera files of others, chessboards, and the tone that is kept per camera."""
+
+import cv2
+import numpy as np
+import pytest
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.sensing.cameras.calibration import calibrate
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.camera_file import load_camera, save_camera
+from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, photograph
+from rrtik_ompl.sensing.cameras.tone import coded
+from rrtik_ompl.sensing.markers.chessboard import Chessboard
+from rrtik_ompl.sensing.markers.detection import charuco_board, dictionary_of
+from rrtik_tests.marker_views import CAMERA, facing
+
+ROS = """\
+image_width: 640
+image_height: 480
+camera_name: narrow_stereo
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [438.78, 0.0, 305.59, 0.0, 437.35, 243.73, 0.0, 0.0, 1.0]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data: [-0.361976, 0.110510, 0.001014, 0.000505, 0.0]
+rectification_matrix:
+  rows: 3
+  cols: 3
+  data: [0.999978, 0.002789, -0.006046, -0.002816, 0.999986, -0.004401, 0.006034, 0.004417, 0.999972]
+projection_matrix:
+  rows: 3
+  cols: 4
+  data: [393.65, 0.0, 322.79, 0.0, 0.0, 393.65, 241.09, 0.0, 0.0, 0.0, 1.0, 0.0]
+"""
+
+
+@pytest.mark.parametrize("ending", ["yaml", "xml"])
+@pytest.mark.parametrize("lens", [(0.05, -0.12, 0.0005, -0.0007, 0.03), (0.1, -0.2, 0.0, 0.0), (0.1,) * 5 + (0.0,) * 9])
+def test_a_camera_that_opencv_stored_is_read_to_the_bit(tmp_path, ending, lens):
+    file = tmp_path / f"c.{ending}"
+    storage = cv2.FileStorage(str(file), cv2.FILE_STORAGE_WRITE)
+    storage.write("image_width", 640)
+    storage.write("image_height", 480)
+    storage.write("camera_matrix", CAMERA.matrix)
+    storage.write("distortion_coefficients", np.array(lens)[None])
+    storage.release()
+    found = load_camera(file)
+    assert np.array_equal(found.matrix, CAMERA.matrix)
+    assert np.array_equal(found.distortion, (*lens, 0.0)[:5])
+    assert (found.width, found.height) == (640, 480)
+
+
+def test_a_camera_info_of_ros_is_read(tmp_path):
+    file = tmp_path / "ost.yaml"
+    file.write_text(ROS)
+    found = load_camera(file)
+    assert found.matrix[[0, 1, 0, 1], [0, 1, 2, 2]] == pytest.approx([438.78, 437.35, 305.59, 243.73])
+    assert found.distortion == pytest.approx([-0.361976, 0.110510, 0.001014, 0.000505, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (ROS.replace("plumb_bob", "equidistant"), "distortion_model"),
+        (ROS.replace("640", "-3"), "image_width"),
+        (ROS.replace("cols: 3\n  data: [438.78, ", "cols: 3\n  data: [", 1), "3 x 3 numbers, got 8"),
+        (ROS.replace("0.000505, 0.0]", "0.000505, 0.0, 0.2]"), "6 coefficients"),
+        ("%YAML:1.0\n---\na: 3\n", "no camera_matrix"),
+        ("%YAML:1.0\n---\n{[", "not a file of OpenCV"),
+        ("<?xml version='1.0'?><opencv_storage><x>", "not a file of OpenCV"),
+    ],
+)
+def test_what_is_no_camera_of_this_kind_is_refused_in_one_line(tmp_path, text, said):
+    file = tmp_path / "c.yaml"
+    file.write_text(text)
+    with pytest.raises(InputError, match=said) as refused:
+        load_camera(file)
+    assert "c.yaml" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_file_of_opencv_without_the_pictures_size_says_what_is_missing(tmp_path):
+    file = tmp_path / "intrinsics.yml"
+    storage = cv2.FileStorage(str(file), cv2.FILE_STORAGE_WRITE)
+    storage.write("M1", CAMERA.matrix)
+    storage.release()
+    with pytest.raises(InputError, match="image_width"):
+        load_camera(file)
+
+
+def views(sheet, count, far=(0.3, 0.42), tone=0.0):
+    rng = np.random.default_rng(0)
+    for _ in range(count):
+        place = [*rng.uniform(-0.04, 0.04, 2), rng.uniform(*far)]
+        clean = clean_picture(CAMERA, [(facing(rng.uniform(-0.5, 0.5, 3), place), sheet)], rays=3)
+        yield photograph(coded(cv2.GaussianBlur(clean, (0, 0), 0.6), tone), rng, noise=0.007, blur=0.0)
+
+
+def test_a_plain_chessboard_calibrates_a_camera():
+    cells = np.kron(np.indices((7, 8)).sum(axis=0) % 2, np.ones((20, 20))) * 255
+    sheet = Print(np.pad(cells.astype(np.uint8), 20, constant_values=255), 0.03 / 20)
+    found = calibrate(list(views(sheet, 7, (0.5, 0.6))), Chessboard(8, 7, 0.03))
+    truth = CAMERA.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
+    assert np.abs(found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]] - truth).max() < 6.0  # of 880; k3 is not estimated
+    assert found.error < 0.12
+    assert found.camera.tone is None
+    with pytest.raises(InputError, match="whole chessboard"):
+        calibrate([np.full((480, 640), 128, dtype=np.uint8)] * 6, Chessboard(8, 7, 0.03))
+
+
+@pytest.mark.parametrize("wrong", [(3, 8, 0.03), (8, 8, 0.0)])
+def test_what_is_no_chessboard_is_refused(wrong):
+    with pytest.raises(InputError, match="4 x 4 squares"):
+        Chessboard(*wrong)
+
+
+def test_a_calibration_keeps_the_tone_of_the_camera(tmp_path):
+    board = charuco_board(6, 8, 0.03, 0.02, "4x4_50")
+    assert dictionary_of(board) == "4x4_50"
+    drawn = np.asarray(board.generateImage((6 * 27, 8 * 27), marginSize=0, borderBits=1))
+    sheet = Print(np.pad(drawn, 9, constant_values=255), 0.03 / 27)
+    found = calibrate(list(views(sheet, 5, tone=1.0)), board).camera
+    assert found.tone == pytest.approx(1.0, abs=0.2)
+    save_camera(found, tmp_path / "c.yaml")
+    assert load_camera(tmp_path / "c.yaml").tone == found.tone
+    assert Camera(CAMERA.matrix, 640, 480).tone is None
