@@ -55,8 +55,8 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoa
     grays = [as_gray(picture) for picture in pictures]
     if len({gray.shape for gray in grays}) > 1:
         raise InputError("the photographs differ in size; take all of them with the same camera and settings")
-    plain = isinstance(board, Chessboard)
-    found = [board.corners(gray) if plain else charuco_corners(gray, board) for gray in grays]
+    dictionary = None if isinstance(board, Chessboard) else dictionary_of(board)
+    found = [board.corners(g) if isinstance(board, Chessboard) else charuco_corners(g, board) for g in grays]
     unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
     used = [k for k, reason in enumerate(unused) if not reason]
     result = None
@@ -72,15 +72,15 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoa
         reasons = "; ".join(sorted({reason for reason in unused if reason})) or "there are no more"
         raise InputError(
             f"{len(used)} of {len(grays)} photographs show the board well, at least {MIN_VIEWS} must ({reasons}); "
-            f"take more, the {'whole chessboard' if plain else 'board'} filling a third of the picture or more, sharp, "
-            "under different angles; a chessboard without markers is another kind of board"
+            "take more, the board filling a third of the picture or more, sharp, under different angles; a chessboard "
+            "is another kind of board, and has to be in view as a whole"
         )
     error, matrix, distortion, _, _, sigmas, _, each = result
     view_errors = np.full(len(grays), np.nan)
     view_errors[used] = np.ravel(each)
     height, width = grays[0].shape
     doubts = np.ravel(sigmas)[:9]
-    tone = None if plain else _tone([grays[k] for k in used[:TONE_VIEWS]], dictionary_of(board))
+    tone = _tone([grays[k] for k in used[:TONE_VIEWS]], dictionary)
     camera = Camera(matrix, width, height, np.ravel(distortion)[:5], sigmas=doubts, tone=tone)
     return Calibration(camera, frozen(doubts[:4]), float(error), frozen(view_errors), tuple(unused))
 

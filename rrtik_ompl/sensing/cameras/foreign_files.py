@@ -101,7 +101,7 @@ def _first(storage: cv2.FileStorage, names: tuple[str, ...], kind: str) -> Any:
     return None
 
 
-def _camera(matrix: Any, lens: Any, width: float, height: float) -> Camera:
+def _camera(matrix: Any, lens: Any, width: Any, height: Any) -> Camera:
     numbers, rest = np.ravel(np.asarray(lens, dtype=np.float64)), 5
     if np.any(numbers[rest:]):
         raise InputError(

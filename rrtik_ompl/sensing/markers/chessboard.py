@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, frozen
 from rrtik_ompl.errors import InputError
 
 
@@ -42,7 +42,7 @@ class Chessboard:
     def points(self) -> Matrix:
         """Corners between squares on the board [m], row by row. Shape ((columns - 1) (rows - 1), 3)."""
         down, across = np.mgrid[1 : self.rows, 1 : self.columns]
-        return np.c_[across.ravel(), down.ravel(), np.zeros(down.size)] * self.square
+        return frozen(np.c_[across.ravel(), down.ravel(), np.zeros(down.size)] * self.square)
 
     def corners(self, gray: NDArray[np.uint8]) -> tuple[Matrix, Matrix]:
         """Points on the board [m], shape (k, 3), and their pixels, shape (k, 2); none if the board is not found."""
