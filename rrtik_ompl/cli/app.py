@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from rrtik_ompl.cli.bench import bench
-from rrtik_ompl.cli.drawing import overlay, play
+from rrtik_ompl.cli.drawing import overlay, play, show
 from rrtik_ompl.cli.ik import inverse_kinematics
 from rrtik_ompl.cli.markers import markers
 from rrtik_ompl.cli.motion import list_moves, time_path
@@ -41,7 +41,6 @@ app = typer.Typer(
 
 ProblemName = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
 PathFile = Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")]
-HtmlFile = Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")]
 
 
 class Kind(str, Enum):
@@ -116,37 +115,6 @@ def check(
         say(f"{path}: {clearance_along(world, route.waypoints)}{kept}")
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
     say(f"{path}: valid, {how_checked(world, route.waypoints)}; {size}")
-    return FOUND
-
-
-def show(
-    problem: ProblemName,
-    path: PathFile = None,
-    before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,
-    html: HtmlFile = None,
-    port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
-    still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
-) -> int:
-    """Show a problem, and a path for it, in 3-D.
-
-    A live page on 127.0.0.1, or a file. Start, goal and obstacles can be dragged there: the page plans by itself.
-    """
-    check_target(html, (".html", ".htm"))
-    from rrtik_ompl import load_path, load_problem
-    from rrtik_ompl.viewer import view
-
-    question = load_problem(problem)
-    route = None if path is None else load_path(path, question.world.robot)
-    earlier = None if before is None else load_path(before, question.world.robot)
-    if html is not None:
-        view(question, route, html=html, before=earlier, still=still)
-        say(f"wrote {html}")
-        return FOUND
-
-    def ready(url: str) -> None:
-        say(f"open {url} in a browser; Ctrl-C ends")
-
-    view(question, route, before=earlier, port=port, still=still, on_ready=ready)
     return FOUND
 
 

@@ -1,4 +1,4 @@
-"""Commands that draw the arm: `rrtik overlay` over pictures, `rrtik play` in a page where things are dragged."""
+"""Commands that draw the arm: `rrtik show` and `rrtik play` in a page or a film, `rrtik overlay` over pictures."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rrtik_ompl.cli.terminal import progress, say
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.cli.terminal import note, progress, say
+from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
@@ -19,9 +19,80 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rrtik_ompl.overlay.film import ArmInPictures
+    from rrtik_ompl.robot import Robot
     from rrtik_ompl.sensing.cameras.pictures import Picture
 
+ROBOT_FILES = (".urdf", ".xml", ".xacro")
 ENDINGS = (".mp4", ".avi", ".png", ".jpg")
+
+
+def show(
+    problem: Annotated[str, typer.Argument(help="A shipped problem (rrtik list problems), a YAML file, or a robot.")],
+    path: Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")] = None,
+    scene: Annotated[Path | None, typer.Option(help="What stands around a robot: a YAML file.")] = None,
+    before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
+    film: Annotated[
+        Path | None, typer.Option(help="Write the path as a film: .gif, .mp4; or the start: .png. Needs a browser.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="Duration of the film [s].")] = 4.0,
+    port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
+    still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
+) -> int:
+    """Show a problem, and a path for it, in 3-D.
+
+    A live page on 127.0.0.1, or a file. Start, goal and obstacles can be dragged there: the page plans by itself.
+
+    A robot is shown alone, or in a scene. Where the start is in collision, the bodies are red, and the exit code is 1.
+    """
+    check_target(html, (".html", ".htm"))
+    check_target(film, (".gif", ".mp4", ".png"))
+    from rrtik_ompl import load_path
+    from rrtik_ompl.viewer import view
+
+    question, robot, fault = _subject(problem, scene)
+    route = None if path is None else load_path(path, robot)
+    earlier = None if before is None else load_path(before, robot)
+    title = fault or None
+    if film is not None:
+        from rrtik_ompl.viewer.film import film as write_film
+
+        with progress("drawing"):
+            write_film(question, route, film, seconds=seconds)
+    if html is not None:
+        view(question, route, html=html, before=earlier, still=still, title=title)
+    written = [file for file in (film, html) if file is not None]
+    if written:
+        say(*(f"wrote {file}" for file in written))
+        return int(bool(fault))
+
+    def ready(url: str) -> None:
+        say(f"open {url} in a browser; Ctrl-C ends")
+
+    view(question, route, before=earlier, port=port, still=still, title=title, on_ready=ready)
+    return int(bool(fault))
+
+
+def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
+    """What is shown, its robot, and why its start is no start, "" if it is one."""
+    from rrtik_ompl import Scene, World, list_problems, list_robots, load_problem, load_robot, load_scene
+    from rrtik_ompl.problem_files.problem import load_unchecked
+    from rrtik_ompl.viewer.subject import Shown
+
+    if Path(name).suffix.lower() in ROBOT_FILES or (name in list_robots() and name not in list_problems()):
+        robot = load_robot(name)
+        return World(robot, Scene() if scene is None else load_scene(scene)), robot, ""
+    if scene is not None:
+        raise InputError(f"--scene is for a robot, and '{name}' is none; a problem file has a scene of its own")
+    try:
+        question = load_problem(name)
+        return question, question.robot, ""
+    except ProblemError as error:
+        fault = str(error)
+    world, start, goal = load_unchecked(name)
+    note(fault)
+    names = frozenset(body for pair in world.contacts(start) for body in (pair.first, pair.second))
+    return Shown(world.robot, world.scene, goal, start, names), world.robot, fault
 
 
 def play(

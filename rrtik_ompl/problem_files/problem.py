@@ -13,11 +13,13 @@ from typing import Any
 
 from pydantic import Field
 
+from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import find_problem, list_planners, load_robot, robot_from_entry, task_files
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError, require
 from rrtik_ompl.files.sections import NotNegative, Positive, Section, Version, parse, without_null
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
+from rrtik_ompl.goal import Goal
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.goal import GoalSection, StartSection, build_goal, goal_data
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
@@ -82,11 +84,7 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
 
         return load_motion_bench_maker(path, robot=robot)
     entry = parse(document, ProblemFile)
-    world = _world(document, entry, robot)
-    with document.at(("start",)):
-        start = entry.start.configuration(world.robot)
-    with document.at(("goal",)):
-        goal = build_goal(entry.goal, world.robot)
+    world, start, goal = _parts(document, entry, robot)
     planner = _planner(document, entry.planner)
     constraints = build_constraints(document, entry.path_constraints, world.robot)
     with document.at(("path_constraints",)) if constraints else nullcontext():
@@ -96,6 +94,24 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
             line = document.lines[(error.part,)]
             error.args = (f"{path}:{line}: {error}",)
             raise
+
+
+def load_unchecked(name_or_file: FilePath) -> tuple[World, Vector, Goal]:
+    """World, start and goal of a problem file, which may be in collision: to look at what is wrong.
+
+    Raises:
+        InputError: As for :func:`load_problem`.
+    """
+    document = _read(problem_path(name_or_file))
+    return _parts(document, parse(document, ProblemFile), None)
+
+
+def _parts(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath | None) -> tuple[World, Vector, Goal]:
+    world = _world(document, entry, robot)
+    with document.at(("start",)):
+        start = entry.start.configuration(world.robot)
+    with document.at(("goal",)):
+        return world, start, build_goal(entry.goal, world.robot)
 
 
 def _is_motion_bench_maker(data: Mapping[str, Any]) -> bool:

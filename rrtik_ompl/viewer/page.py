@@ -95,16 +95,16 @@ def page(
             "no obstacles that move; or use rrtik show"
         )
     story = json.dumps(told, allow_nan=False, separators=(",", ":"))
-    return Template(_asset("page.html")).substitute(
+    return Template(asset("page.html")).substitute(
         title=html.escape(heading),
         policy=html.escape(ASKING_POLICY if asks else POLICY),
-        style=_asset("page.css"),
+        style=asset("page.css"),
         notice=_meshcat("main.min.js.LICENSE.txt").replace("--", "- -"),
         meshcat=_packed_engine(),
         story=story.replace("<", "\\u003c"),  # so that no name can end the element that holds it
         commands=packed(json.dumps([base64.b64encode(each).decode("ascii") for each in recording.commands]).encode()),
-        script="\n".join(_asset(name) for name in SCRIPTS + (PLANNING if told["plan"] else ())),
-        start="\n".join(_asset(name) for name in STARTING),
+        script="\n".join(asset(name) for name in SCRIPTS + (PLANNING if told["plan"] else ())),
+        start="\n".join(asset(name) for name in STARTING),
     )
 
 
@@ -128,7 +128,8 @@ def _title(subject: Subject) -> str:
 
 
 @cache
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """The text of one of the page's own files."""
     return files("rrtik_ompl.viewer").joinpath("assets", name).read_text(encoding="utf-8")
 
 

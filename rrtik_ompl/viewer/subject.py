@@ -51,6 +51,7 @@ class Subject:
         times: When the waypoints of a timed motion are reached [s], shape (k,), or None.
         held: Regions of path constraints, and the configurations, shape (dof,), in which they begin to be held.
         fingers: Of a task: where the gripper's fingers are in the ticks of the run, or None.
+        touching: Names of the bodies in collision, which are drawn red.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Subject:
     times: Vector | None = None
     held: tuple[tuple[HeldRegion, Vector], ...] = ()
     fingers: Fingers | None = None
+    touching: frozenset[str] = frozenset()
 
     @property
     def start(self) -> Vector | None:
@@ -95,12 +97,14 @@ class Shown:
         scene: Its surroundings.
         goal: A goal to draw, or None.
         start: The posture, shape (dof,).
+        touching: Names of bodies to draw red, such as those in collision.
     """
 
     robot: Robot
     scene: Scene
     goal: Goal | None
     start: Vector
+    touching: frozenset[str] = frozenset()
 
 
 Showable: TypeAlias = HasWorld | Shown | World | Robot | Scene
@@ -160,7 +164,9 @@ def subject_of(
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
     held = tuple((region, posture) for region in regions)
-    return Subject(name, robot, scene, goal, frozen(posture[None]), False, None, tinted, marks, held=held)
+    red: frozenset[str] = getattr(shown, "touching", frozenset())
+    rows = frozen(posture[None])
+    return Subject(name, robot, scene, goal, rows, False, None, tinted, marks, held=held, touching=red)
 
 
 def _held(world: object) -> tuple[HeldRegion, ...]:

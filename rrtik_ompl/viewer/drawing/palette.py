@@ -14,6 +14,7 @@ INK = "#1d2733"
 TRAIL = "#d55e00"
 UNPROVEN = "#7b3294"  # the way of the tip on motions that are not proven free
 BEFORE = "#56b4e9"
+TOUCHING = "#d1242f"  # bodies in collision
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6bb1", "#7f7f7f")  # in this order
 AXES = ("#d55e00", "#009e73", "#0072b2")  # x, y, z
 BACKGROUND_TOP = "#fbfcfd"

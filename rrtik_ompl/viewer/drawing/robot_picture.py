@@ -96,6 +96,14 @@ def attached_parts(robot: Robot, attached: tuple[AttachedObject, ...]) -> list[P
     return parts
 
 
+def red_parts(robot: Robot, touching: frozenset[str]) -> set[str]:
+    """Names of the parts of links, and of attached objects, of these names."""
+    frames = robot.model.frames
+    bodies = (*robot.visual.geometryObjects, *robot.collision.geometryObjects)
+    links = {node_name(body.name) for body in bodies if touching and frames[body.parentFrame].name in touching}
+    return links | {node_name(f"attached {name}") for name in touching}
+
+
 def draw_parts(node: Node, robot: Robot, parts: list[Part], frames: NDArray[np.float64]) -> None:
     """Draw the arm below a node, at the joint frames of one configuration, shape (joints + 1, 4, 4)."""
     names = joint_nodes(robot)

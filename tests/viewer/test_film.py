@@ -1,0 +1,76 @@
+"""Films and stills: as many pictures as were asked for, bodies in collision red; what is missing is said in a line."""
+
+import shutil
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.catalog import find_problem
+from rrtik_ompl.cli.app import run
+from rrtik_ompl.problem_files.problem import load_unchecked
+from rrtik_ompl.viewer import film as module
+from rrtik_ompl.viewer.drawing.robot_picture import red_parts
+from rrtik_ompl.viewer.film import BROWSERS, film
+from rrtik_ompl.viewer.picture import draw
+from rrtik_ompl.viewer.subject import Shown, subject_of
+
+WAYPOINTS = [[0.0, 0.0, 0.0], [1.0, 0.5, 0.5]]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="there is no browser")
+def test_a_film_shows_the_arm_moving(tmp_path):
+    robot = rrtik.load_robot("planar3")
+    with Image.open(film(robot, WAYPOINTS, tmp_path / "film.gif", seconds=1.0, rate=2.0, size=(320, 200))) as moving:
+        assert (moving.size, moving.n_frames) == ((320, 200), 3)  # at 0, 0.5 and 1 s
+        pictures = []
+        for k in range(3):
+            moving.seek(k)
+            pictures.append(np.asarray(moving.convert("RGB"), dtype=int))
+    for before, after in pairwise(pictures):
+        assert (np.abs(before - after).max(axis=2) > 60).mean() > 0.002
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "options", "said"),
+    [
+        (None, "film.gif", {}, "a film needs a path"),
+        (WAYPOINTS, "film.avi", {}, "unknown ending '.avi'; use .gif, .mp4, .png"),
+        (WAYPOINTS, "film.gif", {"seconds": 1e9}, "out of range"),
+    ],
+)
+def test_what_is_no_film_is_said_in_a_line(path, name, options, said, tmp_path):
+    with pytest.raises(rrtik.InputError, match=said):
+        film(rrtik.load_robot("planar3"), path, tmp_path / name, **options)
+
+
+def test_without_a_browser_it_is_said_in_a_line(tmp_path, monkeypatch):
+    monkeypatch.setattr(module.shutil, "which", lambda name: None)
+    with pytest.raises(rrtik.InputError, match="needs a browser"):
+        film(rrtik.load_robot("planar3"), WAYPOINTS, tmp_path / "film.gif")
+
+
+def test_a_start_in_collision_is_shown_with_its_bodies_red(tmp_path, capsys):
+    text = find_problem("titan4_prisms").read_text().replace("start: {joints_deg: [0,", "start: {joints_deg: [-10,")
+    (tmp_path / "bad.yaml").write_text(text)
+    assert run(["show", str(tmp_path / "bad.yaml"), "--html", str(tmp_path / "bad.html")]) == 1
+    assert "start is in collision" in capsys.readouterr().err
+    world, start, _ = load_unchecked(tmp_path / "bad.yaml")
+    pair = world.contacts(start)[0]
+    shown = Shown(world.robot, world.scene, None, start, frozenset([pair.first, pair.second]))
+    assert "prism_10" in (pair.first, pair.second)
+    assert red_parts(world.robot, shown.touching) >= {f"attached {pair.second}"}
+    plain = Shown(world.robot, world.scene, None, start)
+    assert draw(subject_of(shown))[0].commands != draw(subject_of(plain))[0].commands
+
+
+def test_a_robot_is_shown_alone_and_in_a_scene(tmp_path, capsys):
+    assert run(["show", "planar3", "--html", str(tmp_path / "robot.html")]) == 0
+    scene = str(find_problem("planar3_boxes"))
+    assert run(["show", "planar3", "--scene", scene, "--html", str(tmp_path / "both.html")]) == 0
+    assert "box" in (tmp_path / "both.html").read_text()
+    assert run(["show", "planar3_boxes", "--scene", scene]) == 2
+    assert "is for a robot" in capsys.readouterr().err
