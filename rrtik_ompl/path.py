@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,33 +26,12 @@ from rrtik_ompl.transitions import (
     subdivided,
     transitions,
 )
+from rrtik_ompl.transitions import Move as Move
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import Proof, World
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY as VERIFICATION_DENSITY
 from rrtik_ompl.world.route_check import Violation, route_violations, verification_resolution
-
-
-class Move(NamedTuple):
-    """One joint moves, all others rest.
-
-    Attributes:
-        joint: Its name.
-        start, end: Its values before and after.
-        unit: Of the values, "rad" or "m".
-        continuous: Whether the joint has no limits, so that a whole turn more is the same posture.
-    """
-
-    joint: str
-    start: float
-    end: float
-    unit: str = "rad"
-    continuous: bool = False
-
-    @property
-    def change(self) -> float:
-        """How far the joint moves, with its sign [rad or m]."""
-        return self.end - self.start
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -221,15 +200,32 @@ class JointPath:
         """Whether its proof covers every motion, and was made by this world or another form of it."""
         return self.proof is not None and self.proof.proven and world.prover.made(self.proof)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str], *, proof: bool = False) -> None:
         """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
 
         The file is written whole or not at all.
 
+        Args:
+            path: Of the file.
+            proof: Whether a .json file shall hold what proves the path too, its certificate, for ``rrtik check``.
+
         Raises:
-            InputError: If the ending is another one or the file cannot be written.
+            InputError: If the ending is another one, the file cannot be written, or a proof is asked for and the path
+                has none that covers it.
+
+        Example:
+            >>> path = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1).path
+            >>> path.save("path.json", proof=True)
+            >>> rrtik.load_certificate("path.json").clearance
+            0.001
         """
-        write_text(path, dumps(self.document(), known_ending(path, FORMATS, "path")))
+        document, ending = self.document(), known_ending(path, FORMATS, "path")
+        if proof:
+            known_ending(path, FORMATS[:1], "path with its proof")
+            from rrtik_ompl.certificates.write import certificate_by
+
+            document["certificate"] = certificate_by(self.proof, self.waypoints).document()
+        write_text(path, dumps(document, ending))
 
     def document(self) -> dict[str, Any]:
         """What a .json file of the path holds."""

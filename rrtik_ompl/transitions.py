@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import factorial, radians
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,28 @@ from rrtik_ompl.arrays import MOST_ROWS, Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError, at_most
 
 SAME = radians(1e-6)  # [rad] or [m]; a joint that changes by no more than this has not moved
+
+
+class Move(NamedTuple):
+    """One joint moves, all others rest.
+
+    Attributes:
+        joint: Its name.
+        start, end: Its values before and after.
+        unit: Of the values, "rad" or "m".
+        continuous: Whether the joint has no limits, so that a whole turn more is the same posture.
+    """
+
+    joint: str
+    start: float
+    end: float
+    unit: str = "rad"
+    continuous: bool = False
+
+    @property
+    def change(self) -> float:
+        """How far the joint moves, with its sign [rad or m]."""
+        return self.end - self.start
 
 
 def moved(a: ArrayLike, b: ArrayLike, tolerance: float = SAME) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from rrtik_ompl.files.text import known_ending, read_text, write_text
 
 VERSION = 1
 KIND = "path_certificate"
+IN_PATHS = "certificate"  # key of a path's file
 FIELDS = (
     "version",
     "kind",
@@ -120,7 +121,7 @@ class Certificate:
 
 
 def load_certificate(path: str | os.PathLike[str]) -> Certificate:
-    """Read a certificate.
+    """Read a certificate, from a file of its own or from a path saved with its proof.
 
     Raises:
         InputError: If the file is missing, too large, or no certificate; the message names the file and the field.
@@ -133,9 +134,26 @@ def load_certificate(path: str | os.PathLike[str]) -> Certificate:
     known_ending(path, (".json",), "certificate")
     text = read_text(path)
     try:
-        return from_document(json_object(text, KIND, "motions"))
+        return from_document(_inside(text))
     except InputError as error:
         raise in_file(path, error) from None
+
+
+def holds_certificate(path: str | os.PathLike[str]) -> bool:
+    """Whether a path's file has a certificate beside its waypoints."""
+    return str(path).endswith(".json") and IN_PATHS in json_object(read_text(path), "joint_path", "waypoints")
+
+
+def _inside(text: str) -> dict[str, Any]:
+    """The object of a certificate's file, or of the certificate in a path's."""
+    try:
+        return json_object(text, KIND, "motions")
+    except InputError as error:
+        try:
+            found = json_object(text, "joint_path", IN_PATHS)[IN_PATHS]
+        except InputError:
+            raise error from None
+        return json_object(json.dumps(found), KIND, "motions")
 
 
 def from_document(document: dict[str, Any]) -> Certificate:

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Protocol
 
-from rrtik_ompl.arrays import frozen, not_negative
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Matrix, finite_array, frozen, not_negative
 from rrtik_ompl.certificates.certificate import Certificate, MotionEntries
+from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.digests import robot_digest, scene_digest
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.fast.proof.log import ProofLog
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.shapes import PointCloud
-from rrtik_ompl.world import World
+from rrtik_ompl.world import Proof, World
+from rrtik_ompl.world.proof import Prover
 
 
-def certificate_of(world: World, path: JointPath, clearance: float = 0.0) -> Certificate | None:
+class HasWaypoints(Protocol):
+    """A path."""
+
+    @property
+    def waypoints(self) -> Matrix:
+        """Shape (k, dof)."""
+
+
+def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: float = 0.0) -> Certificate | None:
     """A certificate of a path; None if not every motion of it is proven free.
 
     Args:
         world: The world.
-        path: Of the world's robot.
+        path: Of the world's robot, or its waypoints, shape (k, dof).
         clearance: Kept from every obstacle beside its margin [m].
 
     Raises:
@@ -31,19 +42,39 @@ def certificate_of(world: World, path: JointPath, clearance: float = 0.0) -> Cer
         >>> rrtik.certificate_of(problem.world, path, path.proof.clearance).save("proof.json")
     """
     require(world, World, "world of a certificate")
-    require(path, JointPath, "path of a certificate")
-    kept, rows, robot = not_negative(clearance, "clearance"), path.waypoints, world.robot
+    kept, robot = not_negative(clearance, "clearance"), world.robot
+    rows = finite_array(getattr(path, "waypoints", path), (None, None), "path of a certificate")
     if rows.shape[1] != robot.dof:
         raise InputError(f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's")
-    if clouds := [o.name for o in world.scene.obstacles if isinstance(o.shape, PointCloud)]:
+    return _made(world.prover, rows, kept)
+
+
+def certificate_by(proof: Proof | None, waypoints: Matrix) -> Certificate:
+    """The certificate of a path, waypoints of shape (k, dof), for what is proven of it already.
+
+    Raises:
+        InputError: If that does not cover the path or was made by another process, or the scene has a cloud.
+    """
+    if proof is None:
+        raise InputError("path to save with its proof: it has none; use path.proved(world)")
+    if not proof.proven:
+        raise InputError(f"path to save with its proof: it is not proven free: {proof.unproven[0]}")
+    if proof.prover is None or (found := _made(proof.prover, waypoints, proof.clearance)) is None:
+        raise InputError("path to save with its proof: it cannot be made again here; use path.proved(world)")
+    return found
+
+
+def _made(prover: Prover, rows: Matrix, kept: float) -> Certificate | None:
+    """The certificate for a clearance [m]; None if not every motion is proven."""
+    if clouds := [body.name for body in prover.bodies if isinstance(body.geometry, CloudSolid)]:
         raise InputError(
             f"a certificate names planes of solids, and '{clouds[0]}' is a cloud; plan.proven says as much"
         )
-    told = world.prover.logged(np.vstack([rows, rows]) if len(rows) == 1 else rows, clearance=kept)
+    told = prover.logged(np.vstack([rows, rows]) if len(rows) == 1 else rows, clearance=kept)
     if told is None:
         return None
-    digests = robot_digest(robot), scene_digest(world.bodies, world.pairs)
-    return Certificate(robot.name, *digests, kept, world.self_margin, frozen(rows), tuple(map(_entries, told)))
+    digests = robot_digest(prover.robot), scene_digest(prover.bodies, prover.pairs)
+    return Certificate(prover.robot.name, *digests, kept, prover.self_margin, frozen(rows), tuple(map(_entries, told)))
 
 
 def _entries(told: ProofLog) -> MotionEntries:

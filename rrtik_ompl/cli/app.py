@@ -79,11 +79,13 @@ def check(
     """Check a problem, and a path for it.
 
     Motions are proven free for their whole length; where that cannot be done they are checked densely. Exit code 1 if
-    the path is not valid, or if the certificate does not hold.
+    the path is not valid, or if the certificate does not hold, which a path's file may have beside its waypoints.
     """
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
     from rrtik_ompl import JointGoal, load_path, load_problem
+    from rrtik_ompl.certificates.certificate import holds_certificate
+    from rrtik_ompl.cli.plan_report import certified
     from rrtik_ompl.world.clearance_curve import clearance_along
     from rrtik_ompl.world.route_check import how_checked
 
@@ -91,8 +93,6 @@ def check(
     world = question.world
     route = None if path is None else load_path(path, world.robot)
     if route is not None and proof is not None:
-        from rrtik_ompl.cli.plan_report import certified
-
         line, holds = certified(question, route, proof)
         say(line)
         return FOUND if holds else NOT_FOUND
@@ -115,7 +115,11 @@ def check(
         say(f"{path}: {clearance_along(world, route.waypoints)}{kept}")
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
     say(f"{path}: valid, {how_checked(world, route.waypoints)}; {size}")
-    return FOUND
+    if path is None or not holds_certificate(path):
+        return FOUND
+    line, holds = certified(question, route, path)
+    say(line)
+    return FOUND if holds else NOT_FOUND
 
 
 def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if left out.")] = None) -> int:

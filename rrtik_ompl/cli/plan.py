@@ -74,7 +74,9 @@ def plan(
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
-    certificate: Annotated[Path | None, typer.Option(help="Write what proves the path free: .json.")] = None,
+    certificate: Annotated[
+        Path | None, typer.Option(help="Write what proves the path free: .json; that of --out takes both.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
     """Find a path and print its moves.
@@ -136,7 +138,7 @@ def _write(
         return ""
     from rrtik_ompl.cli.plan_report import write_certificate
 
-    return write_certificate(problem, path, certificate)
+    return write_certificate(problem, path, certificate, beside=certificate == out)
 
 
 def _shortened(

@@ -172,10 +172,10 @@ def timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimits
     }
 
 
-def write_certificate(problem: Problem, path: JointPath, file: Path) -> str:
+def write_certificate(problem: Problem, path: JointPath, file: Path, *, beside: bool = False) -> str:
     """Write a path's certificate; returns why there is none, "" if it is written.
 
-    It is for the clearance that the path is known to keep.
+    It is for the clearance that the path is known to keep. ``beside``: the file takes the path too.
 
     Raises:
         InputError: If the file cannot be written.
@@ -183,12 +183,16 @@ def write_certificate(problem: Problem, path: JointPath, file: Path) -> str:
     from rrtik_ompl.certificates.write import certificate_of
 
     world = problem.world
-    kept = path.proof.clearance if path.proof is not None and path.proven else 0.0
-    found = certificate_of(world, path, kept)
+    proved = path if path.proven_in(world) else path.proved(world)
+    kept = 0.0 if proved.proof is None else proved.proof.clearance
+    found = certificate_of(world, path, kept if proved.proven else 0.0)
     if found is None:
         gaps = world.prove(path.waypoints, clearance=kept).unproven
         return f"{file}: no certificate: the path is not proven free" + (f": {gaps[0]}" if gaps else "")
-    found.save(file)
+    if beside:
+        proved.save(file, proof=True)
+    else:
+        found.save(file)
     return ""
 
 

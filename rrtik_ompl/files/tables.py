@@ -16,7 +16,7 @@ FORMATS = (".json", ".csv", ".txt")
 def dumps(document: dict[str, Any], ending: str) -> str:
     """Text of a path: ``document`` holds ``waypoints``, ``joint_names`` and whatever else JSON shall keep."""
     if ending == ".json":
-        return json.dumps(document, indent=1) + "\n"
+        return json.dumps(document, indent=None if "certificate" in document else 1) + "\n"
     text = io.StringIO()
     table = csv.writer(text, delimiter="," if ending == ".csv" else " ", lineterminator="\n")
     if ending == ".csv":

@@ -36,7 +36,7 @@ class Chords(NamedTuple):
             replace(gap, motion=k, share=float(self.shares[gap.motion] + gap.share / self.counts[k]))
             for k, gap in sorted(gaps.items())
         )
-        return Proof(len(self.counts), proof.clearance, tuple(unproven))
+        return replace(proof, motions=len(self.counts), unproven=tuple(unproven))
 
 
 def chords_of(durations: Vector, pushes: Vector, slack: float) -> Chords:
@@ -81,4 +81,4 @@ def proof_by_chords(
         first, end = int(stretch[0]), int(stretch[-1]) + 1
         again = proof_by_chords(times[first : end + 1], pushes[first:end], places, world, clearance, finer + 1)
         gaps += [replace(gap, motion=first + gap.motion) for gap in again.unproven]
-    return Proof(found.motions, clearance, tuple(sorted(gaps, key=lambda gap: gap.motion)))
+    return replace(found, unproven=tuple(sorted(gaps, key=lambda gap: gap.motion)))

@@ -100,8 +100,8 @@ class World:
         self._proven_clearance: float | None = None
         self._room = 0.0  # kept on top of the margins of obstacles
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
-        self._always_colliding = fixed_contact(robot, self.bodies, standing) is not None
-        self.prover = Prover(robot, self.bodies, moving, always_colliding=self._always_colliding)
+        self._always_colliding = always = fixed_contact(robot, self.bodies, standing) is not None
+        self.prover = Prover(robot, self.bodies, moving, self_margin=own, always_colliding=always)
 
     def __repr__(self) -> str:
         return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,6 @@ class HoldingProver(Prover):
     def __init__(self, prover: Prover, constraints: HeldRegions) -> None:
         vars(self).update(vars(prover))
         self.free, self._constraints = prover, constraints
-        self._digest = partial(prover._digest)
 
     def route(self, rows: Matrix, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None) -> Proof:
         """Prove the motions between waypoints, shape (k, dof), free and held; see :meth:`Prover.route`."""

@@ -24,12 +24,13 @@ class MovingProver(Prover):
             room: For each body what is to be kept from it beside its margin [m]; read for obstacles.
             always_colliding: Whether an obstacle touches what never moves: then nothing is proven.
         """
-        self._bodies, self._room, self._always_colliding = tuple(bodies), room, always_colliding
+        self.bodies, self._room, self._always_colliding = tuple(bodies), room, always_colliding
+        self._margin = None
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
         if self._moved is None:
-            self._moved = MovedObstacles(super()._packed_for(clearance, slack), self._bodies)
+            self._moved = MovedObstacles(super()._packed_for(clearance, slack), self.bodies)
         if self._room is not None:
-            self._moved.put(self._bodies, self._room)
+            self._moved.put(self.bodies, self._room)
             self._room = None
         return super()._packed_for(clearance, slack)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.contacts import measured
 from rrtik_ompl.collision.digests import world_digest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.proof.layout import WAYS, ProofTable
@@ -33,6 +34,7 @@ MOTIONS_AT_ONCE = 64  # in one call of the kernel, between two looks at the cloc
 FEW = 200  # configurations
 PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
 DOUBLE, INT = 8, 4  # bytes of a number
+NOWHERE = partial(float, "nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +46,33 @@ class Gap:
         share: Where on it, from 0 at its start to 1 at its end; nan if the whole motion was not looked at.
         first, second: Names of the two bodies that are not proven apart. Without a second one, the first says what else
             is wrong; both are "" if there was no time to look.
+
+    Example:
+        >>> bar = rrtik.Obstacle("bar", rrtik.Box([0.1, 0.1, 0.1]), rrtik.pose([0.0, 2.0, 0.0]))
+        >>> world = rrtik.World(rrtik.load_robot("planar3"), rrtik.Scene([bar]))
+        >>> gap = world.prove([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]).unproven[0]
+        >>> gap.pair, gap.distance < 0.1
+        (('link2', 'bar'), True)
     """
 
     motion: int
     share: float
     first: str
     second: str
+    _measure: Callable[[], float] = field(default=NOWHERE, repr=False, compare=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Gap, (self.motion, self.share, self.first, self.second, partial(float, self.distance))
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """Names of the two bodies."""
+        return self.first, self.second
+
+    @property
+    def distance(self) -> float:
+        """How far the two are apart at that place, as coal measures it [m]; nan where there is no place or pair."""
+        return self._measure()
 
     def __str__(self) -> str:
         if not self.second:
@@ -65,20 +88,28 @@ class Proof:
         motions: How many there are.
         clearance: What each keeps from every obstacle beside its margin [m].
         unproven: The places that are not proven, at most one of each motion.
+        margin: The least margin of the obstacles [m]; every obstacle's own is kept.
     """
 
     motions: int
     clearance: float
     unproven: tuple[Gap, ...]
-    _digest: Callable[[], str] = field(default=str, repr=False, compare=False)
+    margin: float = 0.0
+    _digest: str = field(default="", repr=False, compare=False)
+    _prover: Prover | None = field(default=None, repr=False, compare=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Proof, (self.motions, self.clearance, self.unproven, partial(str, self.digest))
+        return Proof, (self.motions, self.clearance, self.unproven, self.margin, self.digest)
 
     @property
     def digest(self) -> str:
         """Of the robot's and the scene's geometry that the motions are proven for: 32 digits in hexadecimal."""
-        return self._digest()
+        return self._digest if self._prover is None else self._prover.digest
+
+    @property
+    def prover(self) -> Prover | None:
+        """What made it; None in another process."""
+        return self._prover
 
     @property
     def proven(self) -> bool:
@@ -87,17 +118,42 @@ class Proof:
 
 
 class Prover:
-    """Proofs of motions of an arm among bodies; without kernels, or where bodies always touch, it proves nothing."""
+    """Proofs of motions of an arm among bodies; without kernels, or where bodies always touch, it proves nothing.
 
-    def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: Pairs, *, always_colliding: bool = False) -> None:
-        self._robot, self._bodies, self._pairs = robot, bodies, pairs
+    Attributes:
+        robot, bodies, pairs: What the proofs are about.
+        self_margin: What links, and what they hold, keep from each other [m].
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        bodies: tuple[Body, ...],
+        pairs: Pairs,
+        *,
+        self_margin: float = 0.0,
+        always_colliding: bool = False,
+    ) -> None:
+        self.robot, self.bodies, self.pairs, self.self_margin = robot, bodies, pairs, self_margin
         self._always_colliding = always_colliding
         self._gain, self._offset = np.ascontiguousarray(robot.chain.gain.T), robot.chain.offset
         ends = np.stack([robot.lower, robot.upper])
         finite = bool(np.isfinite(ends).all())
         self._bounded = finite and bool((np.abs(robot.joint_values(ends)) < 0.5 * LARGEST_VALUE).all())
         self._packed: ProofPairs | None = None
-        self._digest = partial(world_digest, robot, bodies, pairs)
+        self._margin: float | None = None
+
+    @property
+    def digest(self) -> str:
+        """See :attr:`Proof.digest`."""
+        return world_digest(self.robot, self.bodies, self.pairs)
+
+    @property
+    def margin(self) -> float:
+        """The least margin of the obstacles [m]; 0 without obstacles."""
+        if self._margin is None:
+            self._margin = min((body.margin for body in self.bodies if body.kind == "obstacle"), default=0.0)
+        return self._margin
 
     def route(self, rows: Matrix, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None) -> Proof:
         """Prove the motions between waypoints, shape (k, dof).
@@ -118,7 +174,8 @@ class Prover:
         sound = self._sound(rows, values)
         between = None if sound is None else sound[:-1] & sound[1:]
         gaps = self._gaps(values, values[1:], between, (clearance, slack), seconds)
-        return Proof(count, clearance, tuple(gaps), self._digest)
+        places = (replace(gap, _measure=partial(self._distance, rows, gap)) for gap in gaps)
+        return Proof(count, clearance, tuple(places), self.margin, _prover=self)
 
     def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[ProofLog] | None:
         """By what each motion between waypoints, shape (k, dof), is proven; None if one of them is not."""
@@ -158,7 +215,7 @@ class Prover:
 
     def made(self, proof: Proof) -> bool:
         """Whether a proof is one of these bodies, by this object."""
-        return proof._digest is self._digest
+        return proof.prover is self
 
     def still_proven(self, rows: Matrix) -> Mask:
         """Which configurations, shape (m, dof), are proven free. Shape (m,).
@@ -175,6 +232,16 @@ class Prover:
         values = self._joint_values(rows)
         return self._gaps(values, values, self._sound(rows, values), (clearance, 0.0), None)
 
+    def _distance(self, rows: Matrix, gap: Gap) -> float:
+        """How far the two bodies of a gap in the route through waypoints, shape (k, dof), are apart there [m]."""
+        named = {name: [k for k, body in enumerate(self.bodies) if body.name == name] for name in gap.pair}
+        pairs = [(i, j) for i in named[gap.first] for j in named[gap.second]]
+        if not pairs or not np.isfinite(gap.share):
+            return NOWHERE()
+        q = rows[gap.motion] + gap.share * (rows[gap.motion + 1] - rows[gap.motion])
+        frames = self.robot.joint_frames(q[None])[0]
+        return min(contact.distance for contact in measured(self.bodies, pairs, frames, near_only=False))
+
     def _joint_values(self, rows: Matrix) -> Matrix:
         """Values of every joint of the chain, shape (m, joints), row after row in memory."""
         values: Matrix = rows @ self._gain + self._offset
@@ -182,7 +249,7 @@ class Prover:
 
     def _sound(self, rows: Matrix, values: Matrix) -> Mask | None:
         """Which configurations are inside the limits and not too large for the bound on rounding; None for all."""
-        inside = self._robot.within_limits(rows)
+        inside = self.robot.within_limits(rows)
         if inside.all() and (self._bounded or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
             return None
         sound: Mask = inside & (np.abs(values) <= LARGEST_VALUE).all(axis=1)
@@ -221,8 +288,8 @@ class Prover:
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
         """The table, with a clearance and a slack to keep."""
         if self._packed is None:
-            solids = [convex_solids(body.geometry) for body in self._bodies]
-            self._packed = proof_pairs(self._robot.chain, self._bodies, self._pairs, solids, strokes(self._robot))
+            solids = [convex_solids(body.geometry) for body in self.bodies]
+            self._packed = proof_pairs(self.robot.chain, self.bodies, self.pairs, solids, strokes(self.robot))
         self._packed.keep(clearance, slack)
         return self._packed
 
@@ -230,4 +297,4 @@ class Prover:
         if pair < 0:
             return Gap(motion, float("nan"), "", "")
         i, j = packed.bodies[pair].tolist()
-        return Gap(motion, place, self._bodies[i].name, self._bodies[j].name)
+        return Gap(motion, place, self.bodies[i].name, self.bodies[j].name)

@@ -36,6 +36,20 @@ def test_a_certificate_that_plan_writes_is_verified_in_one_line(files, capsys):
     assert "10 mm kept from obstacles" in line
 
 
+def test_a_path_and_its_certificate_in_one_file_are_checked_together(files, tmp_path, capsys):
+    both = tmp_path / "both.json"
+    code, out, err = rrtik(capsys, "plan", "titan4_prisms", "--seed", "1", "--out", both, "--certificate", both)
+    assert (code, err) == (0, "")
+    assert json.loads(both.read_text())["certificate"] == json.loads(files[1].read_text())
+    code, out, _ = rrtik(capsys, "check", "titan4_prisms", both)
+    assert (code, out.splitlines()[-1].startswith(f"{both}: holds: ")) == (0, True)
+    document = json.loads(both.read_text())
+    document["certificate"]["clearance"] = 0.02
+    both.write_text(json.dumps(document))
+    code, out, _ = rrtik(capsys, "check", "titan4_prisms", both)
+    assert (code, f"{both}: does not hold: motion" in out.splitlines()[-1]) == (1, True)
+
+
 def test_a_certificate_that_does_not_hold_is_refused_with_the_fault(files, capsys):
     path, proof = files
     document = json.loads(proof.read_text())

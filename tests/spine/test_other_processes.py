@@ -89,7 +89,8 @@ THROUGH = {
     "pickle": lambda value: pickle.loads(pickle.dumps(value)),
     "joblib and Dask": lambda value: cloudpickle.loads(cloudpickle.dumps(value)),
 }
-NOT_COMPARED = {"_digest", "closed_form", "model", "collision", "visual"} | {"problem"}  # plans are sent without it
+OWN = {"_digest", "_measure", "_prover", "problem"}  # of one process; plans are sent without their problem
+NOT_COMPARED = OWN | {"closed_form", "model", "collision", "visual"}
 
 
 def same(first, second):

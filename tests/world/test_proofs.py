@@ -1,5 +1,6 @@
 """Motions that are proven free for their whole length."""
 
+import pickle
 from dataclasses import replace
 from itertools import pairwise
 
@@ -205,3 +206,29 @@ def test_bodies_of_several_parts_are_not_proven_apart_from_a_half_space_that_the
     assert 20 < free.sum() < len(Q) - 20
     assert not (proven & ~free).any()
     assert proven[free].mean() > 0.8
+
+
+@pytest.mark.kernels
+def test_a_proof_says_the_least_margin_of_the_obstacles_and_how_far_apart_an_open_pair_is():
+    robot = rrtik.load_robot("point2d", radius=0.5, bounds=[[0, 26], [0, 20]])
+    wall = Obstacle("wall", Box([30, 1, 4]), rrtik.pose([13, 10, 0]), margin=0.25)
+    post = Obstacle("post", Box([1, 1, 4]), rrtik.pose([1, 1, 0]), margin=0.75)
+    world = World(robot, Scene([wall, post]))
+    assert World(robot).prove([[5.0, 5.0], [6.0, 5.0]]).margin == 0.0
+    proof = world.prove([[5.0, 5.0], [20.0, 5.0], [20.0, 8.8]])
+    assert (proof.margin, proof.proven) == (0.25, False)
+    (gap,) = proof.unproven
+    y = 5.0 + gap.share * 3.8
+    assert (gap.motion, "wall" in gap.pair) == (1, True)
+    assert gap.distance == pytest.approx(9.5 - y - 0.5, abs=1e-9)
+    again = pickle.loads(pickle.dumps(proof))
+    assert again == proof
+    assert (again.margin, again.unproven[0].distance) == (0.25, gap.distance)
+
+
+@pytest.mark.kernels
+def test_a_gap_that_nobody_looked_at_has_no_distance():
+    robot = rrtik.load_robot("planar3")
+    beyond = np.array([robot.upper, robot.upper + 1.0])
+    (gap,) = World(robot).prove(beyond).unproven
+    assert np.isnan(gap.distance)
