@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from rrtik_ompl.world import Proof, World
 from rrtik_ompl.world.proof import Prover
 
 
+@runtime_checkable
 class HasWaypoints(Protocol):
     """A path."""
 
@@ -43,7 +44,8 @@ def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: floa
     """
     require(world, World, "world of a certificate")
     kept, robot = not_negative(clearance, "clearance"), world.robot
-    rows = finite_array(getattr(path, "waypoints", path), (None, None), "path of a certificate")
+    given = path.waypoints if isinstance(path, HasWaypoints) else path
+    rows = finite_array(given, (None, None), "path of a certificate")
     if rows.shape[1] != robot.dof:
         raise InputError(f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's")
     return _made(world.prover, rows, kept)
