@@ -62,7 +62,7 @@ def certificate_by(proof: Proof | None, waypoints: Matrix) -> Certificate:
     if not proof.proven:
         raise InputError(f"path to save with its proof: it is not proven free: {proof.unproven[0]}")
     if proof.prover is None or (found := _made(proof.prover, waypoints, proof.clearance)) is None:
-        raise InputError("path to save with its proof: it cannot be made again here; use path.proved(world)")
+        raise InputError("path to save with its proof: planes do not prove it here; use path.proved(world)")
     return found
 
 

@@ -84,8 +84,7 @@ def check(
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
     from rrtik_ompl import JointGoal, load_path, load_problem
-    from rrtik_ompl.certificates.certificate import holds_certificate
-    from rrtik_ompl.cli.plan_report import certified
+    from rrtik_ompl.cli.plan_report import wrong_ends
     from rrtik_ompl.world.clearance_curve import clearance_along
     from rrtik_ompl.world.route_check import how_checked
 
@@ -93,20 +92,14 @@ def check(
     world = question.world
     route = None if path is None else load_path(path, world.robot)
     if route is not None and proof is not None:
-        line, holds = certified(question, route, proof)
-        say(line)
-        return FOUND if holds else NOT_FOUND
+        return _certified(question, route, proof)
     kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
     say(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}{kept}")
     if isinstance(question.goal, JointGoal):
         say(f"{question.name}: goal is free, clearance {_millimetres(world.clearance(question.goal.q))}{kept}")
     if route is None:
         return FOUND
-    faults = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(world)]
-    if abs(route.start - question.start).max() > 1e-6:
-        faults.append("the path does not begin at the start of the problem")
-    if not question.reached(route.end):
-        faults.append("the path does not end at the goal of the problem")
+    faults = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(world)] + wrong_ends(question, route)
     for fault in faults:
         say(f"{path}: {fault}")
     if faults:
@@ -115,9 +108,17 @@ def check(
         say(f"{path}: {clearance_along(world, route.waypoints)}{kept}")
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
     say(f"{path}: valid, {how_checked(world, route.waypoints)}; {size}")
-    if path is None or not holds_certificate(path):
+    return _certified(question, route, path, if_any=True)
+
+
+def _certified(problem: Any, route: Any, file: Any, *, if_any: bool = False) -> int:
+    """Say whether the certificate in a file holds; ``if_any``: nothing of a path's file that has none."""
+    from rrtik_ompl.certificates.certificate import holds_certificate
+    from rrtik_ompl.cli.plan_report import certified
+
+    if if_any and not holds_certificate(file):
         return FOUND
-    line, holds = certified(question, route, path)
+    line, holds = certified(problem, route, file)
     say(line)
     return FOUND if holds else NOT_FOUND
 

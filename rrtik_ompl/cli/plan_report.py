@@ -188,12 +188,23 @@ def write_certificate(problem: Problem, path: JointPath, file: Path, *, beside: 
     found = certificate_of(world, path, kept if proved.proven else 0.0)
     if found is None:
         gaps = world.prove(path.waypoints, clearance=kept).unproven
-        return f"{file}: no certificate: the path is not proven free" + (f": {gaps[0]}" if gaps else "")
+        return f"{file}: no certificate: " + (
+            f"the path is not proven free: {gaps[0]}" if gaps else "links are too near for planes of their pieces"
+        )
     if beside:
         proved.save(file, proof=True)
     else:
         found.save(file)
     return ""
+
+
+def wrong_ends(problem: Problem, path: JointPath) -> list[str]:
+    """A line for each end of a path that is not that of its problem."""
+    wrong = {
+        "the path does not begin at the start of the problem": abs(path.start - problem.start).max() > 1e-6,
+        "the path does not end at the goal of the problem": not problem.reached(path.end),
+    }
+    return [text for text, found in wrong.items() if found]
 
 
 def certified(problem: Problem, path: JointPath, proof: Path) -> tuple[str, bool]:
@@ -206,13 +217,9 @@ def certified(problem: Problem, path: JointPath, proof: Path) -> tuple[str, bool
     from rrtik_ompl.certificates.verify import verify_certificate
 
     found = load_certificate(proof)
-    fault = verify_certificate(found, problem.world, path.waypoints)
-    if not fault and abs(path.start - problem.start).max() > 1e-6:
-        fault = "the path does not begin at the start of the problem"
-    if not fault and not problem.reached(path.end):
-        fault = "the path does not end at the goal of the problem"
-    if fault:
-        return f"{proof}: does not hold: {fault}", False
+    faults = [verify_certificate(found, problem.world, path.waypoints), *wrong_ends(problem, path)]
+    if any(faults):
+        return f"{proof}: does not hold: {next(filter(None, faults))}", False
     kept = f", {1e3 * found.clearance:g} mm kept from obstacles" if found.clearance else ""
     moves = len(found.motions)
     return f"{proof}: holds: {moves} motion{'s' * (moves != 1)} proven free{kept}, {found.entries} entries", True

@@ -10,13 +10,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.contacts import measured
 from rrtik_ompl.collision.digests import world_digest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.proof.layout import WAYS, ProofTable
@@ -26,6 +25,7 @@ from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, strokes
+from rrtik_ompl.world.coal_proof import CoalProof, distance_between
 
 LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
 PROOF_KERNELS = "proof.proof_kernels"
@@ -35,6 +35,7 @@ FEW = 200  # configurations
 PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
 DOUBLE, INT = 8, 4  # bytes of a number
 NOWHERE = partial(float, "nan")
+Ends: TypeAlias = tuple[Matrix, Matrix]  # of motions: where they begin, and where they end
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +47,6 @@ class Gap:
         share: Where on it, from 0 at its start to 1 at its end; nan if the whole motion was not looked at.
         first, second: Names of the two bodies that are not proven apart. Without a second one, the first says what else
             is wrong; both are "" if there was no time to look.
-
-    Example:
-        >>> bar = rrtik.Obstacle("bar", rrtik.Box([0.1, 0.1, 0.1]), rrtik.pose([0.0, 2.0, 0.0]))
-        >>> world = rrtik.World(rrtik.load_robot("planar3"), rrtik.Scene([bar]))
-        >>> gap = world.prove([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]).unproven[0]
-        >>> gap.pair, gap.distance < 0.1
-        (('link2', 'bar'), True)
     """
 
     motion: int
@@ -141,6 +135,7 @@ class Prover:
         finite = bool(np.isfinite(ends).all())
         self._bounded = finite and bool((np.abs(robot.joint_values(ends)) < 0.5 * LARGEST_VALUE).all())
         self._packed: ProofPairs | None = None
+        self._coal: CoalProof | None = None
         self._margin: float | None = None
 
     @property
@@ -173,7 +168,7 @@ class Prover:
         values, count = self._joint_values(rows), len(rows) - 1
         sound = self._sound(rows, values)
         between = None if sound is None else sound[:-1] & sound[1:]
-        gaps = self._gaps(values, values[1:], between, (clearance, slack), seconds)
+        gaps = self._gaps((rows, rows[1:]), (values, values[1:]), between, (clearance, slack), seconds)
         places = (replace(gap, _measure=partial(self._distance, rows, gap)) for gap in gaps)
         return Proof(count, clearance, tuple(places), self.margin, _prover=self)
 
@@ -200,7 +195,8 @@ class Prover:
         values = self._joint_values(rows)
         sound = self._sound(rows, values)
         both = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
-        mask[[gap.motion for gap in self._gaps(values, values[len(starts) :], both, (clearance, 0.0), None)]] = False
+        gaps = self._gaps((starts, ends), (values, values[len(starts) :]), both, (clearance, 0.0), None)
+        mask[[gap.motion for gap in gaps]] = False
         return mask
 
     def table(self, clearance: float) -> int:
@@ -230,17 +226,12 @@ class Prover:
     def still_gaps(self, rows: Matrix, *, clearance: float) -> list[Gap]:
         """The configurations, shape (m, dof), that are not proven free; each counts as a motion that stands still."""
         values = self._joint_values(rows)
-        return self._gaps(values, values, self._sound(rows, values), (clearance, 0.0), None)
+        return self._gaps((rows, rows), (values, values), self._sound(rows, values), (clearance, 0.0), None)
 
     def _distance(self, rows: Matrix, gap: Gap) -> float:
         """How far the two bodies of a gap in the route through waypoints, shape (k, dof), are apart there [m]."""
-        named = {name: [k for k, body in enumerate(self.bodies) if body.name == name] for name in gap.pair}
-        pairs = [(i, j) for i in named[gap.first] for j in named[gap.second]]
-        if not pairs or not np.isfinite(gap.share):
-            return NOWHERE()
-        q = rows[gap.motion] + gap.share * (rows[gap.motion + 1] - rows[gap.motion])
-        frames = self.robot.joint_frames(q[None])[0]
-        return min(contact.distance for contact in measured(self.bodies, pairs, frames, near_only=False))
+        q = rows[gap.motion] + np.nan_to_num(gap.share) * (rows[gap.motion + 1] - rows[gap.motion])
+        return distance_between(self.robot, self.bodies, gap.pair, q)
 
     def _joint_values(self, rows: Matrix) -> Matrix:
         """Values of every joint of the chain, shape (m, joints), row after row in memory."""
@@ -256,17 +247,19 @@ class Prover:
         return sound
 
     def _gaps(
-        self, tails: Matrix, heads: Matrix, sound: Mask | None, kept: tuple[float, float], seconds: float | None
+        self, rows: Ends, values: Ends, sound: Mask | None, kept: tuple[float, float], seconds: float | None
     ) -> list[Gap]:
-        """The motions from the first rows of joint values to as many others that are not proven.
+        """The motions from the first configurations to as many others that are not proven.
 
-        ``kept``: clearance and slack [m].
+        ``values``: of all joints there. ``kept``: clearance and slack [m].
         """
+        tails, heads = values
         count, joints = heads.shape
         begin, kernels = time.monotonic(), library(PROOF_KERNELS)
         if kernels is None or self._always_colliding:
             return [Gap(k, float("nan"), "", "") for k in range(count)]
         packed = self._packed_for(*kept)
+        coal = self._coal = self._coal or CoalProof(self.robot, self.bodies, packed)
         pairs, places = np.full(count, NOT_LOOKED_AT, dtype=np.int32), np.full(count, np.nan)
         table = ProofTable(packed.table.address)
         at, found, where = (tails.ctypes.data, heads.ctypes.data), pairs.ctypes.data, places.ctypes.data
@@ -283,6 +276,10 @@ class Prover:
             pairs[~sound], places[~sound] = NOT_LOOKED_AT, np.nan
         elif open_ == 0 and looked == count:
             return []
+        for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if coal.links[pairs[k]]):
+            skipped, sinks = DOUBLE * joints * k, (found + INT * k, where + DOUBLE * k)
+            again = partial(kernels.prove, table, at[0] + skipped, at[1] + skipped, 1, *sinks)
+            coal.settle(np.stack([rows[0][k], rows[1][k]]), pairs[k : k + 1], places[k : k + 1], again)
         return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:

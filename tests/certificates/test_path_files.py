@@ -56,7 +56,7 @@ def test_what_has_no_proof_at_hand_is_refused_in_one_line(how, problem, path, tm
         "not proven": lambda: path.with_waypoints(path.waypoints[[0, -1]]).proved(problem.world),
         "a table": lambda: path,
     }[how]()
-    words = {"elsewhere": "cannot be made again", "not proven": "'link2' and 'box_right'", "a table": "use .json"}
+    words = {"elsewhere": "do not prove it here", "not proven": "'link2' and 'box_right'", "a table": "use .json"}
     name = "path.csv" if how == "a table" else "path.json"
     with pytest.raises(InputError, match=re.escape(words.get(how, "it has none"))) as caught:
         other.save(tmp_path / name, proof=True)

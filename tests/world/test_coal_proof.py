@@ -1,0 +1,109 @@
+"""Links whose convex pieces stick out of their meshes: proven apart by coal's distances, and never where they touch."""
+
+from dataclasses import replace
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.collision.solids import is_closed
+from rrtik_ompl.fast.tables.solid_tables import convex_solids
+from rrtik_ompl.world import World
+from rrtik_ompl.world.coal_proof import CoalProof
+from rrtik_ompl.world.proof import Prover
+from rrtik_tests.by_coal import free_by_coal
+
+pytestmark = pytest.mark.kernels
+
+
+@pytest.fixture(scope="module")
+def world():
+    return World(rrtik.load_robot("ur5"))
+
+
+def by_kernels_alone(monkeypatch):
+    monkeypatch.setattr(CoalProof, "settle", lambda *_: None)
+
+
+@pytest.fixture(scope="module")
+def postures(world):
+    """Free postures that kernels alone cannot prove."""
+    low, high = world.robot.finite_range()
+    Q = np.random.default_rng(3).uniform(low, high, (6000, world.robot.dof))
+    Q = Q[world.valid_batch(Q)]
+    with pytest.MonkeyPatch.context() as patch:
+        by_kernels_alone(patch)
+        return Q[[gap.motion for gap in world.prover.still_gaps(Q, clearance=0.0)]]
+
+
+def test_every_free_posture_is_proven_where_kernels_alone_leave_some_open(world, postures):
+    assert len(postures) > 3
+    assert world.motions_proven(postures, postures).all()
+    assert free_by_coal(world, postures).all()
+
+
+def test_short_motions_that_are_proven_are_free_wherever_coal_looks(world, postures, monkeypatch):
+    rng = np.random.default_rng(4)
+    starts = np.repeat(postures, 8, axis=0)
+    ends = np.clip(starts + rng.normal(0.0, 0.02, starts.shape), world.robot.lower, world.robot.upper)
+    proven = world.motions_proven(starts, ends)
+    assert (proven == world.motions_proven(ends, starts)).mean() > 0.9
+    assert proven.mean() > 0.5
+    for a, b in zip(starts[proven], ends[proven], strict=True):
+        assert free_by_coal(world, a + np.linspace(0.0, 1.0, 60)[:, None] * (b - a)).all()
+    by_kernels_alone(monkeypatch)
+    assert not world.motions_proven(starts, ends)[proven].all()
+
+
+def test_motions_into_contact_are_never_proven(world, postures):
+    rng = np.random.default_rng(5)
+    starts = np.repeat(postures, 40, axis=0)
+    ends = np.clip(starts + rng.normal(0.0, 0.1, starts.shape), world.robot.lower, world.robot.upper)
+    touching = ~free_by_coal(world, ends)
+    assert touching.sum() > 20
+    assert not world.motions_proven(starts, ends)[touching].any()
+
+
+def test_margins_of_the_arm_to_itself_are_kept(world, postures):
+    wide = World(world.robot, self_margin=0.005)
+    assert not wide.motions_proven(postures, postures)[~free_by_coal(wide, postures)].any()
+
+
+def test_the_table_is_as_before_when_links_were_compared(world, postures):
+    world.motions_proven(postures, postures)
+    q = np.zeros((1, world.robot.dof))
+    q[0, 2] = np.pi  # the forearm in the upper arm
+    assert not world.motion_proven(q[0], q[0])
+
+
+def test_a_body_wholly_inside_a_link_is_not_proven_apart_from_it(world):
+    """The wrist as a grain within the upper arm: no surface is near another."""
+    numbers = {body.name: k for k, body in enumerate(world.bodies)}
+    arm, wrist = world.bodies[numbers["upper_arm_link"]], world.bodies[numbers["wrist_1_link"]]
+    q = np.zeros(world.robot.dof)
+    frames = world.robot.joint_frames(q[None])[0]
+    middle = convex_solids(arm.geometry).inside[0].corners.mean(axis=0)
+    place = pin.SE3(frames[arm.joint]) * arm.placement * pin.SE3(np.eye(3), middle)
+    grain = small_mesh(1e-3)
+    assert is_closed(grain)
+    inside = replace(wrist, geometry=grain, placement=pin.SE3(frames[wrist.joint]).inverse() * place)
+    pair = numbers["upper_arm_link"], numbers["wrist_1_link"]
+    bodies = tuple(inside if k == pair[1] else body for k, body in enumerate(world.bodies))
+    assert not Prover(world.robot, bodies, (pair,)).proven(q[None], q[None])[0]
+    away = replace(inside, placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, 5.0])))
+    apart = tuple(away if k == pair[1] else body for k, body in enumerate(world.bodies))
+    assert Prover(world.robot, apart, (pair,)).proven(q[None], q[None])[0]
+
+
+def small_mesh(half):
+    """A closed mesh of a tetrahedron."""
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(4, 4)
+    corners = half * np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+    mesh.addVertices(corners)
+    mesh.addTriangles(np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], dtype=np.int32))
+    mesh.endModel()
+    mesh.computeLocalAABB()
+    return mesh
