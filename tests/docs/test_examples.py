@@ -1,5 +1,7 @@
-"""Scripts of examples/ and the code of the tutorials run as they stand, in an empty folder."""
+"""Scripts and notebooks of examples/ and the code of the tutorials run as they stand, in an empty folder."""
 
+import ast
+import json
 import re
 import runpy
 from pathlib import Path
@@ -9,6 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 LONGEST = 40  # lines
 EXAMPLES = sorted(file for file in (ROOT / "examples").glob("*.py") if not file.stem.startswith("follow_"))
+NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 CODE = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
@@ -35,3 +38,27 @@ def test_the_code_of_a_tutorial_runs_from_top_to_bottom(file, tmp_path, monkeypa
 
 def test_there_are_fifteen_examples():
     assert len(EXAMPLES) >= 15
+
+
+def shown_by(cell, names):
+    """Run a cell; what a notebook shows of the value of its last expression, or None."""
+    body = ast.parse(cell).body
+    last = body.pop() if isinstance(body[-1], ast.Expr) else None
+    exec(compile(ast.Module(body, []), "cell", "exec"), names)
+    value = None if last is None else eval(compile(ast.Expression(last.value), "cell", "eval"), names)
+    return value if not hasattr(value, "_repr_html_") else value._repr_html_() or repr(value)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_runs_and_shows_a_page(file, tmp_path, monkeypatch, quiet_ompl):
+    monkeypatch.chdir(tmp_path)
+    cells = [cell for cell in json.loads(file.read_text())["cells"] if cell["cell_type"] == "code"]
+    assert all(cell["outputs"] == [] for cell in cells)  # pages are large, and made anew
+    names = {}
+    shown = [shown_by("".join(cell["source"]), names) for cell in cells]
+    assert any("<iframe" in str(each) for each in shown)
+
+
+def test_there_are_three_notebooks():
+    assert len(NOTEBOOKS) >= 3
