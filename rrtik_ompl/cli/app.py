@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from collections.abc import Callable
@@ -23,23 +24,27 @@ from rrtik_ompl.cli.reach import reach
 from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.task import straight, task
-from rrtik_ompl.cli.terminal import drop_output, note, prepare_streams, say, warn
+from rrtik_ompl.cli.terminal import drop_output, note, prepare_streams, problem_names, say, warn
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.files import notice
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
+COMPLETING = "_RRTIK_COMPLETE"  # by which a shell asks for completions
 FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
 
 app = typer.Typer(
     help="Plan collision-free paths for robot arms.\n\nExit 0: found or valid; 1: not; 2: bad input; 130: interrupted.",
-    add_completion=False,
+    add_completion=True,  # rrtik --install-completion, for bash, zsh and fish
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
 
-ProblemName = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
+ProblemName = Annotated[
+    str,
+    typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.", autocompletion=problem_names),
+]
 PathFile = Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")]
 
 
@@ -216,6 +221,8 @@ def run(arguments: list[str] | None = None) -> int:
     prepare_streams()
     given = sys.argv[1:] if arguments is None else arguments
     try:
+        if not given and COMPLETING in os.environ:
+            return _complete()
         if not given:  # the help, but no success: nothing was asked
             with redirect_stdout(sys.stderr):
                 app(args=["--help"], prog_name="rrtik", standalone_mode=False)
@@ -238,6 +245,15 @@ def run(arguments: list[str] | None = None) -> int:
     except OSError as error:
         drop_output()
         return _fail(f"standard output cannot be written: {error.strerror or error}")
+
+
+def _complete() -> int:
+    """Answer a shell that completes a command; typer ends that by an exit."""
+    try:
+        app(prog_name="rrtik", standalone_mode=False)
+    except SystemExit:
+        sys.stdout.flush()
+    return FOUND
 
 
 def _fail(message: str) -> int:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rrtik_ompl.cli.terminal import note, progress, say
+from rrtik_ompl.cli.terminal import note, progress, say, shown_names
 from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.files.text import check_target
 
@@ -27,7 +27,12 @@ ENDINGS = (".mp4", ".avi", ".png", ".jpg")
 
 
 def show(
-    problem: Annotated[str, typer.Argument(help="A shipped problem (rrtik list problems), a YAML file, or a robot.")],
+    problem: Annotated[
+        str,
+        typer.Argument(
+            help="A shipped problem (rrtik list problems), a YAML file, or a robot.", autocompletion=shown_names
+        ),
+    ],
     path: Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")] = None,
     scene: Annotated[Path | None, typer.Option(help="What stands around a robot: a YAML file.")] = None,
     before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,

@@ -73,3 +73,17 @@ def counter(message: str, total: int) -> Iterator[Callable[[int], object]]:
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(message, total=total)
         yield lambda done: bar.update(task, completed=done)
+
+
+def problem_names(incomplete: str) -> list[str]:
+    """Shipped problems that begin so: what a shell completes."""
+    from rrtik_ompl.catalog import list_problems
+
+    return [name for name in list_problems() if name.startswith(incomplete)]
+
+
+def shown_names(incomplete: str) -> list[str]:
+    """Shipped problems and robots that begin so."""
+    from rrtik_ompl.catalog import list_robots
+
+    return problem_names(incomplete) + [name for name in list_robots() if name.startswith(incomplete)]

@@ -42,9 +42,10 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
         import xacro
         from xacro import substitution_args
     except ImportError:
+        expanded = f"{path.stem.removesuffix('.urdf')}.urdf"  # by this ending it is read
         raise InputError(
             f"{path}: holds macros, and the package xacro is not installed: pip install xacro, "
-            f"or expand it by hand: xacro {path.name} > {path.stem}"
+            f"or expand it by hand: xacro {path.name} > {expanded}"
         ) from None
     roots, folder, usual = list(packages), path.resolve().parent, substitution_args._eval_find
 
