@@ -24,6 +24,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from rrtik_ompl.description.joint_weights import weighted
 from rrtik_ompl.description.padding import padded
 from rrtik_ompl.description.robot_cache import RobotCache
 from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
@@ -40,7 +41,8 @@ RobotOption: TypeAlias = (
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
 FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
 PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
-MOUNTING = ("base_pose", "tip", "padding")  # keys that stand beside that group
+OF_ALL: Mapping[str, Callable[..., Robot]] = {"padding": padded, "joint_weights": weighted}  # options of any robot
+MOUNTING = ("base_pose", "tip", *OF_ALL)  # keys that stand beside that group
 
 
 def list_robots() -> tuple[str, ...]:
@@ -131,9 +133,9 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     Args:
         name: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
             xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt configuration folder.
-        **options: What the robot takes: any of them ``padding`` (see `rrtik_ompl.padded`), and ``base_pose``, ``tip``
-            and ``locked`` where they apply; a URDF ``srdf, group, joints, joint_limits, packages, xacro_args``, a
-            folder also ``urdf``; a shipped robot for instance ``limits="envelope"``.
+        **options: What the robot takes: any ``padding`` (see `rrtik_ompl.padded`) and ``joint_weights`` (`weighted`),
+            and ``base_pose``, ``tip`` and ``locked`` where they apply; a URDF ``srdf, group, joints, joint_limits,
+            packages, xacro_args``, a folder also ``urdf``; a shipped robot for instance ``limits="envelope"``.
             ``base_pose`` is a ``pinocchio.SE3`` or ``{"xyz": [..], "quat_xyzw": [..]}``.
 
     Raises:
@@ -142,8 +144,8 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     """
     recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
     for option in options:
-        if option not in (*recipe.options, "padding"):
-            takes = ", ".join(sorted((*recipe.options, "padding")))
+        if option not in (*recipe.options, *OF_ALL):
+            takes = ", ".join(sorted((*recipe.options, *OF_ALL)))
             raise InputError(f"robot '{os.fspath(name)}' takes no option '{option}'; it takes {takes}")
     given = {key: _absolute(key, value) for key, value in options.items() if value is not None}
     if "base_pose" in given:
@@ -151,8 +153,9 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     key = json.dumps([recipe.target, plain(given)], sort_keys=True, default=repr)
     cached = _cache.get(key)
     if cached is None:
-        robot = recipe.make(**{option: value for option, value in given.items() if option != "padding"})
-        robot = padded(robot, given["padding"]) if "padding" in given else robot
+        robot = recipe.make(**{option: value for option, value in given.items() if option not in OF_ALL})
+        for option in OF_ALL.keys() & given.keys():
+            robot = OF_ALL[option](robot, given[option])
         files = [recipe.target, *_paths(given), *_paths(robot.source)]
         cached = _cache.put(key, replace(robot, source=recipe.source(given)), files)
     return cached
@@ -162,10 +165,8 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
     """Robot that a problem file names under ``robot``.
 
     Args:
-        entry: A name; or ``{name: .., options}``, ``{urdf: FILE, options}``, ``{moveit: FOLDER, options}``,
-            ``{mjcf: FILE, options}``,
-            ``{dh: FILE, options}``, ``{planar: {..}}``, ``{point2d: {..}}``; the last two take ``base_pose`` beside
-            them.
+        entry: A name; or ``{name: .., options}``; or ``{urdf: FILE, options}``, ``{moveit: FOLDER, options}``, and so
+            with ``mjcf`` and ``dh``; ``{planar: {..}}``, ``{point2d: {..}}``, which take ``base_pose`` beside them.
         folder: Folder of the problem file; files are named relative to it.
 
     Raises:

@@ -58,13 +58,12 @@ class Robot:
         movable: All joints of the description that are not fixed: actuated ones, those that follow and those held.
         lower, upper: Position limits, shape (dof,), -inf and +inf for continuous joints.
         velocity, acceleration, jerk: Limits [rad/s, rad/s^2, rad/s^3 or m], shape (dof,), inf where unknown.
-        prismatic, continuous: Masks, shape (dof,).
-        tip, postures: Name of the frame that goals refer to; named configurations.
+        prismatic, continuous: Masks, shape (dof,). tip, postures: Frame that goals refer to; named configurations.
         allowed_collisions: Pairs of link names that are never checked against each other.
         model, collision, visual: Pinocchio's model and geometry; do not change them.
         closed_form: The robot's own inverse kinematics, if it brings one.
         gripper: The joints that open and close its gripper, `rrtik_ompl.description.gripper.GripperJoints`, or None.
-        padding: How much thicker links are than their geometry [m], by name; see :func:`rrtik_ompl.padded`.
+        padding, joint_weights: By name; see :func:`rrtik_ompl.padded` and :func:`rrtik_ompl.weighted`.
     """
 
     name: str
@@ -89,6 +88,7 @@ class Robot:
     gripper: Any = None
     planar: bool = False
     padding: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    joint_weights: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     source: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
     __deepcopy__ = itself

@@ -11,7 +11,7 @@ import time
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from rrtik_ompl.ompl_bridge.setup import (
     shared_space,
     space_information,
 )
+from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
 from rrtik_ompl.problem import Problem
 
 # What an attempt of effort 1 may take: iterations of our planners, checked motions of OMPL's.
@@ -72,7 +73,7 @@ def attempt(
     There may be none if the planner finds goals itself; one that takes one goal gets the first. With an ``effort`` (for
     planners that support an iteration limit) the attempt ends after a number of iterations or checked motions, so that
     what it finds does not depend on the computer's speed. With ``checked``, start and goals are known to be free,
-    and a planner of ours does not check them again.
+    and a planner of ours does not check them again. Where joints have weights, distances are weighted.
 
     Raises:
         InputError: If the planner does not take a parameter.
@@ -81,6 +82,11 @@ def attempt(
     """
     traits, name = traits_of(factory), getattr(factory, "__name__", str(factory))
     goals = goals[:1] if traits.one_goal else goals
+    if has_weights(problem) and len(goals) and not traits.one_joint:
+        form, options = WeightedProblem(problem), {"seconds": seconds, "seed": seed, "parameters": parameters}
+        found = attempt(form.problem, factory, form.there(goals), **options, effort=effort, checked=checked)
+        rows = None if found.rows is None else form.back(found.rows, np.vstack([problem.start, goals]))
+        return replace(found, rows=rows)
     with quiet():
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         if is_safe(factory):

@@ -10,11 +10,14 @@ import numpy as np
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.choices import PathObjective
+from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.ompl_bridge.weighted import has_weights
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.transitions import route_length
 from rrtik_ompl.world.clearance_curve import clearance_along
 
 NEAREST = 1e-3  # [m] clearances below this cost no more
@@ -23,9 +26,9 @@ DOUBLE = 0.05  # [m] the clearance at which a piece of a path counts double
 PathCost: TypeAlias = Callable[[JointPath, Problem], float]
 
 
-def length(path: JointPath, _: Problem) -> float:
-    """Length in joint space [rad; m]."""
-    return path.length
+def length(path: JointPath, problem: Problem) -> float:
+    """Length in joint space, each joint's way multiplied by its weight [rad; m]."""
+    return route_length(path.waypoints * _weights(problem))
 
 
 def least_time(path: JointPath, problem: Problem) -> float:
@@ -38,12 +41,12 @@ def least_time(path: JointPath, problem: Problem) -> float:
 
 
 def weighted_length(path: JointPath, problem: Problem) -> float:
-    """Length in joint space, where each piece counts ``1 + 0.05 m / clearance`` times [rad; m].
+    """Weighted length in joint space, where each piece counts ``1 + 0.05 m / clearance`` times [rad; m].
 
     The clearance is proven at 240 places on the path, so the true one is no smaller.
     """
     curve, rows = clearance_along(problem.world, path.waypoints), path.waypoints
-    lengths = np.append(np.linalg.norm(np.diff(rows, axis=0), axis=1), 0.0)
+    lengths = np.append(np.linalg.norm(np.diff(rows * _weights(problem), axis=0), axis=1), 0.0)
     ends = np.append(np.where(curve.motions[1:] == curve.motions[:-1], curve.shares[1:], 1.0), 1.0)
     pieces = lengths[np.minimum(curve.motions, len(lengths) - 1)] * (ends - curve.shares)
     return float(pieces @ (1.0 + DOUBLE / np.maximum(curve.distances, NEAREST)))
@@ -60,7 +63,14 @@ def least_cost(problem: Problem, objective: PathObjective) -> float:
     if not isinstance(goal, JointGoal):
         return 0.0
     span = goal.q - problem.start
-    return float(_seconds(span[None], problem.robot)[0] if objective == "time" else np.linalg.norm(span))
+    if objective == "time":
+        return float(_seconds(span[None], problem.robot)[0])
+    return float(np.linalg.norm(span * _weights(problem)))
+
+
+def _weights(problem: Problem) -> Vector | float:
+    """How much each joint counts in lengths, shape (dof,); all alike where there are no weights."""
+    return weights_of(problem.robot) if has_weights(problem) else 1.0
 
 
 def _seconds(motions: np.ndarray, robot: Robot) -> Vector:

@@ -15,6 +15,7 @@ from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
     Number,
+    Positive,
     Section,
     Vector2,
     tag,
@@ -32,6 +33,9 @@ class _Mounted(Section):
     tip: Name | None = Field(None, description="link or frame that goals refer to")
     padding: NotNegative | dict[Name, NotNegative] | None = Field(
         None, description="how much thicker links are than their geometry [m]: by name, or one number for all"
+    )
+    joint_weights: dict[Name, Positive] | None = Field(
+        None, description="how much joints count in the length of a path, by name; 1 if absent"
     )
 
 

@@ -13,14 +13,16 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, positive, whole_number
 from rrtik_ompl.choices import ShorteningMethod, one_of
+from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.errors import InputError, PathWarning, require
 from rrtik_ompl.moves.axis_cut import double_axis_cut
 from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.moves.rules import MoveRules
 from rrtik_ompl.ompl_bridge.simplify import simplified
+from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening.acceptance import Acceptance
+from rrtik_ompl.shortening.acceptance import Acceptance, Form
 from rrtik_ompl.shortening.along_constraints import along_constraints
 from rrtik_ompl.shortening.best import best_in_time
 from rrtik_ompl.shortening.corners import snap_corners
@@ -143,8 +145,8 @@ def shorten(
     Returns:
         A path with the same ends, and with its proof. If the input is proven free so is the result, with the clearance
         if the input has it: what is not gets a detour, or else only proven motions are used; if that does not help,
-        the input is returned. It is not longer than the input, and where one joint moves at a time it has no more
-        moves.
+        the input is returned. It is not longer than the input (:func:`rrtik_ompl.weighted` where joints have weights),
+        and where one joint moves at a time it has no more moves.
 
     Raises:
         UnknownNameError: If there is no such method.
@@ -201,15 +203,29 @@ def _shortened(
     traits = {"leaves_room": chosen.leaves_room, "samples": chosen.samples}
     acceptance = Acceptance(path, problem, given["clearance"], one_joint=single, seed=given["seed"], **traits)
     for form in acceptance.forms():
-        task = Task(form.motions, seconds=form.share * (end - time.monotonic()), **given)
-        rows = np.vstack([chosen.run(head, task, form.problem), tail])
+        task, found = _run(chosen, form, head, given | {"seconds": form.share * (end - time.monotonic())}, single)
+        rows = np.vstack([found, tail])
         if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
             continue
         shorter = acceptance.accepted(path.with_waypoints(rows))
-        if shorter is None or (not chosen.keeps_moves and task.rank(shorter.waypoints) > task.rank(path.waypoints)):
+        counted = 1.0 if single else weights_of(problem.robot)
+        before, after = (task.rank(each.waypoints * counted) for each in (path, shorter or path))
+        if shorter is None or (not chosen.keeps_moves and after > before):
             continue
         return shorter
     return acceptance.input
+
+
+def _run(chosen: Method, form: Form, route: Matrix, given: Mapping[str, Any], single: bool) -> tuple[Task, Matrix]:
+    """What a method makes of a route, in coordinates in which lengths are weighted where joints have weights."""
+    if single or not has_weights(form.problem):
+        task = Task(form.motions, **given)
+        return task, chosen.run(route, task, form.problem)
+    weighted, on_better = WeightedProblem(form.problem, form.motions), given.get("on_better")
+    if on_better is not None:
+        given = {**given, "on_better": lambda rows: on_better(weighted.back(rows, route[[0, -1]]))}
+    task = Task(weighted.problem.world, **given)
+    return task, weighted.back(chosen.run(weighted.there(route), task, weighted.problem), route[[0, -1]])
 
 
 def _single(path: JointPath, method: ShorteningMethod, one_joint: bool | None) -> bool:

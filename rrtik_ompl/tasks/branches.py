@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rrtik_ompl.arrays import Vector
+from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.goal import JointGoal, joint_difference
 from rrtik_ompl.ik.goal_configurations import GoalSearch
@@ -171,8 +172,8 @@ class Expander:
 
 
 def way_of(robot: Robot, a: Vector, b: Vector) -> float:
-    """Of the joints from one configuration to another [rad, metres counted alike]."""
-    return float(np.linalg.norm(joint_difference(robot, b, a)))
+    """Of the joints from one configuration to another, weighted [rad, metres counted alike]."""
+    return float(np.linalg.norm(joint_difference(robot, b, a) * weights_of(robot)))
 
 
 def _way(branch: Branch, stage: Straight) -> Way:

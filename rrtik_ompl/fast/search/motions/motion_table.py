@@ -88,7 +88,8 @@ class FastMotions:
             raise InputError(f"gain and offset: expected {len(fast.limits)} rows, one for each joint, got {joints}")
         self.fast, self.resolve, self._gain, self._offset, self._proof = fast, resolve, matrix, shift, proof
         self.spare: dict[str, Any] = {}
-        self.resolution = positive(resolution, "resolution")
+        self.resolution, self._steps_per_unit = positive(resolution, "resolution"), steps_per_unit
+        self._weights = finite_array(weights, (self.dof,), "weights")
         self.identity = matrix.shape == (joints, joints) and bool((matrix == np.eye(joints)).all() and not shift.any())
         self.table = table(
             {
@@ -97,7 +98,7 @@ class FastMotions:
                 motion_layout.JOINTS: joints,
                 motion_layout.GAIN: np.ascontiguousarray(matrix),
                 motion_layout.OFFSET: shift,
-                motion_layout.WEIGHTS: finite_array(weights, (self.dof,), "weights"),
+                motion_layout.WEIGHTS: self._weights,
                 motion_layout.NUMBERS: np.array([self.resolution, steps_per_unit]),
                 motion_layout.ENDS: np.zeros((2, joints)),
                 motion_layout.RESOLVE: int(resolve),
@@ -110,6 +111,19 @@ class FastMotions:
     def joints(self) -> int:
         """How many joint values a configuration has."""
         return len(self._offset)
+
+    def scaled(self, scale: Vector) -> FastMotions:
+        """The same motions between configurations that are multiplied by ``scale``, shape (dof,), above 0."""
+        return FastMotions(
+            self.fast,
+            self._gain / scale,
+            self._offset,
+            weights=self._weights / scale,
+            resolution=self.resolution,
+            steps_per_unit=self._steps_per_unit,
+            resolve=self.resolve,
+            proof=self._proof,
+        )
 
     def joint_values(self, Q: Matrix) -> Matrix:
         """Joint values of configurations, shapes (m, dof) and (m, joints)."""

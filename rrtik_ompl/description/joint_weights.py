@@ -1,0 +1,64 @@
+"""How much each joint counts in the length of a path: a joint that is slow, or that moves much, is moved less."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+from types import MappingProxyType
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector, bounded_array, frozen, positive
+from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.robot import Robot
+
+LIGHTEST, HEAVIEST = 1e-3, 1e3
+
+
+@lru_cache(maxsize=64)
+def weights_of(robot: Robot) -> Vector:
+    """How much each joint counts, shape (dof,): such that the box of the limits is as long as without weights.
+
+    Steps of searches are shares of that box.
+    """
+    given = np.array([robot.joint_weights.get(joint, 1.0) for joint in robot.joint_names])
+    lower, upper = robot.finite_range()
+    return frozen(given * (np.linalg.norm(upper - lower) / np.linalg.norm(given * (upper - lower))))
+
+
+def weighted(robot: Robot, weights: Mapping[str, float]) -> Robot:
+    """The robot with joints that count more or less than others in the length of a path.
+
+    A joint of weight w counts w times as much as one without: :func:`rrtik_ompl.plan`, ``plan(improve=)``,
+    :func:`rrtik_ompl.shorten` and :class:`rrtik_ompl.Task` make the length small in which each joint's way is
+    multiplied by its weight, and planners measure distances so. Only proportions matter. Paths of single-joint moves
+    (``joint_costs`` is their rule) and those under path constraints know no weights. ``JointPath.length`` is without.
+
+    Args:
+        robot: The robot; weights that it has already are replaced.
+        weights: By name of joint, from 0.001 to 1000; a joint without one counts 1.
+
+    Raises:
+        UnknownNameError: If no actuated joint has a name.
+        InputError: If a weight is out of range.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> arm = rrtik.weighted(rrtik.load_robot("ur5"), {"shoulder_pan_joint": 5.0})
+        >>> arm.joint_weights["shoulder_pan_joint"]
+        5.0
+    """
+    require(robot, Robot, "robot to weight", "use load_robot(name or file)")
+    require(weights, Mapping, f"joint weights of robot '{robot.name}'", "use {name of a joint: weight}")
+    given = {}
+    for joint, value in weights.items():
+        if joint not in robot.joint_names:
+            raise UnknownNameError(f"joint of robot '{robot.name}'", joint, robot.joint_names, where="joint_weights")
+        what = f"joint_weights of robot '{robot.name}': {joint}"
+        given[joint] = positive(float(bounded_array(value, (), what)), what)
+        if not LIGHTEST <= given[joint] <= HEAVIEST:
+            raise InputError(f"{what}: must be from {LIGHTEST:g} to {HEAVIEST:g}, got {given[joint]:g}")
+    source = dict(robot.source) | {"joint_weights": dict(given)}
+    kept = {joint: weight for joint, weight in given.items() if weight != 1.0}
+    return replace(robot, joint_weights=MappingProxyType(kept), source=MappingProxyType(source))

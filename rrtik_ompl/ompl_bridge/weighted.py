@@ -1,0 +1,45 @@
+"""A problem of an arm with joint weights, in coordinates in which lengths are weighted, and the way back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.description.joint_weights import weights_of
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.motion_queries import MotionQueries
+from rrtik_ompl.world.weighted_motions import WeightedMotions
+
+
+class WeightedProblem:
+    """A problem whose configurations are multiplied by the weights of their joints.
+
+    Attributes:
+        problem: With a start and motions in these coordinates; its goal is as it was.
+
+    Args:
+        problem: Of a robot with joint weights, without path constraints.
+        motions: What says which motions are free; the problem's world if None.
+    """
+
+    def __init__(self, problem: Problem, motions: MotionQueries | None = None) -> None:
+        self._scale = weights_of(problem.robot)
+        world = problem.world if motions is None else motions
+        self.problem = problem.with_world(WeightedMotions(world, self._scale))  # type: ignore[arg-type]
+        self.problem.start = frozen(problem.start * self._scale)
+
+    def there(self, rows: Matrix) -> Matrix:
+        """Configurations in these coordinates, shape (m, dof)."""
+        return np.asarray(rows * self._scale)
+
+    def back(self, rows: Matrix, known: Matrix) -> Matrix:
+        """Configurations of the arm, shape (m, dof); values of those that are ``known`` come back to the bit."""
+        found = rows / self._scale
+        for row in known:
+            found = np.where(rows == row * self._scale, row, found)
+        return np.asarray(found)
+
+
+def has_weights(problem: Problem) -> bool:
+    """Whether lengths are weighted: the robot has joint weights, and there are no path constraints."""
+    return bool(problem.robot.joint_weights) and not problem.constraints

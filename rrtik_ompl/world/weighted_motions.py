@@ -1,0 +1,57 @@
+"""Motions in coordinates in which each joint's way is multiplied by its weight: Euclidean lengths there are weighted.
+
+Searches that know nothing of weights are given these coordinates, and what they find is turned back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.fast import FastWorld
+from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world.motion_queries import MotionQueries, is_conservative, kernel_tables
+
+
+class WeightedMotions(MotionQueries):
+    """The motions of a world in weighted coordinates.
+
+    Attributes:
+        robot: The arm with limits and joint values of these coordinates.
+        fast, motions: What kernels read; None where the world has none.
+        weights, motion_resolution, accuracy: See :class:`rrtik_ompl.World`.
+
+    Args:
+        world: A world, or another one that checks motions of its robot.
+        weights: Of the joints, shape (dof,).
+    """
+
+    def __init__(self, world: Any, weights: Vector) -> None:
+        robot: Robot = world.robot
+        self._world, self._scale = world, weights
+        chain = replace(robot.chain, gain=frozen(robot.chain.gain / weights))
+        bounds = {name: frozen(getattr(robot, name) * weights) for name in ("lower", "upper")}
+        self.robot = replace(robot, chain=chain, joint_weights=MappingProxyType({}), **bounds)
+        motions: FastMotions | None = getattr(world, "motions", None)
+        self.motions = None if motions is None else motions.scaled(weights)
+        self.fast: FastWorld | None = None if motions is None else kernel_tables(world)
+        self.weights: Vector = world.weights / weights
+        self.motion_resolution = float(world.motion_resolution)
+        self.accuracy: Accuracy = "conservative" if is_conservative(world) else "exact"
+
+    def valid_batch(self, Q: Matrix) -> Mask:
+        """Which configurations Q, shape (m, n), are free, shape (m,)."""
+        return np.asarray(self._world.valid_batch(self._back(Q)))
+
+    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
+        """Which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
+        return np.asarray(self._world.motion_valid_batch(self._back(A), self._back(B)))
+
+    def _back(self, Q: Matrix) -> Matrix:
+        return np.asarray(Q / self._scale)

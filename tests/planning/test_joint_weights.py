@@ -1,0 +1,133 @@
+"""Joints that count more or less than others in the length of a path."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.planning.path_costs import least_cost, length
+
+HEAVY = 6.0
+
+
+def weighted_length(path, weights):
+    return float(np.linalg.norm(np.diff(path.waypoints, axis=0) * weights, axis=1).sum())
+
+
+def cases(count):
+    """A Panda among balls, two free configurations without a free straight motion, and weights: two joints count 6."""
+    base, found, k = rrtik.load_robot("panda"), [], 0
+    while len(found) < count:
+        rng = np.random.default_rng([k, 5])
+        k += 1
+        places = [np.append(rng.uniform(-0.7, 0.7, 2), rng.uniform(0.1, 0.9)) for _ in range(8)]
+        balls = [
+            rrtik.Obstacle(f"ball {i}", rrtik.Sphere(0.1), place)
+            for i, place in enumerate(places)
+            if np.linalg.norm(place[:2]) > 0.3
+        ]
+        weights = np.ones(base.dof)
+        weights[rng.choice(base.dof, 2, replace=False)] = HEAVY
+        world = rrtik.World(base, rrtik.Scene(balls))
+        rows = rng.uniform(*base.finite_range(), (60, base.dof))
+        rows = rows[world.valid_batch(rows) & world.certify(rows)]
+        if len(rows) > 1 and not world.motion_valid(rows[0], rows[1]):
+            heavy = rrtik.weighted(base, dict(zip(base.joint_names, weights.tolist(), strict=True)))
+            found.append((world, rrtik.World(heavy, world.scene), rows[0], rows[1], weights))
+    return found
+
+
+@pytest.fixture(scope="module")
+def problem():
+    world, heavy, start, goal, weights = cases(1)[0]
+    return rrtik.Problem(world, start, goal), rrtik.Problem(heavy, start, goal), weights
+
+
+@pytest.mark.kernels
+def test_paths_are_shorter_in_the_weighted_length_and_free():
+    plain, weighted = 0.0, 0.0
+    for seed, (world, heavy, start, goal, weights) in enumerate(cases(8)):
+        one = rrtik.plan(rrtik.Problem(world, start, goal), seed=seed)
+        other = rrtik.plan(rrtik.Problem(heavy, start, goal), seed=seed)
+        assert other.found, other.reason
+        assert other.proven
+        assert other.path.violations(heavy) == ()
+        assert (other.path.start == start).all()
+        assert (other.path.end == goal).all()
+        plain += weighted_length(one.path, weights)
+        weighted += weighted_length(other.path, weights)
+    assert weighted < 0.99 * plain
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("planner", ["auto", "fastrrtconnect", "RRTConnect"])
+def test_only_proportions_count(problem, planner):
+    plain = problem[0]
+    even = rrtik.weighted(plain.robot, dict.fromkeys(plain.robot.joint_names, 4.0))
+    same = rrtik.Problem(rrtik.World(even, plain.world.scene), plain.start, plain.goal)
+    one, other = rrtik.plan(plain, planner, seed=3), rrtik.plan(same, planner, seed=3)
+    assert one.path.waypoints == pytest.approx(other.path.waypoints, abs=1e-9)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("method", ["auto", "shortcut", "retraction", "ompl"])
+def test_shortening_never_makes_the_weighted_length_longer(problem, method):
+    plain, heavy, weights = problem
+    path = rrtik.plan(plain, "RRTConnect", seed=2).path
+    seen = []
+    shorter = rrtik.shorten(path, heavy, method=method, one_joint=False, seed=1, on_better=seen.append)
+    assert weighted_length(shorter, weights) < weighted_length(path, weights)
+    assert shorter.violations(heavy.world) == ()
+    assert all((each.start == path.start).all() and (each.end == path.end).all() for each in seen)
+    ratio = weighted_length(shorter, weights) / length(shorter, heavy)
+    assert least_cost(heavy, "length") == pytest.approx(np.linalg.norm((heavy.goal.q - heavy.start) * weights) / ratio)
+
+
+@pytest.mark.kernels
+def test_goals_of_the_tip_are_reached(problem):
+    plain, heavy, _ = problem
+    goal = rrtik.PoseGoal(plain.robot.fk(plain.goal.q))
+    plan = rrtik.plan(rrtik.Problem(heavy.world, heavy.start, goal), seed=1)
+    assert plan.found, plan.reason
+    assert goal.satisfied(heavy.robot, plan.path.end[None]).all()
+    assert plan.path.violations(heavy.world) == ()
+
+
+@pytest.mark.kernels
+def test_single_joint_moves_know_no_weights(problem):
+    plain, heavy, _ = problem
+    one, other = (rrtik.plan(each, "bicrdt", seed=1).path for each in (plain, heavy))
+    assert (one.waypoints == other.waypoints).all()
+    again = rrtik.shorten(other, heavy)
+    assert again.one_joint_at_a_time
+    assert (again.waypoints == rrtik.shorten(one, plain).waypoints).all()
+
+
+def test_weights_are_an_option_of_every_robot_and_stand_in_files(tmp_path):
+    robot = rrtik.load_robot("planar3", radius=0.01, joint_weights={"joint2": 2.5, "joint3": 1.0})
+    assert dict(robot.joint_weights) == {"joint2": 2.5}
+    again = pickle.loads(pickle.dumps(robot))
+    assert again.joint_weights == robot.joint_weights
+    problem = rrtik.Problem(rrtik.World(robot), [0.1, 0.2, 0.3], [0.3, 0.2, 0.1])
+    rrtik.save_problem(problem, tmp_path / "weighted.yaml")
+    assert rrtik.load_problem(tmp_path / "weighted.yaml").robot is robot
+    arm = rrtik.load_robot("ur5", joint_weights={"elbow_joint": 3.0}, padding={"wrist_3_link": 0.01})
+    assert (arm.padding["wrist_3_link"], arm.joint_weights["elbow_joint"]) == (0.01, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("weights", "error", "said"),
+    [
+        ({"q9": 2.0}, UnknownNameError, "joint_weights: no joint of robot 'planar3' 'q9'"),
+        ({"joint1": 0.0}, InputError, "joint1: must be greater than 0"),
+        ({"joint1": 1e4}, InputError, "joint1: must be from 0.001 to 1000, got 10000"),
+        ({"joint1": "heavy"}, InputError, "joint1"),
+        ([1.0, 2.0, 3.0], InputError, "use {name of a joint: weight}"),
+    ],
+)
+def test_bad_weights_are_one_line(weights, error, said):
+    with pytest.raises(error, match=said) as caught:
+        rrtik.weighted(rrtik.load_robot("planar3", radius=0.01), weights)
+    assert "\n" not in str(caught.value)
