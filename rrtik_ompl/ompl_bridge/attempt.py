@@ -83,7 +83,8 @@ def attempt(
     traits, name = traits_of(factory), getattr(factory, "__name__", str(factory))
     goals = goals[:1] if traits.one_goal else goals
     if has_weights(problem) and len(goals) and not traits.one_joint:
-        form, options = WeightedProblem(problem), {"seconds": seconds, "seed": seed, "parameters": parameters}
+        form = WeightedProblem(problem)
+        options: dict[str, Any] = {"seconds": seconds, "seed": seed, "parameters": parameters}
         found = attempt(form.problem, factory, form.there(goals), **options, effort=effort, checked=checked)
         rows = None if found.rows is None else form.back(found.rows, np.vstack([problem.start, goals]))
         return replace(found, rows=rows)

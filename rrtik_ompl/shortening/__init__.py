@@ -203,7 +203,8 @@ def _shortened(
     traits = {"leaves_room": chosen.leaves_room, "samples": chosen.samples}
     acceptance = Acceptance(path, problem, given["clearance"], one_joint=single, seed=given["seed"], **traits)
     for form in acceptance.forms():
-        task, found = _run(chosen, form, head, given | {"seconds": form.share * (end - time.monotonic())}, single)
+        limited = {**given, "seconds": form.share * (end - time.monotonic())}
+        task, found = _run(chosen, form, head, limited, single)
         rows = np.vstack([found, tail])
         if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
             continue

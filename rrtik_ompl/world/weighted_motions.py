@@ -36,8 +36,8 @@ class WeightedMotions(MotionQueries):
         robot: Robot = world.robot
         self._world, self._scale = world, weights
         chain = replace(robot.chain, gain=frozen(robot.chain.gain / weights))
-        bounds = {name: frozen(getattr(robot, name) * weights) for name in ("lower", "upper")}
-        self.robot = replace(robot, chain=chain, joint_weights=MappingProxyType({}), **bounds)
+        lower, upper = frozen(robot.lower * weights), frozen(robot.upper * weights)
+        self.robot = replace(robot, chain=chain, lower=lower, upper=upper, joint_weights=MappingProxyType({}))
         motions: FastMotions | None = getattr(world, "motions", None)
         self.motions = None if motions is None else motions.scaled(weights)
         self.fast: FastWorld | None = None if motions is None else kernel_tables(world)
