@@ -82,12 +82,11 @@ def attempt(
     """
     traits, name = traits_of(factory), getattr(factory, "__name__", str(factory))
     goals = goals[:1] if traits.one_goal else goals
-    if has_weights(problem) and len(goals) and not traits.one_joint:
+    if len(goals) and not traits.one_joint and has_weights(problem):
         form = WeightedProblem(problem)
-        options: dict[str, Any] = {"seconds": seconds, "seed": seed, "parameters": parameters}
-        found = attempt(form.problem, factory, form.there(goals), **options, effort=effort, checked=checked)
-        rows = None if found.rows is None else form.back(found.rows, np.vstack([problem.start, goals]))
-        return replace(found, rows=rows)
+        limits: dict[str, Any] = {"seconds": seconds, "seed": seed, "parameters": parameters, "effort": effort}
+        found = attempt(form.problem, factory, form.there(goals), **limits, checked=checked)
+        return replace(found, rows=form.found(found.rows, goals))
     with quiet():
         ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         if is_safe(factory):

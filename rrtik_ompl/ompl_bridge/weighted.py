@@ -26,7 +26,7 @@ class WeightedProblem:
         self._scale = weights_of(problem.robot)
         world = problem.world if motions is None else motions
         self.problem = problem.with_world(WeightedMotions(world, self._scale))  # type: ignore[arg-type]
-        self.problem.start = frozen(problem.start * self._scale)
+        self._start, self.problem.start = problem.start, frozen(problem.start * self._scale)
 
     def there(self, rows: Matrix) -> Matrix:
         """Configurations in these coordinates, shape (m, dof)."""
@@ -38,6 +38,10 @@ class WeightedProblem:
         for row in known:
             found = np.where(rows == row * self._scale, row, found)
         return np.asarray(found)
+
+    def found(self, rows: Matrix | None, goals: Matrix) -> Matrix | None:
+        """A path to one of some goals as one of the arm, shape (k, dof), or None."""
+        return None if rows is None else self.back(rows, np.vstack([self._start, goals]))
 
 
 def has_weights(problem: Problem) -> bool:
