@@ -10,7 +10,7 @@ import os
 import stat
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
 
@@ -68,12 +68,7 @@ def nobody_else_s(file: Path, *, among: int = OTHERS_WRITE) -> bool:
 def write_whole(file: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let ``write`` fill a file that appears all at once or, where it cannot be written, not at all."""
     with contextlib.suppress(OSError):
-        new = [folder for folder in file.parents if not folder.exists()]
-        file.parent.mkdir(parents=True, exist_ok=True)
-        for folder in {file.parent, *new}:
-            mode = stat.S_IMODE(folder.stat().st_mode)
-            if mode & OTHERS_WRITE:  # by the umask of many systems
-                folder.chmod(mode & ~OTHERS_WRITE)
+        _make_closed(file.parent)
         handle, aside = tempfile.mkstemp(dir=file.parent, prefix=".writing-")
         try:
             with os.fdopen(handle, "wb") as stream:
@@ -82,3 +77,37 @@ def write_whole(file: Path, write: Callable[[IO[bytes]], object]) -> None:
         except OSError:
             with contextlib.suppress(OSError):
                 os.unlink(aside)
+
+
+def _make_closed(folder: Path) -> None:
+    """Make a folder, and those above it that are missing, to which only the user can write."""
+    new = [place for place in folder.parents if not place.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for place in {folder, *new}:
+        mode = stat.S_IMODE(place.stat().st_mode)
+        if mode & OTHERS_WRITE:  # by the umask of many systems
+            place.chmod(mode & ~OTHERS_WRITE)
+
+
+@contextlib.contextmanager
+def one_at_a_time(file: Path | None) -> Iterator[None]:
+    """Wait until no other process makes ``file``, and let none begin meanwhile; none waits where there is no lock.
+
+    Whoever has waited looks again whether the file is there. A process that ends in any way gives its lock back.
+    """
+    try:
+        import fcntl  # not on Windows
+    except ImportError:
+        yield
+        return
+    lock = None
+    with contextlib.suppress(OSError):
+        if file is not None:
+            _make_closed(file.parent)
+            lock = os.open(file.with_suffix(".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if lock is not None:
+            os.close(lock)

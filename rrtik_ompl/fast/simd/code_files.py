@@ -105,9 +105,9 @@ def machine_key(name: str) -> str:
     return f"{_contents(name)} {processor_identity()}"
 
 
-def file_name(name: str, key: str) -> str:
-    """Name of the file of a kernel module's code."""
-    return f"{name}-{sha256(key.encode()).hexdigest()[:24]}.code"
+def file_name(name: str, key: str, ending: str = "code") -> str:
+    """Name of the file of a kernel module's code in the user's cache."""
+    return f"{name}-{sha256(key.encode()).hexdigest()[:24]}.{ending}"
 
 
 def bitcode_name(name: str, target: Target) -> str:

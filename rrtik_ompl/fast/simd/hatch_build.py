@@ -23,7 +23,8 @@ WITHOUT, REQUIRED = "0", "1"
 WIDTHS = ("8", "16")
 ENDINGS = (".bitcode", ".wasm")
 PATIENCE = None if SETTING == REQUIRED else 1800.0  # [s]; a wheel that must have all kernels waits for them
-PORTABLE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}  # nothing that only this processor can do
+# Nothing that only this processor can do, and nothing of the kind left in the cache of whoever builds.
+PORTABLE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "RRTIK_CACHE": ""}
 
 
 class KernelBitcode(BuildHookInterface):  # type: ignore[misc]

@@ -15,12 +15,10 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
+from rrtik_ompl.fast.simd.bitcode_store import own_bitcode, packaged_bitcode
 from rrtik_ompl.fast.simd.code_files import (
-    FOLDER,
     PREFIX,
     Code,
-    bitcode_key,
-    bitcode_name,
     file_name,
     kernel_modules,
     machine_key,
@@ -30,7 +28,6 @@ from rrtik_ompl.fast.simd.code_files import (
 from rrtik_ompl.fast.simd.processor import target_machine
 from rrtik_ompl.fast.simd.targets import UnknownMachineError, target_of, this_target
 from rrtik_ompl.files.cache import cache_folder, nobody_else_s
-from rrtik_ompl.files.notice import COMPILING, tell_once
 
 MAX_REASON = 300  # [letters]
 
@@ -124,14 +121,8 @@ def _kept(name: str) -> Library | None:
 
 def _made(name: str) -> Library:
     """The library from the package's bitcode or else its source; kept in the user's cache if that can be written."""
-    target = this_target()
-    packaged = read_code(FOLDER / bitcode_name(name, target), bitcode_key(name, target))
-    code = None if packaged is None else machine_code(packaged)
-    if code is None:
-        from rrtik_ompl.fast.simd.bitcode import compiled_module
-
-        tell_once(COMPILING)
-        code = machine_code(compiled_module(name))
+    packaged = packaged_bitcode(name)
+    code = (None if packaged is None else machine_code(packaged)) or machine_code(own_bitcode(name))
     if code is None:
         raise RuntimeError("LLVM does not take the code that numba made")
     made = Library(name, code)

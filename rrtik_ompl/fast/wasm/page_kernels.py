@@ -41,10 +41,10 @@ def made_page_kernels() -> bytes:
         ImportError: Without numba.
         RuntimeError: If this LLVM cannot make it.
     """
-    from rrtik_ompl.fast.simd.bitcode import compiled_module
+    from rrtik_ompl.fast.simd.bitcode_store import own_bitcode
     from rrtik_ompl.fast.wasm.emit import wasm_module
 
-    return wasm_module({name: compiled_module(module) for name, module in LIBRARIES.items()})
+    return wasm_module({name: own_bitcode(module) for name, module in LIBRARIES.items()})
 
 
 def write_page_kernels(folder: Path) -> None:

@@ -1,5 +1,6 @@
 """Kernels are made once for a processor, load without numba, and a bad cache costs time, never a wrong answer."""
 
+import fcntl
 import os
 import runpy
 import shutil
@@ -17,9 +18,10 @@ from rrtik_ompl import load_problem
 from rrtik_ompl.cli import terminal
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.fast import warm_up
-from rrtik_ompl.fast.simd import bitcode, code_files, compiled, library
+from rrtik_ompl.fast.simd import bitcode, bitcode_store, code_files, compiled, library
 from rrtik_ompl.fast.simd.targets import this_target
 from rrtik_ompl.files import notice
+from rrtik_ompl.files.cache import cache_folder, one_at_a_time
 
 # kernels are compiled anew here, which takes minutes on a busy machine
 pytestmark = [pytest.mark.kernels, pytest.mark.timeout(3600)]
@@ -75,13 +77,20 @@ def filled(tmp_path_factory):
     return folder, answers
 
 
+@pytest.fixture(scope="module")
+def kept():
+    """The user's own cache with all kernels in it."""
+    assert warm_up(lambda _: None)
+    return cache_folder("kernels")
+
+
 @pytest.fixture
 def cached(filled, tmp_path, monkeypatch):
     """A copy of that folder as this process's cache: the file of the kernels."""
     shutil.copytree(filled[0], tmp_path, dirs_exist_ok=True)
     monkeypatch.setenv("RRTIK_CACHE", str(tmp_path))
     monkeypatch.setattr(library, "_libraries", {})
-    (file,) = (tmp_path / "kernels").iterdir()
+    (file,) = (tmp_path / "kernels").glob("*.code")
     return file
 
 
@@ -109,11 +118,12 @@ def test_both_widths_answer_the_same(filled, tmp_path):
 
 
 @pytest.mark.slow
-def test_processes_that_start_at_once_do_not_disturb_each_other(filled, tmp_path):
-    for process in [start(RRTIK_CACHE=str(tmp_path)) for _ in range(2)]:
-        assert finished(process)[0] == filled[1]
-    (file,) = (tmp_path / "kernels").iterdir()
-    assert file.read_bytes() == next((filled[0] / "kernels").iterdir()).read_bytes()
+def test_of_processes_that_start_at_once_one_compiles_and_the_others_wait(filled, tmp_path):
+    ends = [finished(process) for process in [start(RRTIK_CACHE=str(tmp_path)) for _ in range(2)]]
+    assert [answers for answers, _, _ in ends] == [filled[1]] * 2
+    assert sorted(said for _, _, said in ends) == ["", "compiling\n"]
+    (file,) = (tmp_path / "kernels").glob("*.code")
+    assert file.read_bytes() == next((filled[0] / "kernels").glob("*.code")).read_bytes()
 
 
 @pytest.mark.parametrize("folder", ["", "file/below"])
@@ -166,7 +176,7 @@ def test_a_folder_in_the_files_place_is_no_trouble(cached):
     cached.unlink()
     cached.mkdir()
     assert library.library(KERNELS) is not None
-    assert [*cached.parent.iterdir()] == [cached]
+    assert [*cached.parent.glob("*.code")] == [cached]
 
 
 def test_a_library_is_loaded_once(cached):
@@ -202,6 +212,19 @@ def test_bitcode_of_another_kind_of_processor_is_not_taken():
     assert library.machine_code(code_files.Code({}, b"nonsense")) is None
 
 
+def test_a_process_that_is_killed_gives_its_lock_back(tmp_path):
+    file = tmp_path / "kernels" / "a.code"
+    held = "import pathlib, time; from rrtik_ompl.files.cache import one_at_a_time\n"
+    held += f"with one_at_a_time(pathlib.Path({str(file)!r})):\n    print(flush=True); time.sleep(1000)"
+    with subprocess.Popen([sys.executable, "-c", held], stdout=subprocess.PIPE) as process:
+        process.stdout.readline()
+        with file.with_suffix(".lock").open() as lock, pytest.raises(BlockingIOError):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        process.kill()
+    with one_at_a_time(file):
+        pass
+
+
 def test_a_kernel_that_needs_python_is_refused(monkeypatch):
     def allocating(count):
         return np.zeros(count).size
@@ -219,7 +242,7 @@ def test_a_compiler_that_fails_is_told_once_and_replaced_by_numpy(cached, monkey
     def fail(name):
         raise ValueError(f"no {name}")
 
-    cached.unlink()
+    shutil.rmtree(cached.parent)
     monkeypatch.setattr(bitcode, "compiled_module", fail)
     monkeypatch.setattr(library, "_said", set())
     with pytest.warns(RuntimeWarning, match="plain numpy, many times slower: ValueError: no [\\w.]*kernels"):
@@ -228,8 +251,9 @@ def test_a_compiler_that_fails_is_told_once_and_replaced_by_numpy(cached, monkey
 
 
 @pytest.mark.slow
-def test_warming_up_makes_all_kernels(cached, capsys):
+def test_warming_up_makes_all_kernels(kept, cached, capsys):
     before = cached.read_bytes()
+    shutil.copytree(kept, cached.parent, dirs_exist_ok=True)
     cached.unlink()
     assert run(["warmup"]) == 0
     ready = [*(f"{name}: ready" for name in code_files.kernel_modules()), "pages that plan: ready"]
@@ -263,9 +287,10 @@ def packaged(cached, tmp_path, monkeypatch):
 
     folder = tmp_path / "package"
     folder.mkdir()
+    monkeypatch.setattr(bitcode, "kernel_modules", lambda: [KERNELS])
     bitcode.write_bitcode(folder)
-    cached.unlink()
-    monkeypatch.setattr(library, "FOLDER", folder)
+    shutil.rmtree(cached.parent)
+    monkeypatch.setattr(bitcode_store, "FOLDER", folder)
     monkeypatch.setattr(bitcode, "compiled_module", fail)
     monkeypatch.setattr(library, "_said", set())
     return folder / code_files.bitcode_name(KERNELS, this_target())

@@ -5,7 +5,8 @@ import warnings
 import llvmlite.binding as llvm
 import pytest
 
-from rrtik_ompl.fast.simd import bitcode, code_files, library, targets
+from rrtik_ompl.fast.simd import bitcode, bitcode_store, code_files, library, targets
+from rrtik_ompl.fast.simd.bitcode_store import own_bitcode
 from rrtik_ompl.fast.simd.targets import TARGETS, target_of, this_target
 from rrtik_tests.object_files import symbols
 
@@ -38,7 +39,7 @@ TRIPLES = {
 
 @pytest.fixture(scope="module")
 def code():
-    return bitcode.compiled_module(KERNELS)
+    return own_bitcode(KERNELS)
 
 
 @pytest.mark.parametrize(("triple", "name"), TRIPLES.items())
@@ -71,11 +72,10 @@ def test_code_for_every_kind_is_made_here_and_needs_the_c_library_alone(code, ta
 
 
 @pytest.mark.slow
-def test_code_of_every_library_is_made_for_every_kind():
-    for name in code_files.kernel_modules():
-        code = bitcode.compiled_module(name)
-        for target in TARGETS:
-            checked_object(name, code, target, 0)
+@pytest.mark.parametrize("name", code_files.kernel_modules())
+def test_code_of_every_library_is_made_for_every_kind(name):
+    for target in TARGETS:
+        checked_object(name, own_bitcode(name), target, 0)
 
 
 def test_missing_names_are_seen(code):
@@ -97,7 +97,7 @@ def test_foreign_bitcode_is_never_used(code, target, tmp_path, monkeypatch):
         raise ValueError(f"{name} is compiled")
 
     monkeypatch.setenv("RRTIK_CACHE", "")
-    monkeypatch.setattr(library, "FOLDER", tmp_path)
+    monkeypatch.setattr(bitcode_store, "FOLDER", tmp_path)
     monkeypatch.setattr(bitcode, "compiled_module", fail)
     for key in (code_files.bitcode_key(KERNELS, target), code_files.bitcode_key(KERNELS, this_target())):
         for place in TARGETS:  # also in the place, and with the key, of this machine's own
