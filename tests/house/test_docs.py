@@ -82,7 +82,7 @@ def test_the_examples_of_tasks_run(tmp_path, monkeypatch):
     assert 0.0 < names["far"].fraction < 1.0
     assert names["plan"].chosen[1] == 1
     assert Path("task.html").stat().st_size > 100_000
-    (file,) = blocks("tasks", "yaml")
+    file = blocks("tasks", "yaml")[0]
     Path("task.yaml").write_text(file)
     assert run(["task", "task.yaml"]) == 0
 
