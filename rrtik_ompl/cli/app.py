@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import redirect_stdout
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -29,6 +29,10 @@ from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.files import notice
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
+
+if TYPE_CHECKING:
+    from rrtik_ompl.path import JointPath
+    from rrtik_ompl.problem import Problem
 
 COMPLETING = "_RRTIK_COMPLETE"  # by which a shell asks for completions
 FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -116,12 +120,12 @@ def check(
     return _certified(question, route, path, if_any=True)
 
 
-def _certified(problem: Any, route: Any, file: Any, *, if_any: bool = False) -> int:
+def _certified(problem: Problem, route: JointPath, file: Path | None, *, if_any: bool = False) -> int:
     """Say whether the certificate in a file holds; ``if_any``: nothing of a path's file that has none."""
     from rrtik_ompl.certificates.certificate import holds_certificate
     from rrtik_ompl.cli.plan_report import certified
 
-    if if_any and not holds_certificate(file):
+    if file is None or (if_any and not holds_certificate(file)):
         return FOUND
     line, holds = certified(problem, route, file)
     say(line)

@@ -6,7 +6,7 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
@@ -15,6 +15,9 @@ from rrtik_ompl.cli.terminal import note, problem_names, progress, say
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
+
+if TYPE_CHECKING:
+    from rrtik_ompl.path import JointPath
 
 RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules
 
@@ -118,7 +121,7 @@ def plan(
     return 0 if found.found and not lack else 1
 
 
-def _say_path(path: Any, written: tuple[Path | None, ...]) -> None:
+def _say_path(path: JointPath | None, written: tuple[Path | None, ...]) -> None:
     """Print the moves or waypoints of a path, if there is one, and the files that it was written to."""
     if path is None:
         return
