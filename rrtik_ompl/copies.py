@@ -5,12 +5,15 @@ from __future__ import annotations
 import sys
 from dataclasses import fields, is_dataclass
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import frozen
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Thing = TypeVar("Thing")
 MOST_SHOWN = 8  # numbers of an array, or items of a tuple, in one line
@@ -82,7 +85,7 @@ def unpacked(value: object) -> object:
     return frozen(value.values, value.values.dtype) if isinstance(value, _ReadOnlyArray) else value
 
 
-def in_one_line(thing: Any) -> str:
+def in_one_line(thing: DataclassInstance) -> str:
     """``__repr__`` of a dataclass: long arrays by their shape, long tuples by their number of items.
 
     Example:

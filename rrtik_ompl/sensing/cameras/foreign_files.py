@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 import cv2
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from rrtik_ompl.errors import InputError
@@ -101,7 +102,7 @@ def _first(storage: cv2.FileStorage, names: tuple[str, ...], kind: str) -> Any:
     return None
 
 
-def _camera(matrix: Any, lens: Any, width: Any, height: Any) -> Camera:
+def _camera(matrix: ArrayLike, lens: ArrayLike, width: int, height: int) -> Camera:
     numbers, rest = np.ravel(np.asarray(lens, dtype=np.float64)), 5
     if np.any(numbers[rest:]):
         raise InputError(
