@@ -53,8 +53,8 @@ class Judge:
         pose = body.placement if body.joint == 0 else self.data.oMi[body.joint] * body.placement
         return coal.Transform3s(pose.rotation, pose.translation)
 
-    def strays(self, rows: Matrix, begin: pin.SE3, end: pin.SE3) -> tuple[float, float]:
-        """How far the tip leaves a line between two poses at `SAMPLES` samples of each motion [m, rad].
+    def strays(self, rows: Matrix, begin: pin.SE3, end: pin.SE3, samples: int = SAMPLES) -> tuple[float, float]:
+        """How far the tip leaves a line between two poses at some samples of each motion [m, rad].
 
         Each sample is compared with the point of the line that is nearest to its place, or with one so near to that
         that the orientation fits better and the place is still within 0.1 mm.
@@ -63,7 +63,7 @@ class Judge:
         length, turn = float(np.linalg.norm(way)), pin.log3(begin.rotation.T @ end.rotation)
         off, twisted = 0.0, 0.0
         for a, b in pairwise(rows):
-            for share in np.linspace(0.0, 1.0, SAMPLES + 1):
+            for share in np.linspace(0.0, 1.0, samples + 1):
                 tip = self.tip(a + share * (b - a))
                 away = tip.translation - begin.translation
                 along = float(away @ way) / length**2

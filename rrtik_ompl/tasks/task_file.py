@@ -29,6 +29,7 @@ from rrtik_ompl.files.sections import (
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.goal import Goal
+from rrtik_ompl.problem import usable_configuration
 from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, build_goal, goal_data
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.robot import RobotEntry
@@ -229,7 +230,7 @@ def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
     with document.at(("scene",)):
         world = World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
     with document.at(("start",)):
-        start = entry.start.configuration(robot)
+        start = usable_configuration(world, entry.start.configuration(robot), "start")
     return LoadedTask(world, start, Task(_stages(document, entry, world, start)), path.stem)
 
 

@@ -224,6 +224,7 @@ def test_goals_in_order_are_the_tour_that_python_plans(tmp_path, capsys):
         ("{position: [0.3", "{place: [0.3", "tour.yaml:6: goals"),
         ("joints: [0.8, ", "joints: [", r"tour.yaml:5: .*joints.*6 joints"),
         ("upright: {axis: y", "on_plane: {axis: y", "tour.yaml:9: path_constraints"),
+        ("start: {joints: [0.0, -1.6, 1.8,", "start: {joints: [0.0, -1.6, 3.1,", "tour.yaml:3: start.*in collision"),
     ],
 )
 def test_a_bad_tour_is_refused_with_file_and_line(tmp_path, capsys, old, new, words):
