@@ -1,6 +1,6 @@
 """Straight lines of the tip beside roboplan's Cartesian planner, on the same lines in one run.
 
-Usage: ``python bench/tip_motion/peers.py [--lines 60] [--python PYTHON] [--jobs 1] [--out FILE]``
+Usage: ``python bench/tip_motion/peers.py [--lines 12] [--python PYTHON] [--jobs 1] [--out FILE]``
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ def line_of(python: str, arm: str, number: int) -> dict[str, Followed]:
         spent.append(time.process_time() - since)
     found = {OURS: seen(None if made.path is None else made.path.waypoints, made.fraction == 1.0, min(spent))}
     with TemporaryDirectory() as folder:
-        task = task_of(rrtik.Problem(world, q, other), Path(folder), SECONDS)
+        asked = task_of(rrtik.Problem(world, q, other), Path(folder), SECONDS)
         for module in THEIRS:
-            answers = [_host(module, python).ask(task, 0) for _ in range(ROUNDS)]
+            answers = [_host(module, python).ask(asked, 0) for _ in range(ROUNDS)]
             rows, least = answers[-1].rows, min(answer.cpu for answer in answers)
             found[module] = seen(rows, rows is not None, least)
     return found
@@ -87,9 +87,9 @@ def _host(module: str, python: str) -> Host:
 def main() -> None:
     """Write the page."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--lines", type=int, default=60, help="of each arm")
+    parser.add_argument("--lines", type=int, default=12, help="of each arm")
     parser.add_argument("--python", default=sys.executable, help="interpreter of an environment with roboplan")
-    add_options(parser, "tip_motion_peers")
+    add_options(parser, "tip_motion_peers.md")
     given = parser.parse_args()
     report = Report("Straight lines beside roboplan's", "python bench/tip_motion/peers.py", processes(given.jobs))
     report.intro = (
