@@ -17,6 +17,7 @@ from rrtik_ompl.pilot.devices.perception import LivePerception, SimulatedSource
 from rrtik_ompl.pilot.devices.simulated_vehicle import SimulatedVehicle, find_vehicle, load_vehicle
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
+from rrtik_ompl.pilot.devices.wrong_arm import WrongArm
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for, start_of
@@ -78,7 +79,7 @@ def open_session(options: SessionOptions) -> OpenSession:
         return _replay(options, problem, options.replay)
     if options.arm is not None and isinstance(options.source, Path):
         raise InputError("--arm: an arm is moved by a camera's pictures, not by photographs or a film: leave one out")
-    arm: Arm = SimulatedArm(problem.robot, problem.start) if options.arm is None else _line_arm(problem, options.arm)
+    arm: Arm = _simulated_arm(options, problem) if options.arm is None else _line_arm(problem, options.arm)
     perception = _perception(options, problem, arm)
     record = Record(options.record)
     record.write("begin", 0.0, problem=problem.name, seed=options.seed, q=arm.read().tolist())
@@ -90,6 +91,14 @@ def open_session(options: SessionOptions) -> OpenSession:
         closing.insert(0, arm.close)
         reports["the line to the arm"] = lambda: arm.reported
     return OpenSession(Engine(session, perception, simulated=simulated), tuple(closing), reports, record)
+
+
+def _simulated_arm(options: SessionOptions, problem: Problem) -> SimulatedArm:
+    """Without errors, or wrong as the file of the simulated vehicle says."""
+    faults = None if options.source is not None else _vehicle(options, problem).faults
+    if faults is None:
+        return SimulatedArm(problem.robot, problem.start)
+    return WrongArm(problem.robot, problem.start, faults)
 
 
 def _perception(options: SessionOptions, problem: Problem, arm: Arm) -> LivePerception:

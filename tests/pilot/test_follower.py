@@ -45,6 +45,22 @@ def test_the_wrong_joint_or_the_wrong_way_is_lost_and_named():
     assert follower().update(np.array([0.6, 0, 0, 0, 0, 0])).advice == "lost"
 
 
+def test_what_remains_is_what_will_be_made_each_joint_alone_from_where_the_others_are():
+    following, off = follower(), np.radians([0.0, 0.6, -0.5, 0.3, 0.0, 0.9])
+    following.update(CORNERS[0] + off)
+    here = CORNERS[0] + off
+    rest = following.rest(here)
+    assert [move.joint for move in rest.moves()] == [move.joint for move in following.moves]
+    turned = [ROBOT.joint_names.index(move.joint) for move in following.moves]
+    still = np.setdiff1d(np.arange(6), turned)
+    assert np.array_equal(rest.end[turned], CORNERS[-1][turned])
+    assert np.array_equal(rest.end[still], here[still])
+    following.update(CORNERS[1] + off)
+    back = following.back(CORNERS[1] + off)
+    assert back.one_joint_at_a_time
+    assert np.array_equal(back.end[still], here[still])
+
+
 def test_the_way_back_is_the_way_reversed():
     following = follower()
     following.update(CORNERS[1])

@@ -69,6 +69,10 @@ class SimulatedArm:
         """Joint values. Shape (dof,), rad or m."""
         return self._q.copy()
 
+    def links(self) -> Vector:
+        """Where the links are, which a camera sees. Shape (dof,), rad or m."""
+        return self._q.copy()
+
     @property
     def moving(self) -> int | None:
         """The joint that moves, None if it stands still."""

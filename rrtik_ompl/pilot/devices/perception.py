@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import RrtikError
-from rrtik_ompl.pilot.devices.arm import Arm
+from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import Feed, PictureSource
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
@@ -110,7 +110,8 @@ class SimulatedSource:
     def latest(self) -> Picture:
         """A picture with the arm at its present configuration."""
         self._count += 1
-        return self._camera.picture(self._arm.read(), float(self._count))
+        arm = self._arm
+        return self._camera.picture(arm.links() if isinstance(arm, SimulatedArm) else arm.read(), float(self._count))
 
     def close(self) -> None:
         """Nothing to release."""

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import pinocchio as pin
 from pydantic import Field
 
 from rrtik_ompl.catalog import problem_folders
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.files.sections import Name, Section, Version, parse
+from rrtik_ompl.files.sections import Name, NotNegative, Number, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.pilot.devices.wrong_arm import Faults
 from rrtik_ompl.problem_files.scene import PoseEntry
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.camera_file import load_camera
@@ -33,12 +35,29 @@ class SimulatedVehicle:
         marker_map: The objects.
         places: ``T_base_object`` by name.
         T_base_camera: Pose of the camera.
+        faults: Of the arm; None if it has none.
     """
 
     camera: Camera
     marker_map: MarkerMap
     places: Mapping[str, pin.SE3]
     T_base_camera: pin.SE3
+    faults: Faults | None = None
+
+
+class FaultsEntry(Section):
+    """By how much the arm is wrong; angles concern joints that turn, sliding ones have the lag alone."""
+
+    lag: NotNegative = Field(0.0, description="commands take effect so much later [s]")
+    stick_deg: NotNegative = Field(0.0, description="smaller moves are not made from rest")
+    overshoot_deg: NotNegative = Field(0.0, description="by which joints go too far")
+    backlash_deg: NotNegative = Field(0.0, description="play between drive and link")
+    offset_deg: Number = Field(0.0, description="what is read beyond where the drive is")
+
+    def build(self) -> Faults:
+        """The faults."""
+        angles = (self.stick_deg, self.overshoot_deg, self.backlash_deg, self.offset_deg)
+        return Faults(self.lag, *np.deg2rad(angles).tolist())
 
 
 class PlaceEntry(Section):
@@ -56,6 +75,7 @@ class VehicleFile(Section):
     map: Name
     camera_pose: PoseEntry = Field(description="T_base_camera")
     places: Annotated[list[PlaceEntry], Field(min_length=1)]
+    arm: FaultsEntry | None = Field(None, description="by how much the simulated arm is wrong")
 
 
 def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
@@ -72,7 +92,10 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
     for number, each in enumerate(entry.places):
         with document.at(("places", number, "name")):
             places[marker_map.named(each.name).name] = each.pose.build()
-    return SimulatedVehicle(load_camera(folder / entry.camera), marker_map, places, entry.camera_pose.build())
+    with document.at(("arm",)):
+        faults = None if entry.arm is None else entry.arm.build()
+    camera = load_camera(folder / entry.camera)
+    return SimulatedVehicle(camera, marker_map, places, entry.camera_pose.build(), faults)
 
 
 def find_vehicle(problem: str) -> Path:

@@ -94,13 +94,21 @@ class Follower:
         return Progress(self.current, share, remaining, "stop" if ending else "move")
 
     def rest(self, q: Vector) -> JointPath:
-        """The remaining moves from q: straight to the end of the current one, then as planned."""
-        rows = np.vstack([q, self._corners[self.current + 1 :]]) if not self.done else np.vstack([q, q])
-        return self.path.with_waypoints(rows)
+        """The remaining moves from q as they will be made: each for its joint alone, all others stay as they are."""
+        return self._from(q, [(move.joint, move.end) for move in self.moves[self.current :]])
 
     def back(self, q: Vector) -> JointPath:
-        """The path back to the beginning: the moves that were made, reversed."""
-        return self.path.with_waypoints(np.vstack([q, self._corners[: self.current + 1][::-1]]))
+        """The path back to the beginning: the moves that were made, reversed, each for its joint alone."""
+        made = self.moves[: self.current + 1]  # the current one is under way
+        return self._from(q, [(move.joint, move.start) for move in made[::-1]])
+
+    def _from(self, q: Vector, ends: list[tuple[str, float]]) -> JointPath:
+        rows = [np.array(q, dtype=np.float64)]
+        for name, end in ends:
+            row = rows[-1].copy()
+            row[self._names.index(name)] = end
+            rows.append(row)
+        return self.path.with_waypoints(np.array(rows if len(rows) > 1 else [*rows, *rows]))
 
     def _lost(self, q: Vector, planned: Vector, moving: int | None) -> Progress | None:
         away = np.abs(q - planned)

@@ -1,0 +1,164 @@
+"""A simulated arm that is wrong by stated amounts: it lags, sticks, goes too far, has backlash, and reads wrong angles.
+
+Real arms of vehicles are all of that. What the pilot's tool does then can be tested here, since it is known where the
+links truly are.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Vector, finite_array, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.robot import Robot
+
+MAX_LAG = 10.0  # [s]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Faults:
+    """By how much an arm is wrong; one number for all joints that turn [rad], or one for each joint [rad or m].
+
+    Attributes:
+        lag: Commands take effect so much later, those to stop as well [s].
+        stick: A joint at rest does not move for a set point that is nearer than that.
+        overshoot: A joint that ends its motion, or is stopped, goes on by that, and by half of its way at most.
+        backlash: Play between the drive, which is measured, and the link.
+        offset: What is read beyond where the drive is; may be negative.
+    """
+
+    lag: float = 0.0
+    stick: ArrayLike = 0.0
+    overshoot: ArrayLike = 0.0
+    backlash: ArrayLike = 0.0
+    offset: ArrayLike = 0.0
+
+    def for_robot(self, robot: Robot) -> dict[str, Vector]:
+        """Each as an array of shape (dof,), except ``lag``.
+
+        Raises:
+            InputError: If one does not fit the robot, is not finite, or is negative where it must not be.
+        """
+        if not 0.0 <= float(self.lag) <= MAX_LAG:
+            raise InputError(f"lag of the arm must be between 0 and {MAX_LAG:g} s, got {self.lag:g}")
+        found = {}
+        for name in [each.name for each in fields(self) if each.name != "lag"]:
+            given = np.asarray(getattr(self, name), dtype=np.float64)
+            values = np.where(robot.prismatic, 0.0, given) if given.ndim == 0 else given
+            found[name] = frozen(finite_array(values, (robot.dof,), f"{name} of the arm"))
+            if name != "offset" and (found[name] < 0.0).any():
+                raise InputError(f"{name} of the arm must be 0 or more, got {found[name].min():g}")
+        return found
+
+
+class WrongArm(SimulatedArm):
+    """A simulated arm with faults; `read` is what it says of itself, `links` is where it is.
+
+    Example:
+        >>> from rrtik_ompl import load_robot
+        >>> import numpy as np
+        >>> arm = WrongArm(load_robot("ur5"), np.zeros(6), Faults(offset=0.01))
+        >>> float(arm.read()[0]), float(arm.links()[0])
+        (0.01, 0.0)
+    """
+
+    def __init__(self, robot: Robot, start: ArrayLike, faults: Faults, rates: ArrayLike | None = None) -> None:
+        """Begin at a configuration of the links, at rest in the middle of the play.
+
+        Args:
+            robot: The arm.
+            start: Where the links are, shape (dof,).
+            faults: By how much it is wrong.
+            rates: Of the joints, shape (dof,) [rad/s or m/s]; default ones if None.
+
+        Raises:
+            InputError: If one of them does not fit the robot.
+        """
+        super().__init__(robot, start, rates)
+        each = faults.for_robot(robot)
+        self._lag, self._stick, self._overshoot = float(faults.lag), each["stick"], each["overshoot"]
+        self._half, self._offset = 0.5 * each["backlash"], each["offset"]
+        self._links = self._q.copy()
+        self._coasting = np.zeros(robot.dof)  # way that is left of going too far, with its sign
+        self._began, self._now = 0.0, 0.0
+        self._waiting: deque[tuple[float, Callable[[], None]]] = deque()
+
+    def read(self) -> Vector:
+        """What the arm says of its joints. Shape (dof,), rad or m."""
+        return self._q + self._offset
+
+    def links(self) -> Vector:
+        """Where the links are. Shape (dof,), rad or m."""
+        return self._links.copy()
+
+    def move(self, joint: int, target: float) -> None:
+        """Send one joint to a value of its own reading [rad or m]."""
+        self._later(lambda: self._begin(joint, target - float(self._offset[joint])))
+
+    def follow(self, q: ArrayLike) -> None:
+        """Send all joints to set points of their own reading, shape (dof,).
+
+        Raises:
+            InputError: If they do not fit the robot.
+        """
+        course = self.robot.configuration(q, "set point")
+        self._later(lambda: SimulatedArm.follow(self, course - self._offset))
+
+    def stop(self) -> None:
+        """Stop, as soon as the arm does."""
+        self._later(self._end)
+
+    def advance(self, seconds: float) -> None:
+        """Advance the simulated time; commands whose time comes meanwhile take effect when it does."""
+        end = self._now + seconds
+        while self._waiting and self._waiting[0][0] <= end:
+            due, act = self._waiting.popleft()
+            self._go(max(due - self._now, 0.0))
+            self._now = max(due, self._now)
+            act()
+        self._go(end - self._now)
+        self._now = end
+
+    def _later(self, act: Callable[[], None]) -> None:
+        if self._lag > 0.0:
+            self._waiting.append((self._now + self._lag, act))
+        else:
+            act()
+
+    def _begin(self, joint: int, target: float) -> None:
+        here = float(self._q[joint])
+        if self.moving != joint:
+            self._end()
+            if not self._coasting[joint] and abs(target - here) <= float(self._stick[joint]):
+                return
+            self._began = here
+        self._coasting[joint] = 0.0
+        super().move(joint, target)
+
+    def _go(self, seconds: float) -> None:
+        """Move on, with no command in between."""
+        left, goal = np.full(self.robot.dof, seconds), self._goal
+        if goal is not None:
+            joint, needed = goal[0], abs(goal[1] - float(self._q[goal[0]])) / float(self._rates[goal[0]])
+            left[joint] = max(seconds - needed, 0.0)
+        super().advance(seconds)
+        if goal is not None and self._goal is None:
+            self._coast(goal[0], float(np.sign(goal[1] - self._began)))
+        step = np.clip(self._coasting, -self._rates * left, self._rates * left)
+        self._coasting = self._coasting - step
+        self._q = self.robot.clamp(self._q + step)
+        self._links = np.clip(self._links, self._q - self._half, self._q + self._half)
+
+    def _end(self) -> None:
+        goal, self._goal, self._course = self._goal, None, None
+        if goal is not None:
+            self._coast(goal[0], float(np.sign(goal[1] - self._q[goal[0]])))
+
+    def _coast(self, joint: int, way: float) -> None:
+        self._coasting[joint] = way * min(float(self._overshoot[joint]), 0.5 * abs(float(self._q[joint]) - self._began))
