@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.catalog import load_robot as load_robot
     from rrtik_ompl.certificates.certificate import Certificate as Certificate
     from rrtik_ompl.certificates.certificate import load_certificate as load_certificate
-    from rrtik_ompl.certificates.verify import verify_certificate as verify_certificate
+    from rrtik_ompl.certificates.checked import verify_certificate as verify_certificate
     from rrtik_ompl.certificates.write import certificate_of as certificate_of
     from rrtik_ompl.constraints.shorthands import inside as inside
     from rrtik_ompl.constraints.shorthands import on_line as on_line
@@ -130,7 +130,7 @@ else:
         "catalog": ("list_problems", "list_robots", "load_robot"),
         "benchmark.batch": ("plan_batch",),
         "certificates.certificate": ("Certificate", "load_certificate"),
-        "certificates.verify": ("verify_certificate",),
+        "certificates.checked": ("verify_certificate",),
         "certificates.write": ("certificate_of",),
         "description.joint_weights": ("weighted",),
         "description.padding": ("padded",),

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"\]\((\.\./[^)\s#]+)(#[^)\s]*)?\)")
 PICTURES = ROOT / "bench" / "reports"
 PICTURE = re.compile(
-    r"\]\((?:https://raw\.githubusercontent\.com/rrtik-ompl/rrtik-ompl/main|\.\.)/bench/reports/([\w.-]+\.png)\)"
+    r"\]\((?:https://raw\.githubusercontent\.com/rrtik-ompl/rrtik-ompl/main|\.\.)/bench/reports/([\w.-]+\.(?:png|gif))\)"
 )
 # The pages of the public names, and the modules that each of them is of, by how their names begin.
 REFERENCE = {
@@ -35,7 +35,7 @@ REFERENCE = {
 def on_files(files: Files, config: Any) -> Files:
     """Add the front page, which is the README, the pictures, and one page for each group of public names."""
     files.append(File.generated(config, "index.md", content=_front_page()))
-    for picture in PICTURES.glob("*.png"):
+    for picture in [*PICTURES.glob("*.png"), *PICTURES.glob("*.gif")]:
         files.append(File.generated(config, f"pictures/{picture.name}", abs_src_path=str(picture)))
     for title, names in _groups().items():
         text = [f"# {title}", *(f"::: {name}" for name in names)]
