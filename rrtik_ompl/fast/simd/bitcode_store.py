@@ -8,12 +8,12 @@ from rrtik_ompl.fast.simd.code_files import (
     bitcode_key,
     bitcode_name,
     file_name,
+    kept_or_made,
     machine_key,
     read_code,
-    write_code,
 )
 from rrtik_ompl.fast.simd.targets import this_target
-from rrtik_ompl.files.cache import cache_folder, nobody_else_s, one_at_a_time
+from rrtik_ompl.files.cache import cache_folder
 from rrtik_ompl.files.notice import COMPILING, tell_once
 
 
@@ -32,13 +32,11 @@ def own_bitcode(name: str) -> Code:
     """
     key, folder = f"bitcode {machine_key(name)}", cache_folder("kernels")
     file = None if folder is None else folder / file_name(name, key, "bitcode")
-    with one_at_a_time(file):  # processes that start at once would all compile, for minutes
-        kept = read_code(file, key) if file is not None and nobody_else_s(file) else None
-        if kept is None:
-            from rrtik_ompl.fast.simd.bitcode import compiled_module
 
-            tell_once(COMPILING)
-            kept = compiled_module(name)
-            if file is not None:
-                write_code(file, key, kept)
-    return kept
+    def make() -> Code:
+        from rrtik_ompl.fast.simd.bitcode import compiled_module
+
+        tell_once(COMPILING)
+        return compiled_module(name)
+
+    return kept_or_made(file, key, make)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -14,7 +15,7 @@ from pathlib import Path
 
 from rrtik_ompl.fast.simd.processor import WIDTH, processor_identity
 from rrtik_ompl.fast.simd.targets import Target
-from rrtik_ompl.files.cache import write_whole
+from rrtik_ompl.files.cache import nobody_else_s, one_at_a_time, write_whole
 
 LAYOUT = 2
 CHECK_BYTES = 32
@@ -133,3 +134,22 @@ def write_code(file: Path, key: str, code: Code) -> None:
     """Write code to a file that appears whole, or not at all where it cannot be written."""
     body = json.dumps({"key": key, "entries": code.entries}).encode() + b"\n" + code.code
     write_whole(file, lambda stream: stream.write(sha256(body).digest() + body))
+
+
+def kept_code(file: Path | None, key: str) -> Code | None:
+    """The code in a file of the user's cache, or None as for `read_code`, or if others can write to it."""
+    return read_code(file, key) if file is not None and nobody_else_s(file) else None
+
+
+def kept_or_made(file: Path | None, key: str, make: Callable[[], Code]) -> Code:
+    """The code in a file of the user's cache, which is made, and kept there, if it is absent.
+
+    Processes that start at once would all make it, for minutes; so one does, and the others wait.
+    """
+    with one_at_a_time(file):
+        code = kept_code(file, key)
+        if code is None:
+            code = make()
+            if file is not None:
+                write_code(file, key, code)
+        return code

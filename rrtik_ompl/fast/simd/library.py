@@ -20,14 +20,14 @@ from rrtik_ompl.fast.simd.code_files import (
     PREFIX,
     Code,
     file_name,
+    kept_code,
     kernel_modules,
     machine_key,
-    read_code,
     write_code,
 )
 from rrtik_ompl.fast.simd.processor import target_machine
 from rrtik_ompl.fast.simd.targets import UnknownMachineError, target_of, this_target
-from rrtik_ompl.files.cache import cache_folder, nobody_else_s
+from rrtik_ompl.files.cache import cache_folder
 
 MAX_REASON = 300  # [letters]
 
@@ -110,7 +110,7 @@ def _file(name: str) -> Path | None:
 def _kept(name: str) -> Library | None:
     """The library from the user's cache, if it is there."""
     file = _file(name)
-    code = read_code(file, machine_key(name)) if file is not None and nobody_else_s(file) else None
+    code = kept_code(file, machine_key(name))
     if code is None:
         return None
     try:

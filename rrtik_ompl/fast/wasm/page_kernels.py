@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from rrtik_ompl.fast.simd.code_files import FOLDER, Code, file_name, read_code, sources_digest, write_code
+from rrtik_ompl.fast.simd.code_files import FOLDER, Code, file_name, kept_or_made, read_code, sources_digest, write_code
 from rrtik_ompl.fast.simd.processor import WIDTH
-from rrtik_ompl.files.cache import cache_folder, nobody_else_s
+from rrtik_ompl.files.cache import cache_folder
 from rrtik_ompl.files.notice import tell_once
 
 # Libraries that a page has, by what the names of their functions begin with there.
@@ -61,14 +61,12 @@ def page_kernels() -> bytes | None:
         return packaged.code
     folder = cache_folder("kernels")
     file = None if folder is None else folder / file_name("page", key)
-    kept = read_code(file, key) if file is not None and nobody_else_s(file) else None
-    if kept is not None:
-        return kept.code
     try:
-        tell_once(COMPILING_PAGES)
-        made = made_page_kernels()
+        return kept_or_made(file, key, _code).code
     except (ImportError, RuntimeError):
         return None
-    if file is not None:
-        write_code(file, key, Code({}, made))
-    return made
+
+
+def _code() -> Code:
+    tell_once(COMPILING_PAGES)
+    return Code({}, made_page_kernels())
