@@ -24,7 +24,7 @@ from rrtik_ompl.cli.reach import reach
 from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.task import straight, task
-from rrtik_ompl.cli.terminal import drop_output, note, prepare_streams, problem_names, say, warn
+from rrtik_ompl.cli.terminal import ProblemName, drop_output, note, prepare_streams, say, warn
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.files import notice
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
@@ -45,10 +45,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-ProblemName = Annotated[
-    str,
-    typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.", autocompletion=problem_names),
-]
 PathFile = Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rrtik_ompl.cli.terminal import note, progress, say, shown_names
+from rrtik_ompl.cli.terminal import ProblemName, note, progress, say, shown_names
 from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.files.text import check_target
 
@@ -101,7 +101,7 @@ def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
 
 
 def play(
-    problem: Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")],
+    problem: ProblemName,
     path: Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")] = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
 ) -> int:

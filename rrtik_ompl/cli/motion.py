@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rrtik_ompl.choices import one_of
-from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, progress, say
+from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, ProblemName, progress, say
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target, comma_numbers
@@ -19,11 +19,10 @@ if TYPE_CHECKING:
 
     from rrtik_ompl.arrays import Vector
     from rrtik_ompl.path import JointPath
-    from rrtik_ompl.problem import Problem as PlanningProblem
+    from rrtik_ompl.problem import Problem
 
 PLOT_FORMATS = (".png", ".svg")
 
-Problem = Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")]
 GivenPath = Annotated[Path, typer.Argument(help="A path file: .json, .csv or .txt.")]
 UNITS = "One number, or one per joint with commas [deg/s{0}; m/s{0} if it slides]."
 
@@ -67,7 +66,7 @@ def list_moves(
 
 
 def time_path(
-    problem: Problem,
+    problem: ProblemName,
     path: GivenPath,
     velocity: Annotated[str | None, typer.Option(help=UNITS.format(""))] = None,
     acceleration: Annotated[str | None, typer.Option(help=UNITS.format("^2"))] = None,
@@ -164,7 +163,7 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Join
     return route
 
 
-def _valid_path(path: Path, task: PlanningProblem) -> JointPath:
+def _valid_path(path: Path, task: Problem) -> JointPath:
     """A path of a file, checked against its problem."""
     from rrtik_ompl import load_path
 

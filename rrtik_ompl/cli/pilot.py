@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rrtik_ompl.cli.terminal import note, progress, say
+from rrtik_ompl.cli.terminal import ProblemName, note, progress, say
 from rrtik_ompl.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ SOURCES = ("--camera", "--video", "--images", "--simulated", "--replay")
 
 
 def pilot(
-    problem: Annotated[str, typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.")],
+    problem: ProblemName,
     camera: Annotated[int | None, typer.Option(help="Number of a camera device.", min=0)] = None,
     video: Annotated[Path | None, typer.Option(help="A video file in place of a camera.")] = None,
     images: Annotated[Path | None, typer.Option(help="A folder of images, one a second.")] = None,

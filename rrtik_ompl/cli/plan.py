@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from rrtik_ompl.choices import CommandShortening, Name, ProofMode, one_of
-from rrtik_ompl.cli.terminal import note, problem_names, progress, say
+from rrtik_ompl.cli.terminal import ProblemName, note, progress, say
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
@@ -39,12 +39,7 @@ def _chosen(names: tuple[Name, ...], what: str) -> Callable[[str], Name]:
 
 
 def plan(
-    problem: Annotated[
-        str,
-        typer.Argument(
-            help="A shipped problem (see: rrtik list problems) or a YAML file.", autocompletion=problem_names
-        ),
-    ],
+    problem: ProblemName,
     planner: Annotated[
         str | None, typer.Option(help="See: rrtik list planners. If left out, the problem's, or else auto.")
     ] = None,

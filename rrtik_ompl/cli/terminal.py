@@ -6,7 +6,9 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 TRAJECTORY_FORMATS = (".json", ".csv", ".yaml", ".mcap")
 
@@ -87,3 +89,9 @@ def shown_names(incomplete: str) -> list[str]:
     from rrtik_ompl.catalog import list_robots
 
     return problem_names(incomplete) + [name for name in list_robots() if name.startswith(incomplete)]
+
+
+ProblemName = Annotated[
+    str,
+    typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.", autocompletion=problem_names),
+]
