@@ -154,8 +154,8 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     cached = _cache.get(key)
     if cached is None:
         robot = recipe.make(**{option: value for option, value in given.items() if option not in OF_ALL})
-        for option in OF_ALL.keys() & given.keys():
-            robot = OF_ALL[option](robot, given[option])
+        for option, of_all in OF_ALL.items():
+            robot = of_all(robot, given[option]) if option in given else robot
         files = [recipe.target, *_paths(given), *_paths(robot.source)]
         cached = _cache.put(key, replace(robot, source=recipe.source(given)), files)
     return cached

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, finite_array, finite_number, frozen, not_negative
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError, in_file
-from rrtik_ompl.files.tables import json_object
+from rrtik_ompl.files.tables import checked_object, json_object
 from rrtik_ompl.files.text import known_ending, read_text, write_text
 
 VERSION = 1
@@ -153,7 +153,7 @@ def _inside(text: str) -> dict[str, Any]:
             found = json_object(text, "joint_path", IN_PATHS)[IN_PATHS]
         except InputError:
             raise error from None
-        return json_object(json.dumps(found), KIND, "motions")
+        return checked_object(found, KIND, "motions")
 
 
 def from_document(document: dict[str, Any]) -> Certificate:

@@ -41,11 +41,7 @@ Side = tuple[int, int, int, int, float, float]  # motion, pair, a solid of each 
 def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
     """The first fault of a certificate in one line; "" if it proves that a path is free.
 
-    Args:
-        certificate: The certificate; nothing in it is believed.
-        world: The robot and the scene; bodies, pairs and the chain of joints are read, no check of it is asked.
-        waypoints: Of the path, shape (k, dof); the certificate has to be for these to the bit.
-        clearance: What the path has to keep from obstacles beside their margins at least [m].
+    Arguments as in :func:`rrtik_ompl.verify_certificate`, which refuses those of another kind first.
     """
     rows, robot = np.ascontiguousarray(waypoints, dtype=np.float64), world.robot
     kept, moves = certificate.clearance, max(1, len(rows) - 1)

@@ -42,7 +42,7 @@ def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
     Raises:
         InputError: If the text is something else; the message names the line or the key.
     """
-    file = f"is this a {kind.partition('_')[2]} file?"
+    file = _asked(kind)
     try:
         document = json.loads(text)
     except json.JSONDecodeError as error:
@@ -51,10 +51,23 @@ def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
         raise InputError(f"lists are nested too deeply; {file}") from None
     except ValueError:
         raise InputError(f"holds a number of thousands of digits; {file}") from None
+    return checked_object(document, kind, key)
+
+
+def checked_object(document: object, kind: str, key: str) -> dict[str, Any]:
+    """What has been read, as an object of version 1 and of a kind, that has this key.
+
+    Raises:
+        InputError: If it is something else; the message names the key.
+    """
     if not isinstance(document, dict) or key not in document:
-        raise InputError(f"expected an object with the key '{key}'; {file}")
+        raise InputError(f"expected an object with the key '{key}'; {_asked(kind)}")
     _check_heads(document, kind)
     return document
+
+
+def _asked(kind: str) -> str:
+    return f"is this a {kind.partition('_')[2]} file?"
 
 
 def _check_heads(document: dict[str, Any], kind: str) -> None:
