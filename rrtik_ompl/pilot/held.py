@@ -10,14 +10,15 @@ from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.drive import Drive
+from rrtik_ompl.pilot.guide import Guide
 from rrtik_ompl.pilot.interlock import FOLLOWING, MOVING
-from rrtik_ompl.pilot.routes.follower import Follower, Progress
+from rrtik_ompl.pilot.routes.follower import MADE, Follower
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange, check_move, move_refusal, way_out
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.units import joint_unit, reading
 from rrtik_ompl.world import World
 
-ARRIVED = np.deg2rad(0.02)  # [rad or m]; a drive ends this close to its goal
+STUCK_SECONDS = 0.8  # an arm that comes no nearer to the end of a move for as long does not get there
 MIN_SPEED = 0.05  # share of the joints' rates
 
 
@@ -33,8 +34,7 @@ class Driven(Protocol):
     selected: int
     mode: str
     message: str
-    follower: Follower | None
-    progress: Progress | None
+    guide: Guide
 
     @property
     def world(self) -> World:
@@ -43,11 +43,8 @@ class Driven(Protocol):
     def joint_range(self) -> JointRange:
         """The range in which the selected joint can be driven now."""
 
-    def refuse_if_blocked(self) -> None:
-        """Raise InputError if the rest of the route is not free any more."""
-
-    def show_due(self, follower: Follower) -> None:
-        """Select the joint of the current move."""
+    def command(self, verb: str, time: float, /, **arguments: object) -> str:
+        """Execute a command."""
 
 
 class Held:
@@ -66,7 +63,8 @@ class Held:
         self._press: tuple[str, float] = ("", -1.0)  # command and number of the press that drives, or drove last
         self.over = False
         self._due = 0, 0.0  # joint and end of the move that it makes
-        self._near = ARRIVED
+        self._nearest = np.inf, 0.0  # how near to its end the arm has come, and when
+        self._near = MADE
 
     def goes_on(self, verb: str, arguments: dict[str, object]) -> bool:
         """Whether a command renews the press of before."""
@@ -95,9 +93,13 @@ class Held:
 
     def release(self) -> str:
         """Nothing is pressed any more."""
-        driven = self.drive.active
+        session, driven = self._session, self.drive.active
         self.end()
-        return "released" if driven and self._session.mode != FOLLOWING else self._session.message
+        if not driven or session.mode != FOLLOWING:
+            return "released" if driven else session.message
+        joint, end = self._due
+        left, unit = reading(abs(end - float(session.q[joint])), joint_unit(session.robot.prismatic[joint]))
+        return f"{session.robot.joint_names[joint]}: {left:.3g} {unit} are left of the move; hold 'next' to go on"
 
     def jog(self, direction: float, press: float) -> str:
         """Drive the selected joint, at a share of the speed from -1 to 1."""
@@ -133,33 +135,45 @@ class Held:
 
     def next(self, press: float) -> str:
         """Make the current move of the route; each press makes one move at most."""
-        session, follower = self._session, self._session.follower
+        session, follower = self._session, self._session.guide.follower
         if follower is None:
             raise InputError("there is no route to follow; 'plan' proposes one")
         if self._begins("next", press):
-            self._due = self._due_move(follower)
-        name = session.robot.joint_names[self._due[0]]
-        return self._run(*self._due, 1.0, f"{name} is there: release, then hold 'next' again")
+            self._due, self._nearest = self._due_move(follower), (np.inf, session.time)
+        joint, end = self._due
+        if self._stuck(abs(end - float(session.q[joint])), float(follower.slack[joint])):
+            return session.command("settle", session.time)
+        return self._run(
+            joint, end, 1.0, f"{session.robot.joint_names[joint]} is there: release, then hold 'next' again"
+        )
+
+    def _stuck(self, away: float, slack: float) -> bool:
+        """Whether the arm has stopped coming nearer to the end of its move, within the tolerance of the route."""
+        nearest, since = self._nearest
+        if away < nearest - MADE:
+            self._nearest = away, self._session.time
+            return False
+        return MADE < away <= slack and self._session.time - since > STUCK_SECONDS
 
     def _begins(self, verb: str, press: float) -> bool:
         """Whether a press is a new one."""
         if (verb, press) == self._press:
             return False
         self.drive.end()
-        self._press, self.over, self._near = (verb, press), False, ARRIVED
+        self._press, self.over, self._near = (verb, press), False, MADE
         return True
 
     def _due_move(self, follower: Follower) -> tuple[int, float]:
         """Joint and end [rad or m] of the move that is due."""
         session = self._session
-        session.progress = follower.update(session.q)
+        session.guide.progress = progress = follower.update(session.q)
         joint = follower.joint()
-        if session.progress.advice == "lost" or joint is None:
-            raise InputError(session.progress.fault or "all moves are done")
-        session.refuse_if_blocked()
-        session.show_due(follower)
+        if progress.advice == "lost" or joint is None:
+            raise InputError(progress.fault or "all moves are done")
+        session.guide.refuse_if_blocked()
+        session.guide.show_due(follower)
         end = float(follower.target[joint])
-        self._near = min(ARRIVED, 0.25 * abs(end - float(session.q[joint])))  # a short move has to be made, too
+        self._near = min(MADE, 0.25 * abs(end - float(session.q[joint])))  # a short move has to be made, too
         return joint, end
 
     def still_free(self) -> bool:

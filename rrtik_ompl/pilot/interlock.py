@@ -15,7 +15,7 @@ STALE_SECONDS = 0.5  # a picture older than that does not show the present
 
 MOVING: Final = ("jog", "go", "next")  # held: the arm moves only as long as they are renewed
 PRESENT: Final = (*MOVING, "move", "plan", "replan", "accept", "back")  # need the arm and a picture of now
-ALWAYS: Final = ("stop", "release", "halt", "select", "speed", "object", "grasp", "reject")
+ALWAYS: Final = ("stop", "release", "halt", "select", "speed", "object", "grasp", "reject", "settle")
 
 _MANUAL = (MANOEUVRE, CHOOSING, PROPOSED), "a route is being followed: 'next' makes its next move, 'stop' leaves it"
 _ONLY_IN: Final = {
@@ -23,6 +23,7 @@ _ONLY_IN: Final = {
     "go": _MANUAL,
     "move": _MANUAL,
     "accept": ((PROPOSED,), "there is no route to accept; 'plan' proposes one"),
+    "settle": ((FOLLOWING,), "no route is being followed"),
     "next": ((FOLLOWING,), "no route is being followed; 'plan' and 'accept' one first"),
 }
 

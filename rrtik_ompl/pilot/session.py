@@ -16,21 +16,18 @@ from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
+from rrtik_ompl.pilot.guide import Guide
 from rrtik_ompl.pilot.held import Held
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, MOVING, PROPOSED, Knowledge, refusal
 from rrtik_ompl.pilot.lamps import Lamp
 from rrtik_ompl.pilot.record import Record
-from rrtik_ompl.pilot.routes.follower import Follower, Progress, path_fault
-from rrtik_ompl.pilot.routes.manoeuvre import JointRange, escape_advice
-from rrtik_ompl.pilot.routes.no_route import NoRoute
-from rrtik_ompl.pilot.routes.proposal import propose
+from rrtik_ompl.pilot.routes.follower import Follower, Progress
+from rrtik_ompl.pilot.routes.manoeuvre import JointRange
 from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import World
-
-BLOCKED = "the route is blocked now: {}; 'replan' finds another"
 
 
 class Session:
@@ -62,23 +59,22 @@ class Session:
         self.mode, self.selected, self.speed = MANOEUVRE, 0, 1.0
         self.target: str | None = None
         self.choice: tuple[str, int] | None = None
-        self.route: Route | None = None
-        self.follower: Follower | None = None
-        self.progress: Progress | None = None
         self.message = ""
         self.q: Vector = frozen(arm.read())
         self.desired: Vector = self.q
         self.time = 0.0
         self.picture_time = -np.inf
+        self.feasibility = FeasibilityCache(self.surroundings)
+        self.guide = Guide(self)
         self.held = Held(self)
         self._past, self._trouble, self._seen_at = past, "", dict[str, float]()
         self._record = record or Record(None)
-        self._feasibility = FeasibilityCache(self.surroundings)
         self._commands: dict[str, Callable[..., str]] = {
             "select": self._select, "jog": self.held.jog, "move": self.held.move, "go": self.held.go,
             "next": self.held.next, "release": self.held.release, "speed": self.held.set_speed, "stop": self._stop,
-            "object": self._object, "grasp": self._grasp, "plan": self._plan, "accept": self._accept,
-            "reject": self._reject, "back": self._back, "replan": self._plan, "halt": self._halt,
+            "object": self._object, "grasp": self._grasp, "plan": self.guide.plan, "replan": self.guide.plan,
+            "accept": self.guide.accept, "reject": self.guide.reject, "back": self.guide.back,
+            "settle": self.guide.settle, "halt": self._halt,
         }  # fmt: skip
 
     # --- input -------------------------------------------------------------------------------------------
@@ -102,18 +98,7 @@ class Session:
             self._record.write("joints", time, q=self.q.tolist())
         self.held.expire(time)
         self._watch()
-        self.message = self._record.news() or self.message
-        if self.follower is None or self.mode != FOLLOWING:
-            return
-        due, self.progress = self.follower.current, self.follower.update(self.q)
-        if self.progress.advice == "lost":
-            self._stand_still()
-            self.message = f"off the route: {self.progress.fault}; 'replan' finds a new one from here"
-        elif self.progress.advice == "done" and not self.held.drive.active:
-            self.mode, self.message = MANOEUVRE, "all moves are done"
-        elif self.follower.current != due:
-            self.show_due(self.follower)
-            self.message = f"move {self.follower.current} of {len(self.follower.moves)} is done; 'next' makes the next"
+        self.message = self.guide.watch() or self._record.news() or self.message
 
     def command(self, verb: str, time: float, /, **arguments: object) -> str:
         """Execute a command of the pilot; returns a line for a person, which is `message` from then on.
@@ -153,13 +138,33 @@ class Session:
         return Knowledge(self.arm.lost, self.time - self.picture_time, self._past)
 
     @property
+    def driving(self) -> bool:
+        """Whether a joint is driven."""
+        return self.held.drive.active
+
+    @property
+    def route(self) -> Route | None:
+        """The route that was planned last."""
+        return self.guide.route
+
+    @property
+    def follower(self) -> Follower | None:
+        """Of the route, or of the way back."""
+        return self.guide.follower
+
+    @property
+    def progress(self) -> Progress | None:
+        """Where the arm is on its route."""
+        return self.guide.progress
+
+    @property
     def world(self) -> World:
         """The world for moves by hand: the gripper may touch what it holds, as long as it does."""
         return self.surroundings.world_at(self.q, self.target)
 
     def lamps(self) -> tuple[Lamp, ...]:
         """Lamps of the chosen object where it is and for where the arm is."""
-        return self._feasibility.lamps(self.target, self.q)
+        return self.feasibility.lamps(self.target, self.q)
 
     def lamp(self) -> Lamp | None:
         """The lamp of the grasp that is chosen."""
@@ -168,11 +173,11 @@ class Session:
     def fault(self) -> str:
         """What is wrong with the grasp that is chosen: by how much it is out of reach, what touches; "" if nothing."""
         lamp = self.lamp()
-        return "" if lamp is None else self._feasibility.fault(str(self.target), lamp, self.q)
+        return "" if lamp is None else self.feasibility.fault(str(self.target), lamp, self.q)
 
     def joint_range(self) -> JointRange:
         """The range in which the selected joint can be driven now."""
-        return self._feasibility.joint_range(self.world, self.q, self.selected)
+        return self.feasibility.joint_range(self.world, self.q, self.selected)
 
     def unseen(self, name: str) -> float:
         """For how long an object has not been in view, by the pictures taken since [s]."""
@@ -186,12 +191,13 @@ class Session:
         self.selected = int(joint)
         return f"{self.robot.joint_names[self.selected]} selected"
 
-    def _stand_still(self) -> None:
+    def stand_still(self) -> None:
+        """Stop the arm, and end what is held."""
         self.held.end()
         self.arm.stop()
 
     def _stop(self) -> str:
-        self._stand_still()
+        self.stand_still()
         self.desired = self.q
         if self.mode == FOLLOWING:
             self.mode = PROPOSED
@@ -214,52 +220,6 @@ class Session:
         self.choice, self.mode = (type, int(level)), CHOOSING
         return f"{type} at level {int(level) + 1}: {self.fault() or 'can be reached'}"
 
-    def _plan(self) -> str:
-        self.arm.stop()
-        self.q = frozen(self.arm.read())
-        lamp = self._feasibility.patient_lamp(self.target, self.choice, self.q)
-        found = propose(self.problem, self.surroundings, self.target, lamp, self.q, self.rates, self.seed)
-        if isinstance(found, NoRoute):
-            self.route = self.follower = self.progress = None
-            self.mode = CHOOSING if self.choice else MANOEUVRE
-            otherwise = "choose another grasp" if self.choice else "drive the arm elsewhere, or choose an object"
-            return f"no route: {self.fault() or found}; {escape_advice(self.world, self.q) or otherwise}"
-        self.route, self.mode = found, PROPOSED
-        self.follower, self.progress = Follower(found.path, self.rates), None
-        self.desired = frozen(found.path.end)
-        return found.summary() + "; 'accept' or 'reject'"
-
-    def _accept(self) -> str:
-        if self.follower is None:
-            raise InputError("there is no route to accept; 'plan' proposes one")
-        progress = self.follower.update(self.q)
-        if progress.advice == "lost":
-            raise InputError(f"the arm is not where the route starts: {progress.fault}; 'replan' starts it from here")
-        self.refuse_if_blocked()
-        self.mode, self.progress = FOLLOWING, progress
-        self.show_due(self.follower)
-        return "accepted; hold 'next' to make the next move"
-
-    def show_due(self, follower: Follower) -> None:
-        """Select the joint of the current move; its end is the desired value."""
-        joint = follower.joint()
-        if joint is not None:
-            self.desired, self.selected = frozen(follower.target), joint
-
-    def _reject(self) -> str:
-        self.arm.stop()
-        self.route = self.follower = self.progress = None
-        self.mode, self.desired = (CHOOSING if self.choice else MANOEUVRE), self.q
-        return "rejected"
-
-    def _back(self) -> str:
-        if self.follower is None:
-            raise InputError("there is no route to go back on")
-        self.arm.stop()
-        back = self.follower.back(self.q)
-        self.follower, self.mode, self.progress = Follower(back, self.rates), PROPOSED, None
-        return f"the way back: {len(back.moves())} moves; 'accept' or 'reject'"
-
     # --- what ends a motion ---------------------------------------------------------------------------------------
 
     def _watch(self) -> None:
@@ -281,20 +241,4 @@ class Session:
         if self.mode != FOLLOWING and not self.held.still_free():
             self.held.end()
             self.message = "stopped: something has come into the way"
-        if self.follower is None or self.mode not in (FOLLOWING, PROPOSED):
-            return
-        if fault := self._fault_of_rest():
-            self._stand_still()
-            self.message = BLOCKED.format(fault)
-
-    def refuse_if_blocked(self) -> None:
-        """Raise InputError if the rest of the route is not free any more."""
-        if fault := self._fault_of_rest():
-            raise InputError(BLOCKED.format(fault))
-
-    def _fault_of_rest(self) -> str:
-        if self.follower is None:
-            return ""
-        grasped = self.target is not None and self.choice is not None
-        world = self.surroundings.holding(str(self.target)) if grasped else self.surroundings.world
-        return path_fault(world, self.follower.rest(self.q))
+        self.message = self.guide.check() or self.message

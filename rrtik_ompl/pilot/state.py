@@ -116,4 +116,5 @@ def _route(session: Session) -> dict[str, Any] | None:
         "robustness": round(route.robustness, 2),
         "share": 0.0 if progress is None else progress.share,
         "advice": "" if progress is None else progress.advice,
+        "withdrawn": session.guide.withdrawn,
     }

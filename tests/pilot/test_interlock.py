@@ -43,7 +43,7 @@ def put_into(planned, mode, link, picture):
     arm._q, arm._goal, arm.lost = PROBLEM.start.copy(), None, link
     made.held.end()
     made.mode, made.selected, made.choice, made.speed = mode, 0, ("front", 0), 1.0
-    made.follower, made.progress = Follower(made.route.path, made.rates), None
+    made.guide.follower, made.guide.progress = Follower(made.route.path, made.rates), None
     made.time, made.picture_time, made._trouble = 100.0, 100.0 + PICTURES[picture], ""
     made.q = arm.read()
     made.desired = made.q.copy()
@@ -73,7 +73,7 @@ def test_no_command_in_no_state_moves_the_arm_where_it_may_not(planned):
         if not known:
             assert made.mode != FOLLOWING, state
             assert verb in ALWAYS or after == mode, state
-        made.route, count = route, count + 1
+        made.guide.route, count = route, count + 1
     assert count == len(MODES) * 2 * len(PICTURES) * len((*PRESENT, *ALWAYS))
 
 

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from rrtik_ompl.errors import InputError
@@ -100,9 +101,15 @@ def test_an_object_that_comes_into_the_way_blocks_the_next_move():
     middle = made.route.path.waypoints[len(made.route.path.waypoints) // 2]
     blocker = MarkedObject("crate", "obstacle", (MountedMarker(9, 0.08),), (Obstacle("crate", Box([0.1, 0.1, 0.1])),))
     made.see([SeenObject(blocker, pose(ROBOT.fk(middle).translation), 1e-8 * np.eye(6), None)], 0.4)
-    assert "blocked" in made.message
-    assert "blocked" in made.command("next", 0.5, press=0)
+    assert "withdrawn" in made.message
+    assert made.mode == PROPOSED
+    assert made.guide.withdrawn
+    assert "accept" in made.command("next", 0.5, press=0)
+    assert "withdrawn" in made.command("accept", 0.5)
     assert arm.moving is None
+    made.see([SeenObject(blocker, pose([0.0, -3.0, 0.0]), 1e-8 * np.eye(6), None)], 0.6)
+    assert "free again" in made.message
+    assert "accepted" in made.command("accept", 0.7)
 
 
 def test_without_an_object_the_problems_own_goal_is_planned_for():
@@ -111,7 +118,10 @@ def test_without_an_object_the_problems_own_goal_is_planned_for():
     assert "moves" in made.command("plan", 0.0)
     made.command("accept", 0.1)
     follow(made, arm, 0.1)
-    assert np.abs(made.q - PROBLEM.goal.q).max() < np.radians(1.01)
+    assert made.message == "all moves are done"
+    off = ROBOT.fk(PROBLEM.goal.q).actInv(ROBOT.fk(made.q))
+    assert np.linalg.norm(off.translation) <= 5e-4
+    assert np.linalg.norm(pin.log3(off.rotation)) <= np.radians(0.1)
 
 
 def test_the_way_back_leads_to_the_start():
@@ -123,7 +133,19 @@ def test_the_way_back_leads_to_the_start():
     assert "way back" in made.command("back", time)
     made.command("accept", time)
     follow(made, arm, time)
-    assert np.abs(made.q - PROBLEM.start).max() < np.radians(1.01)
+    assert np.abs(made.q - PROBLEM.start).max() < np.radians(0.01)
+
+
+def test_who_lets_go_before_the_end_of_a_move_has_to_make_it_to_its_end():
+    made, arm = session()
+    for verb, arguments in (("grasp", {"type": "front", "level": 0}), ("plan", {}), ("accept", {})):
+        made.command(verb, 0.1, **arguments)
+    joint, end = made.follower.joint(), made.follower.target
+    time = hold(made, arm, "next", 0.1, lambda: abs(made.q[joint] - end[joint]) < np.radians(0.8), press=0)
+    assert made.follower.current == 0
+    assert "are left of the move" in made.message
+    hold(made, arm, "next", time, lambda: made.follower.current == 1, press=1)
+    assert made.q[joint] == pytest.approx(end[joint], abs=1e-4)
 
 
 def test_a_record_repeats_the_session(tmp_path):

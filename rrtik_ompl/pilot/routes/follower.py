@@ -10,11 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath, Move
 from rrtik_ompl.units import joint_unit, reading
 from rrtik_ompl.world import World
 
-TOLERANCE = np.deg2rad(1.0)  # [rad]; a move is done this close to its end
+MADE = np.deg2rad(0.005)  # [rad or m]; a move is made this close to its end: the tip of an arm of 2 m is 0.2 mm off
+TOLERANCE = np.deg2rad(1.0)  # [rad]; farther from its value a joint is off the route
 SLIDING_TOLERANCE = 0.002  # [m]
 REACTION_SECONDS = 0.3  # from the advice to stop until the pilot does
 
@@ -39,7 +41,14 @@ class Progress:
 
 
 class Follower:
-    """Tracks an arm along a path of single-joint moves."""
+    """Tracks an arm along a path of single-joint moves.
+
+    Attributes:
+        path: The path.
+        moves: Its moves.
+        current: Number of the move that is due, from 0.
+        slack: How far each joint may be off the route, shape (dof,) [rad or m].
+    """
 
     def __init__(self, path: JointPath, rates: Vector, tolerance: float = TOLERANCE) -> None:
         """Begin at the first move.
@@ -55,7 +64,7 @@ class Follower:
         self.path, self.moves = path, path.moves()
         self._corners = _corners(path, self.moves)
         self._rates = rates
-        self._slack = slack(path, tolerance)
+        self.slack = slack(path, tolerance)
         self._names = list(path.joint_names)
         self.current = 0
 
@@ -83,15 +92,31 @@ class Follower:
         if lost is not None:
             return lost
         remaining = float(end - q[joint])
-        if abs(remaining) <= min(self._slack[joint], 0.5 * abs(end - begin)):  # a short move has to be made, too
+        if abs(remaining) <= min(MADE, 0.5 * abs(end - begin)):  # a short move has to be made, too
             self.current += 1
             return self.update(q)
-        inside = min(begin, end) - self._slack[joint] <= q[joint] <= max(begin, end) + self._slack[joint]
+        inside = min(begin, end) - self.slack[joint] <= q[joint] <= max(begin, end) + self.slack[joint]
         if not inside:
             return self._off(joint, float(q[joint]), float(end))
         share = float(np.clip(1.0 - remaining / (end - begin), 0.0, 1.0))
-        ending = abs(remaining) <= self._rates[joint] * REACTION_SECONDS + self._slack[joint]
+        ending = abs(remaining) <= self._rates[joint] * REACTION_SECONDS
         return Progress(self.current, share, remaining, "stop" if ending else "move")
+
+    def pass_on(self, q: Vector) -> tuple[str, str]:
+        """Take the current move for made although its end is not reached; its joint, and what is left of it in words.
+
+        Raises:
+            InputError: If more than the tolerance of the route is left, or no move is due.
+        """
+        joint = self.joint()
+        if joint is None:
+            raise InputError("all moves are done")
+        name, left = self._names[joint], abs(float(self.target[joint] - q[joint]))
+        shown, unit = reading(left, joint_unit(self.path.prismatic[joint]))
+        if left > self.slack[joint]:
+            raise InputError(f"{name}: {shown:.3g} {unit} are left of the move")
+        self.current += 1
+        return name, f"{shown:.2g} {unit}"
 
     def rest(self, q: Vector) -> JointPath:
         """The remaining moves from q as they will be made: each for its joint alone, all others stay as they are."""
@@ -114,7 +139,7 @@ class Follower:
         away = np.abs(q - planned)
         if moving is not None:
             away[moving] = 0.0
-        off = np.flatnonzero(away > self._slack)
+        off = np.flatnonzero(away > self.slack)
         return self._off(int(off[0]), float(q[off[0]]), float(planned[off[0]])) if len(off) else None
 
     def _off(self, joint: int, value: float, planned: float) -> Progress:

@@ -17,15 +17,14 @@ from rrtik_ompl.ik.batch import solve_ik_batch
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.routes.approach import approaches
 from rrtik_ompl.pilot.routes.clearance import closest_pair
-from rrtik_ompl.pilot.routes.follower import slack
 from rrtik_ompl.pilot.routes.moves import planned
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, RouteSearch, Tail
-from rrtik_ompl.transitions import SAME
 from rrtik_ompl.world import World
 
 CLEARANCE_SAMPLES = 100  # along a route
 END_OFFSET, END_TURN = 2e-4, np.deg2rad(0.04)  # [m], [rad] of the tip from its grasp, at the end of a route
+MAX_END_OFFSET, MAX_END_TURN = 5e-4, np.deg2rad(0.1)  # the same of an arm that has followed it
 MAX_BEGINNINGS = 6  # configurations in front of the object that are tried
 
 
@@ -67,7 +66,7 @@ class Route:
 
 def route_to(world: World, q: Vector, goal: Vector, rates: Vector, seed: int) -> Route | NoRoute:
     """A route to a configuration."""
-    return _route(world, world, q, [[_with_near_joints_kept(world, goal, q)[None]]], rates, seed)
+    return _route(world, world, q, [[_without_tiny_moves(world, goal, q)[None]]], rates, seed)
 
 
 def route_to_grasp(
@@ -124,13 +123,6 @@ def _without_tiny_moves(world: World, goal: Vector, q: Vector) -> Vector:
             break
         kept = tried
     return kept
-
-
-def _with_near_joints_kept(world: World, goal: Vector, q: Vector) -> Vector:
-    """A goal of joints whose near ones need not move, if that is free; near enough is the tolerance of following."""
-    small = slack(JointPath.of(world.robot, q[None]))
-    loose, exact = (np.where(np.abs(goal - q) <= near, q, goal) for near in (small, SAME))
-    return loose if world.valid(loose) else exact
 
 
 def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates: Vector, seed: int) -> Route | NoRoute:

@@ -5,7 +5,7 @@ const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1];  // shares of the joints' rates
 const PRESETS = ["corner", "side", "top", "behind"];
 const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
 const NEAR_LIMIT = 0.04, MARK = 0.006, UNSEEN_S = 1, HOLD_MS = 3000;
-const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|left;|outside|collision|away from the goal/;
+const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|withdrawn|stopped:|but the tip|no nearer|left;|outside|collision|away from the goal/;
 const FIRST_WORDS = "Choose a grasp with G and L, then plan with P. Or choose a joint with 1 … 9 and hold ← or → to drive it.";
 let state = null, role = { role: "watching", free: false, pages: 1 }, preset = 0, receivedAt = 0, playing = null;
 let previousAlert = "", heldUntil = 0;
@@ -197,7 +197,7 @@ function showJoint(row, joint, k) {
       `transparent ${from}, var(--amber) ${from} ${to}, transparent ${to}`).join()})` : "none";
   }
   bar.classList.toggle("near", joint.lower !== null && (now < NEAR_LIMIT || now > 1 - NEAR_LIMIT));
-  const difference = joint.desired - joint.value, small = Math.abs(difference) < (joint.unit === "m" ? 0.002 : 1);
+  const difference = joint.desired - joint.value, small = Math.abs(difference) < (joint.unit === "m" ? 0.0005 : 0.05);
   set(row.cells[2], `${fixed(joint.value, digits)} ${joint.unit === "m" ? "m" : "°"}`);
   set(row.cells[3], fixed(joint.desired, digits));
   set(row.cells[4], (small ? "✓ " : "") + fixed(difference, digits));
@@ -250,6 +250,9 @@ function lampButton(lamp) {
 function showRoute() {
   const list = byId("moves"), route = state.route;
   byId("current").hidden = !route || state.mode !== "following";
+  byId("withdrawn").hidden = !route?.withdrawn;
+  set(byId("withdrawn"), route?.withdrawn ? inWords(`WITHDRAWN: ${route.withdrawn}. Nothing moves on it.`) : "");
+  list.classList.toggle("withdrawn", Boolean(route?.withdrawn));
   if (!route) { if (list.children.length) list.replaceChildren(); list.dataset.key = ""; set(byId("route_numbers"), ""); return; }
   const clear = route.clearance_mm === null ? "" : ` · ${fixed(route.clearance_mm, 0)} mm clear`;
   set(byId("route_numbers"), `${route.moves.length} · ${fixed(route.travel, 0)}° · ${fixed(route.seconds, 0)} s${clear} · ${fixed(100 * route.robustness, 0)} % safe at ±1°`);
@@ -298,7 +301,7 @@ function showButtons() {
   byId("pause").hidden = !state.replay || role.role !== "pilot";
   set(byId("pause").firstChild, state.paused ? "Go on" : "Pause");
   const mine = role.role === "pilot" && !state.replay && !state.trouble, at = (...modes) => mine && modes.includes(state.mode);
-  for (const [id, good] of [["accept", at("proposed")], ["reject", role.role === "pilot" && state.mode === "proposed"], ["next", at("following")], ["plan", mine],
+  for (const [id, good] of [["accept", at("proposed") && !state.route?.withdrawn], ["reject", role.role === "pilot" && state.mode === "proposed"], ["next", at("following")], ["plan", mine],
     ["replan", mine && Boolean(state.route)], ["back", mine && Boolean(state.route)], ["stop", !state.replay],
     ...["minus", "plus", "go"].map((id) => [id, at("manoeuvre", "choosing", "proposed")])]) byId(id).disabled = !good;
   for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || state.mode !== "proposed";

@@ -1,0 +1,82 @@
+"""A simulated pilot's hands: they hold "next" for one move of the route after the other, until all are made."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.pilot.devices.wrong_arm import WrongArm
+from rrtik_ompl.pilot.session import Session
+
+STEP = 0.03  # [s] between two renewals of what is held
+REST, STILL, PRESSES = 40, 33, 60  # steps between presses; steps at rest after which they let go; presses at most
+HOLD_SECONDS = 20.0
+HASTY_RADIANS = np.deg2rad(1.0)
+
+
+class Followed(NamedTuple):
+    """Where the links were after each press, shape (n, dof), and how often the route was planned anew."""
+
+    rows: Matrix
+    plans: int
+
+
+def follow_route(session: Session, arm: WrongArm, *, hasty: bool = False) -> Followed:
+    """Plan, accept, and make all moves; plan anew where the tool asks for it.
+
+    Args:
+        session: Whose target and grasp are chosen, or whose problem has a goal.
+        arm: Its arm.
+        hasty: Each move is let go a degree before its end once, and made to its end by a second press.
+    """
+    rows, plans = [arm.links()], 0
+    _plan(session, "plan")
+    for press in range(PRESSES):
+        if session.follower is None or session.mode != "following":
+            break
+        hold_next(session, arm, press, early=hasty and press % 2 == 0)
+        rows.append(arm.links())
+        if "off the route" in session.message or session.guide.withdrawn:
+            plans += 1
+            _plan(session, "replan")
+    return Followed(np.array(rows), plans)
+
+
+def hold_next(session: Session, arm: WrongArm, press: int, *, early: bool = False) -> None:
+    """Hold "next" until its move is made, or the arm is at rest; let go, and wait.
+
+    Args:
+        session: That follows a route.
+        arm: Its arm.
+        press: Number of the press.
+        early: Let go a degree before the end.
+    """
+    still, end = 0, session.time + HOLD_SECONDS
+    while still < STILL and session.time < end and not (early and _near(session)):
+        before = arm.links()
+        session.command("next", session.time, press=press)
+        if session.held.over:
+            break
+        _pass(session, arm)
+        still = still + 1 if np.array_equal(before, arm.links()) else 0
+    session.command("release", session.time)
+    for _ in range(REST):
+        _pass(session, arm)
+
+
+def _pass(session: Session, arm: WrongArm) -> None:
+    arm.advance(STEP)
+    session.tick(session.time + STEP)
+
+
+def _near(session: Session) -> bool:
+    progress = session.progress
+    return progress is not None and progress.share > 0.0 and abs(progress.remaining) <= HASTY_RADIANS
+
+
+def _plan(session: Session, verb: str) -> None:
+    session.command(verb, session.time)
+    if session.mode == "proposed":
+        session.command("accept", session.time)

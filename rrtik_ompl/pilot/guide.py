@@ -1,0 +1,204 @@
+"""The route of a session: proposed, accepted, followed move by move, and withdrawn when it is not free any more.
+
+Source: [1, ch. 6].
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.devices.arm import Arm
+from rrtik_ompl.pilot.feasibility import FeasibilityCache
+from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED
+from rrtik_ompl.pilot.routes.follower import Follower, Progress, path_fault
+from rrtik_ompl.pilot.routes.manoeuvre import escape_advice
+from rrtik_ompl.pilot.routes.no_route import NoRoute
+from rrtik_ompl.pilot.routes.proposal import propose
+from rrtik_ompl.pilot.routes.route import MAX_END_OFFSET, MAX_END_TURN, Route
+from rrtik_ompl.pilot.surroundings import Surroundings
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.world import World
+
+WITHDRAWN = "the route is withdrawn: {}; 'replan' finds another"
+MADE = "all moves are done"
+
+
+class Guided(Protocol):
+    """The session, as its route uses it."""
+
+    problem: Problem
+    robot: Robot
+    arm: Arm
+    rates: Vector
+    q: Vector
+    desired: Vector
+    selected: int
+    seed: int
+    mode: str
+    target: str | None
+    choice: tuple[str, int] | None
+    surroundings: Surroundings
+    feasibility: FeasibilityCache
+
+    @property
+    def world(self) -> World:
+        """The world for moves by hand."""
+
+    @property
+    def driving(self) -> bool:
+        """Whether a joint is driven."""
+
+    def fault(self) -> str:
+        """What is wrong with the grasp that is chosen; "" if nothing."""
+
+    def stand_still(self) -> None:
+        """Stop the arm, and end what is held."""
+
+
+class Guide:
+    """Proposes a route, and leads along it.
+
+    Attributes:
+        route: As it was planned last; None without one.
+        follower: Tracks the arm along it, or along the way back.
+        progress: Where the arm is on it; None before it is accepted.
+        withdrawn: Why it must not be followed any more; "" while it may.
+    """
+
+    def __init__(self, session: Guided) -> None:
+        """Begin without a route."""
+        self.route: Route | None = None
+        self.follower: Follower | None = None
+        self.progress: Progress | None = None
+        self.withdrawn = ""
+        self._session = session
+
+    def plan(self) -> str:
+        """Propose a route from where the arm is."""
+        session = self._session
+        session.arm.stop()
+        session.q = frozen(session.arm.read())
+        lamp = session.feasibility.patient_lamp(session.target, session.choice, session.q)
+        found = propose(session.problem, session.surroundings, session.target, lamp, session.q, session.rates,
+                        session.seed)  # fmt: skip
+        self.withdrawn = ""
+        if isinstance(found, NoRoute):
+            self._leave()
+            otherwise = "choose another grasp" if session.choice else "drive the arm elsewhere, or choose an object"
+            advice = escape_advice(session.world, session.q) or otherwise
+            return f"no route: {session.fault() or found}; {advice}"
+        self.route, self.follower, self.progress = found, Follower(found.path, session.rates), None
+        session.mode, session.desired = PROPOSED, frozen(found.path.end)
+        return found.summary() + "; 'accept' or 'reject'"
+
+    def accept(self) -> str:
+        """Follow the route that is proposed."""
+        session, follower = self._session, self.follower
+        if follower is None:
+            raise InputError("there is no route to accept; 'plan' proposes one")
+        progress = follower.update(session.q)
+        if progress.advice == "lost":
+            raise InputError(f"the arm is not where the route starts: {progress.fault}; 'replan' starts it from here")
+        self.refuse_if_blocked()
+        session.mode, self.progress, self.withdrawn = FOLLOWING, progress, ""
+        self.show_due(follower)
+        return "accepted; hold 'next' to make the next move"
+
+    def reject(self) -> str:
+        """Leave the route."""
+        self._session.arm.stop()
+        self._leave()
+        self._session.desired = self._session.q
+        return "rejected"
+
+    def back(self) -> str:
+        """Propose the way back: the moves that were made, reversed."""
+        session = self._session
+        if self.follower is None:
+            raise InputError("there is no route to go back on")
+        session.arm.stop()
+        back = self.follower.back(session.q)
+        self.follower, session.mode, self.progress, self.withdrawn = Follower(back, session.rates), PROPOSED, None, ""
+        return f"the way back: {len(back.moves())} moves; 'accept' or 'reject'"
+
+    def settle(self) -> str:
+        """Take the current move for made where the arm does not come nearer to its end."""
+        session, follower = self._session, self.follower
+        if follower is None or follower.joint() is None:
+            raise InputError("no move is due")
+        joint, left = follower.pass_on(session.q)
+        self.progress = follower.update(session.q)
+        self.show_due(follower)
+        return f"{joint} comes no nearer than {left} to its end; release, then hold 'next' again"
+
+    def watch(self) -> str:
+        """Update the progress of an accepted route; what there is to say, "" if nothing."""
+        session, follower = self._session, self.follower
+        if follower is None or session.mode != FOLLOWING:
+            return ""
+        due, self.progress = follower.current, follower.update(session.q)
+        if self.progress.advice == "lost":
+            session.stand_still()
+            return f"off the route: {self.progress.fault}; 'replan' finds a new one from here"
+        if self.progress.advice == "done":
+            return "" if session.driving else self._ended(follower)
+        if follower.current != due:
+            self.show_due(follower)
+            return f"move {follower.current} of {len(follower.moves)} is done; 'next' makes the next"
+        return ""
+
+    def show_due(self, follower: Follower) -> None:
+        """Select the joint of the current move; its end is the desired value."""
+        joint = follower.joint()
+        if joint is not None:
+            self._session.desired, self._session.selected = frozen(follower.target), joint
+
+    def check(self) -> str:
+        """After a change of the scene: withdraw a route that is not free any more, and say so; "" if all is well."""
+        session = self._session
+        if self.follower is None or session.mode not in (FOLLOWING, PROPOSED):
+            return ""
+        fault, before = self.fault_of_rest(), self.withdrawn
+        if not fault:
+            self.withdrawn = ""
+            return "the route is free again; 'accept' follows it" if before else ""
+        session.stand_still()
+        self.withdrawn, session.mode = fault, PROPOSED
+        return WITHDRAWN.format(fault)
+
+    def refuse_if_blocked(self) -> None:
+        """Withdraw the route and raise InputError if the rest of it is not free any more."""
+        if fault := self.fault_of_rest():
+            self.withdrawn, self._session.mode = fault, PROPOSED
+            raise InputError(WITHDRAWN.format(fault))
+
+    def fault_of_rest(self) -> str:
+        """Why what remains of the route must not be followed; "" if it may be."""
+        if self.follower is None:
+            return ""
+        session = self._session
+        grasped = session.target is not None and session.choice is not None
+        world = session.surroundings.holding(str(session.target)) if grasped else session.surroundings.world
+        return path_fault(world, self.follower.rest(session.q))
+
+    def _ended(self, follower: Follower) -> str:
+        """All moves are made: whether the tip is where the route ends."""
+        session = self._session
+        session.mode = MANOEUVRE
+        off = session.robot.fk(follower.path.end).actInv(session.robot.fk(session.q))
+        away, turned = float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
+        if away <= MAX_END_OFFSET and turned <= MAX_END_TURN:
+            return MADE
+        far = f"{1e3 * away:.1f} mm and {np.rad2deg(turned):.2f} deg"
+        return f"all moves are made, but the tip is {far} away from the end of the route; 'replan' may go nearer"
+
+    def _leave(self) -> None:
+        self.route = self.follower = self.progress = None
+        self.withdrawn = ""
+        self._session.mode = CHOOSING if self._session.choice else MANOEUVRE
