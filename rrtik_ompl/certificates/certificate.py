@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +33,7 @@ FIELDS = (
 )
 DEEPEST = 30  # level of an interval that is read
 WHOLE = 6  # whole numbers of an entry: body, part, body, part, level, number; three numbers of a plane may follow
+MEASURED = 4  # whole numbers of an entry of two links that are measured: body, body, level, number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +41,8 @@ class MotionEntries:
     """By what the pairs of solids are apart in one motion. What has no entry is apart by a ball in all of it.
 
     Attributes:
-        solids: Body above the plane, its part, body below, its part, shape (n, 4).
+        solids: Body above the plane, its part, body below, its part, shape (n, 4). Parts -1 and -1: two links as they
+            are, which coal measures in the middle of the interval.
         intervals: Level and number of the interval from number / 2**level to (number + 1) / 2**level, shape (n, 2).
         normals: Unit normal of the plane seen from the frame that carries both bodies, or zeros if a ball and a ball or
             box settle it, shape (n, 3).
@@ -92,10 +95,11 @@ class Certificate:
         return sum(len(motion.solids) for motion in self.motions)
 
     def document(self) -> dict[str, Any]:
-        """Plain data for JSON; an entry is a list of six numbers, or of nine with a plane."""
+        """Plain data for JSON; an entry is a list of six numbers, of nine with a plane, or of four for coal."""
         motions = []
         for motion in self.motions:
             rows = np.column_stack([motion.solids, motion.intervals]).tolist()
+            rows = [row if row[1] >= 0 else [*row[0:3:2], *row[4:]] for row in rows]
             ways = [way if any(way) else [] for way in motion.normals.tolist()]
             motions.append([row + way for row, way in zip(rows, ways, strict=True)])
         return {
@@ -196,28 +200,30 @@ def _waypoints(rows: object) -> Matrix:
 def _entries(rows: object, where: str) -> MotionEntries:
     if not isinstance(rows, list):
         raise InputError(f"{where}: expected a list of entries")
-    whole, normals = np.zeros((len(rows), WHOLE), dtype=np.int64), np.zeros((len(rows), 3))
     for k, row in enumerate(rows):
-        fault = _entry_fault(row)
-        if fault:
+        if fault := _entry_fault(row):
             raise InputError(f"{where}[{k}]: {fault}")
-        whole[k] = row[:WHOLE]
-        if len(row) > WHOLE:
-            normals[k] = finite_array(row[WHOLE:], (3,), f"{where}[{k}]")
+    whole = np.array([_six(row) for row in rows], dtype=np.int64).reshape(-1, WHOLE)
+    normals = np.array([row[WHOLE:] or [0.0] * 3 for row in rows], dtype=np.float64).reshape(-1, 3)
     return MotionEntries(frozen(whole[:, :4], np.int64), frozen(whole[:, 4:], np.int64), frozen(normals))
+
+
+def _six(row: list[Any]) -> list[int]:
+    """The whole numbers of an entry, part -1 for links that are measured."""
+    return [row[0], -1, row[1], -1, *row[2:]] if len(row) == MEASURED else row[:WHOLE]
 
 
 def _entry_fault(row: object) -> str:
     """What is wrong with an entry; "" if nothing is."""
-    if not isinstance(row, list) or len(row) not in (WHOLE, WHOLE + 3):
-        return "expected a list of 6 whole numbers, or of 6 and the 3 numbers of a plane"
+    if not isinstance(row, list) or len(row) not in (MEASURED, WHOLE, WHOLE + 3):
+        return "expected a list of 4 or 6 whole numbers, or of 6 and the 3 numbers of a plane"
     if not all(type(number) is int and 0 <= number < 1 << DEEPEST for number in row[:WHOLE]):
         return "body, part, body, part, level and number must be whole numbers"
-    level, number = row[4:WHOLE]
+    level, number = row[:WHOLE][-2:]
     if level > DEEPEST or number >= 1 << level:
         return f"no interval {number} of level {level}"
-    if not all(map(_is_number, row[WHOLE:])) or (len(row) > WHOLE and not any(row[WHOLE:])):
-        return "the normal of a plane must be three numbers, not all of them 0"
+    if not all(_is_number(each) and math.isfinite(each) for each in row[WHOLE:]) or not any(row[WHOLE:] or [1]):
+        return "the normal of a plane must be three finite numbers, not all of them 0"
     return ""
 
 

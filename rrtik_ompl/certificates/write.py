@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, finite_array, frozen, not_negative
 from rrtik_ompl.certificates.certificate import Certificate, MotionEntries
@@ -76,15 +76,18 @@ def _made(prover: Prover, rows: Matrix, kept: float) -> Certificate | None:
     if told is None:
         return None
     digests = robot_digest(prover.robot), scene_digest(prover.bodies, prover.pairs)
-    return Certificate(prover.robot.name, *digests, kept, prover.self_margin, frozen(rows), tuple(map(_entries, told)))
+    motions = tuple(_entries(*each) for each in told)
+    return Certificate(prover.robot.name, *digests, kept, prover.self_margin, frozen(rows), motions)
 
 
-def _entries(told: ProofLog) -> MotionEntries:
+def _entries(told: ProofLog, measured: NDArray[np.int64]) -> MotionEntries:
     """What a verifier does not find by itself; a motion that stands still is one interval of level 0."""
     intervals = told.intervals.copy()
     if len(intervals) and (intervals == intervals[0]).all():  # one interval alone is all of the motion
         intervals[:] = 0
-    needed = (intervals[:, 0] > 0) | told.normals.any(axis=1)
-    return MotionEntries(
-        frozen(told.solids[needed], np.int64), frozen(intervals[needed], np.int64), frozen(told.normals[needed])
-    )
+    links = (told.solids[:, None, ::2] == measured[None, :, :2]).all(axis=2).any(axis=1)
+    needed = ((intervals[:, 0] > 0) | told.normals.any(axis=1)) & ~links
+    whole = np.insert(measured[:, :2], [1, 2], -1, axis=1)
+    solids, intervals = np.vstack([told.solids[needed], whole]), np.vstack([intervals[needed], measured[:, 2:]])
+    normals = np.vstack([told.normals[needed], np.zeros((len(measured), 3))])
+    return MotionEntries(frozen(solids, np.int64), frozen(intervals, np.int64), frozen(normals))

@@ -8,6 +8,7 @@ body is wholly inside another is asked once a motion, for a closed surface that 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,17 @@ from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.solids import is_closed, is_mesh
 from rrtik_ompl.fast.proof import layout
+from rrtik_ompl.fast.proof.log import ProofLog, logged
 from rrtik_ompl.fast.proof.packing import ProofPairs
 from rrtik_ompl.robot import Robot
 
 MOST = 400  # distances for a pair in one motion: some tenths of a second
-NARROWEST = 1.0 / 512.0  # of a motion
+DEEPEST = 9  # level of an interval: 1/512 of a motion
+SPARE = 1.01  # of the way that bodies come nearer: who verifies it may bound that by other balls
 FAR = 1e6  # [m]; what may overlap by that is apart
+
+Numbers: TypeAlias = NDArray[np.int32]
+Told: TypeAlias = tuple[ProofLog, NDArray[np.int64]]  # by kernels; links and intervals that coal measured
 
 
 class CoalProof:
@@ -48,7 +54,7 @@ class CoalProof:
         mixed = meshes[packed.bodies].any(axis=1) & ~hollow[packed.bodies].any(axis=1)
         self.links: Mask = mixed & ~packed.beside_obstacle & ~_groups(packed)
 
-    def settle(self, motion: Matrix, pair: NDArray[np.int32], place: Vector, again: Callable[[], object]) -> None:
+    def settle(self, motion: Matrix, pair: Numbers, place: Vector, again: Callable[[], object]) -> NDArray[np.int64]:
         """Compare links by coal until nothing is left open of a motion, shape (2, dof), or what it cannot settle.
 
         Args:
@@ -56,33 +62,58 @@ class CoalProof:
             pair: Number of the pair of links that is not proven apart, shape (1,); written, -1 for none.
             place: Where, shape (1,); written.
             again: Lets the kernels prove the motion once more, and write both.
+
+        Returns:
+            The numbers of two links, level and number of an interval in whose middle they are measured, shape (n, 4).
         """
-        margins, bodies = self._packed.table[layout.MARGINS], self._packed.bodies
-        kept = margins.copy()
+        margins, bodies, sides = self._packed.table[layout.MARGINS], self._packed.bodies, self._packed.sides
+        kept, told = margins.copy(), list[list[int]]()
         try:
-            while pair[0] >= 0 and self.links[pair[0]] and self._apart(motion, int(pair[0]), float(place[0])):
+            while pair[0] >= 0 and self.links[pair[0]]:
+                intervals = self._intervals(motion, int(pair[0]), float(place[0]))
+                if not intervals:
+                    break
+                told += [[*sides[pair[0], ::2].tolist(), *interval] for interval in intervals]
                 margins[self.links & (bodies == bodies[pair[0]]).all(axis=1)] = -FAR
                 again()
         finally:
             margins[:] = kept
+        return np.array(told, dtype=np.int64).reshape(-1, 4)
 
-    def _apart(self, motion: Matrix, row: int, place: float) -> bool:
-        """Whether the two bodies of a pair are apart in all of a motion; looked at first where kernels gave up."""
+    def logged(self, motion: Matrix, pair: Numbers, place: Vector, run: Callable[[], object]) -> Told:
+        """What kernels tell while they prove a motion, and :meth:`settle` of it; arguments as there."""
+        told = [logged(self._packed, run)]
+        measured = self.settle(motion, pair, place, lambda: told.append(logged(self._packed, run)))
+        return told[-1], measured
+
+    def _intervals(self, motion: Matrix, row: int, place: float) -> list[tuple[int, int]]:
+        """Level and number of intervals that cover a motion, on each of which the bodies of a pair are apart.
+
+        None if they are not apart in all of it. Where kernels gave up is looked at first.
+        """
         pair = [self._bodies[k] for k in self._packed.bodies[row].tolist()]
         kept = float(self._packed.table[layout.MARGINS][row]) + DISTANCE_TOLERANCE
-        way = float(approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0]))
+        way = SPARE * float(approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0]))
         if kept <= 0.0 or Containment((*pair,), ((0, 1),)).holds((0, 1), self._robot.joint_frames(motion[:1])[0]):
-            return False
-        open_, looks = [(0.0, 1.0), (place, place)], 0
+            return []
+
+        def room(share: float) -> float:
+            return _gap(self._robot, pair, motion[0] + share * (motion[1] - motion[0])) - kept
+
+        open_, told, looks = [(0, 0)], list[tuple[int, int]](), 0
+        if room(place) <= 0.0:
+            return []
         while open_ and looks < MOST:
-            low, high = open_.pop()
-            middle, half, looks = 0.5 * (low + high), 0.5 * (high - low), looks + 1
-            room = _gap(self._robot, pair, motion[0] + middle * (motion[1] - motion[0])) - kept
-            if room <= 0.0 or (room <= way * half and half < NARROWEST):
-                return False
-            if room <= way * half:
-                open_ += [(middle, high), (low, middle)]
-        return not open_
+            (level, number), looks = open_.pop(), looks + 1
+            width = 0.5**level
+            spare = room((number + 0.5) * width)
+            if spare <= 0.0 or (spare <= 0.5 * way * width and level == DEEPEST):
+                return []
+            if spare > 0.5 * way * width:
+                told.append((level, number))
+            else:
+                open_ += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
+        return [] if open_ else told
 
 
 def distance_between(robot: Robot, bodies: Sequence[Body], names: tuple[str, str], q: Vector) -> float:

@@ -19,13 +19,12 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.digests import world_digest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.proof.layout import WAYS, ProofTable
-from rrtik_ompl.fast.proof.log import ProofLog, logged
 from rrtik_ompl.fast.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, strokes
-from rrtik_ompl.world.coal_proof import CoalProof, distance_between
+from rrtik_ompl.world.coal_proof import CoalProof, Told, distance_between
 
 LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
 PROOF_KERNELS = "proof.proof_kernels"
@@ -172,16 +171,18 @@ class Prover:
         places = (replace(gap, _measure=partial(self._distance, rows, gap)) for gap in gaps)
         return Proof(count, clearance, tuple(places), self.margin, _prover=self)
 
-    def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[ProofLog] | None:
+    def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[Told] | None:
         """By what each motion between waypoints, shape (k, dof), is proven; None if one of them is not."""
         values, kernels = self._joint_values(rows), library(PROOF_KERNELS)
         if kernels is None or not self.route(rows, clearance=clearance).proven:
             return None
-        packed, told = self._packed_for(clearance, SPARE), []
+        packed, told = self._packed_for(clearance, SPARE), list[Told]()
+        coal = CoalProof(self.robot, self.bodies, packed)
         pair, place = np.zeros(1, dtype=np.int32), np.zeros(1)
         for k in range(len(rows) - 1):
             at = (values[k].ctypes.data, values[k + 1].ctypes.data, 1, pair.ctypes.data, place.ctypes.data)
-            told.append(logged(packed, partial(kernels.prove, ProofTable(packed.table.address), *at)))
+            run = partial(kernels.prove, ProofTable(packed.table.address), *at)
+            told.append(coal.logged(rows[k : k + 2], pair, place, run))
             if pair[0] != PROVEN:
                 return None
         return told

@@ -14,7 +14,7 @@ import rrtik_ompl as rrtik
 from bench.proofs.cases import random_cases, random_scene
 from bench.proofs.certificates import main
 from bench.proofs.tampering import TAMPERINGS
-from rrtik_ompl.certificates.certificate import from_document
+from rrtik_ompl.certificates.certificate import MotionEntries, from_document
 from rrtik_ompl.certificates.verify import Motions, verify_certificate
 from rrtik_ompl.certificates.write import certificate_of
 from rrtik_ompl.errors import InputError
@@ -23,6 +23,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
 from rrtik_ompl.world import World
+from rrtik_ompl.world.coal_proof import CoalProof
 from rrtik_tests.turning_slider import slider
 
 ARMS = ("planar3", "titan4", "panda", "ur5_gripper", "point2d", "slider")
@@ -145,6 +146,40 @@ def test_a_larger_clearance_than_the_certificate_has_is_not_shown_by_it(cases):
     assert "clearance" in verify_certificate(case.certificate, case.world, case.path.waypoints, clearance=0.002)
 
 
+def test_links_that_coal_proves_apart_are_in_the_certificate_and_measured_again():
+    world = World(rrtik.load_robot("ur5"))
+    low, high = world.robot.finite_range()
+    drawn = np.random.default_rng(3).uniform(low, high, (6000, world.robot.dof))
+    drawn = drawn[world.motions_proven(drawn, drawn)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(CoalProof, "settle", lambda *_: None)
+        starts = drawn[[gap.motion for gap in world.prover.still_gaps(drawn, clearance=0.0)]][:3]
+    assert len(starts) == 3
+    for a, b in zip(starts, starts + np.array([1e-3, -1e-3, 1e-3, 1e-3, -1e-3, 0.1]), strict=True):
+        certificate = from_document(json.loads(json.dumps(certificate_of(world, [a, b]).document())))
+        (motion,) = certificate.motions
+        measured = np.flatnonzero(motion.solids[:, 1] < 0)
+        assert len(measured) > 0
+        assert verify_certificate(certificate, world, [a, b]) == ""
+        kept = np.arange(len(motion.solids)) != measured[-1]
+        missing = MotionEntries(motion.solids[kept], motion.intervals[kept], motion.normals[kept])
+        other = replace(motion, solids=np.where(motion.solids < 0, 0, motion.solids))
+        for falsified in (missing, other):
+            assert verify_certificate(replace(certificate, motions=(falsified,)), world, [a, b])
+
+
+def test_links_that_touch_are_not_measured_apart_whatever_a_certificate_says():
+    world = World(rrtik.load_robot("ur5"))
+    q = np.zeros(world.robot.dof)
+    q[2] = np.pi  # the forearm in the upper arm
+    honest = certificate_of(world, [np.zeros(6), np.zeros(6)])
+    motions = Motions(world, np.array([q, q]), 0.0)
+    solids = np.array([[i, -1, j, -1] for i, j in motions.pairs])
+    entries = MotionEntries(solids, np.zeros((len(solids), 2), dtype=np.int64), np.zeros((len(solids), 3)))
+    forged = replace(honest, waypoints=np.array([q, q]), motions=(entries,))
+    assert "not shown apart" in verify_certificate(forged, world, [q, q])
+
+
 @pytest.mark.parametrize("name", ["panda", "slider"])
 def test_the_verifier_computes_the_frames_that_pinocchio_does_and_bounds_all_accelerations(name, cases):
     case = cases(name)[0]
@@ -165,7 +200,9 @@ def test_the_verifier_computes_the_frames_that_pinocchio_does_and_bounds_all_acc
         corners = np.concatenate([part.corners for part in motions.solids[motions.numbers[number, -1]].parts])
         points = np.einsum("nij,kj->nki", turns[:, body.joint], corners) + origins[:, body.joint][:, None]
         chords = points[0] + shares[:, None, None] * (points[-1] - points[0])
-        assert np.linalg.norm(points - chords, axis=2).max() <= motions._bend(number, 0)[0] / 8.0 + 1e-12
+        velocity, bend = motions._bounds(number, 0)[:, 0]
+        assert np.linalg.norm(points - chords, axis=2).max() <= bend / 8.0 + 1e-12
+        assert np.linalg.norm(np.diff(points, axis=0), axis=2).max() <= velocity / 49.0 + 1e-12
 
 
 def test_the_log_grows_where_it_is_too_small_and_costs_nothing_afterwards(cases, monkeypatch):
