@@ -113,6 +113,8 @@ def plan(
         _say_path(path, (out, html, None if lack else certificate))
     if lack:
         note(lack)
+    elif less := report.less_clearance(path, clearance):
+        note(less)
     return 0 if found.found and not lack else 1
 
 
@@ -149,12 +151,14 @@ def _shortened(
 ) -> tuple[Any, float]:
     """The path made shorter, by the rules of single-joint moves that the planner had; and the time [s]."""
     from rrtik_ompl.shortening import MoveRules, shorten
+    from rrtik_ompl.world.kept_clearance import possible_clearance
 
     if path is None or method == "none" or len(path.waypoints) < 2:
         return path, 0.0
     begin = time.perf_counter()
     kept = MoveRules(problem.robot.joint_names, **rules) if rules and path.one_joint_at_a_time else None
-    shorter = shorten(path, problem, method=method, seed=seed, rules=kept, clearance=clearance)
+    limit = possible_clearance(problem.world, clearance, path.waypoints)
+    shorter = shorten(path, problem, method=method, seed=seed, rules=kept, clearance=limit)
     return shorter, time.perf_counter() - begin
 
 

@@ -122,6 +122,16 @@ def summary(
     return lines
 
 
+def less_clearance(path: JointPath | None, asked: float | None) -> str:
+    """A line that says that a proven path keeps less than what was asked for [m]; "" if it does not."""
+    proof = None if path is None else path.proof
+    if proof is None or asked is None or not proof.proven or proof.clearance >= asked:
+        return ""
+    return (
+        f"no path was found that keeps {1e3 * asked:g} mm from obstacles; this one keeps {1e3 * proof.clearance:g} mm"
+    )
+
+
 def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float) -> dict[str, Any]:
     """The same for machines: plain values that json can write; rad, m, s."""
     found: dict[str, Any] = {

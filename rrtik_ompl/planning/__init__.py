@@ -80,7 +80,7 @@ def plan(
         proof: "preferred": see above. "required": no path is found unless all of it is proven. "off": motions are
             checked, and nothing is said of proofs.
         clearance: What the path keeps from every obstacle on top of its margin [m], if there is such a path. None:
-            1 mm, or what start and goal have.
+            1 mm, or what start and goal have. At a goal of the tip configurations that keep it are preferred.
         improve: How long the path may go on getting better after it was found [s], within ``seconds``: further plans
             with other seeds, each shortened, of which the best is kept. It ends when sixty of them in a row gain
             nothing, or the path is as short as can be. ``statistics["cost_over_time"]`` has the course, rows of seconds

@@ -17,6 +17,7 @@ from rrtik_ompl.planning.one_planner import run_planner
 from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import shorten
+from rrtik_ompl.world.kept_clearance import possible_clearance
 from rrtik_ompl.world.motion_queries import has_kernels
 
 SHARE = 0.5  # of the time left, for each planner but the last
@@ -43,7 +44,8 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
     if path is not None and len(path.waypoints) > 2 and left > 0.0:
         has_kernels(problem.world, KERNELS)  # loads them, which is no part of planning
         begin = time.perf_counter()
-        limits: dict[str, Any] = {"seconds": left, "checks": SHORTENING_CHECKS, "clearance": request.clearance}
+        clearance = possible_clearance(problem.world, request.clearance, path.waypoints)
+        limits: dict[str, Any] = {"seconds": left, "checks": SHORTENING_CHECKS, "clearance": clearance}
         shorter = shorten(path, problem, method="auto", one_joint=False, seed=request.seed, **limits)
         path = shorter.with_waypoints(shorter.waypoints) if request.proof == "off" else shorter
         spent += time.perf_counter() - begin

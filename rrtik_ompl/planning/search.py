@@ -11,7 +11,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import ProofMode
 from rrtik_ompl.goal import JointGoal, TipGoal, has_continuous
-from rrtik_ompl.ik.goal_configurations import GoalSearch
+from rrtik_ompl.ik.goal_configurations import MAX_ROUNDS, GoalSearch
 from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, EFFORT_MOTIONS, Attempt, attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.path import JointPath
@@ -62,7 +62,7 @@ class Search:
     ) -> None:
         self.totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
         self.reason, self.counting = "", 0.0
-        self._problem, self._factory = problem, factory
+        self._problem, self._factory, self._clearance = problem, factory, clearance
         self._deadline, self._seeds = deadline, seeds
         self._goals = GoalSearch(problem, seeds[0])
         self._traits, joints = traits_of(factory), isinstance(problem.goal, JointGoal)
@@ -133,8 +133,22 @@ class Search:
             return np.zeros((0, self._problem.robot.dof))
         known = len(self._goals.rows)
         newer = number > 0 and self._goals.more()
-        rows, first = self._goals.first(), known if newer else number
+        rows, first = self._roomy_goals(), known if newer else number
         return rows[:1] if self._short_way(number) else np.roll(rows, -first, axis=0) if first else rows
+
+    def _roomy_goals(self) -> Matrix:
+        """All that is known to be at a goal of the tip: those that keep the clearance asked for, if there are any."""
+        rows, wanted = self._goals.first(), self._clearance
+        if wanted is None or isinstance(self._problem.goal, JointGoal):
+            return rows
+        for _ in range(MAX_ROUNDS):
+            kept = self._problem.world.motions_proven(rows, rows, clearance=wanted)
+            if kept.any():
+                return rows[kept]
+            if not self._goals.more():
+                break
+            rows = self._goals.rows
+        return rows
 
     def _quick_path(self, aims: Matrix) -> JointPath | None:
         """Of a brief attempt on what the kernels can prove; None where it finds nothing or cannot prove an end."""

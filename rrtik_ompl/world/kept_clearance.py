@@ -46,6 +46,14 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
     return None
 
 
+def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> float | None:
+    """What is asked for [m], or as much of it as the ends of a route, shape (k, dof), have; None stays None."""
+    if clearance is None:
+        return None
+    room = room_between(world, rows[[0, -1]], clearance)
+    return 0.0 if room is None else room.kept
+
+
 def leaving_room(world: World, room: Room) -> World:
     """The same world for searches: motions keep more than what is to be kept, at points that lie close enough.
 

@@ -264,3 +264,16 @@ def test_rules_of_moves_hold_for_paths_that_had_to_be_proven():
         found = plan(problem, "bicrdt", seed=seed, parameters={"smallest_move": 0.1})
         changes = np.abs(np.diff(found.path.waypoints, axis=0)).max(axis=1)
         assert changes.min() >= 0.1 - 1e-9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_path_to_a_goal_of_the_tip_ends_where_the_clearance_is_kept(seed):
+    found = rrtik.plan(rrtik.load_problem("planar6_c_pose"), seed=seed, clearance=0.1)
+    assert found.proven
+    assert found.path.proof.clearance == 0.1
+
+
+def test_where_no_configuration_at_the_goal_keeps_the_clearance_less_is_kept():
+    found = rrtik.plan(rrtik.load_problem("planar6_c_pose"), seed=1, clearance=0.3)
+    assert found.proven
+    assert 0.0 < found.path.proof.clearance < 0.3

@@ -59,7 +59,7 @@ def test_short_motions_that_are_proven_are_free_wherever_coal_looks(world, postu
 
 def test_motions_into_contact_are_never_proven(world, postures):
     rng = np.random.default_rng(5)
-    starts = np.repeat(postures, 40, axis=0)
+    starts = np.repeat(postures, 20, axis=0)
     ends = np.clip(starts + rng.normal(0.0, 0.1, starts.shape), world.robot.lower, world.robot.upper)
     touching = ~free_by_coal(world, ends)
     assert touching.sum() > 20
