@@ -143,9 +143,19 @@ def load_certificate(path: str | os.PathLike[str]) -> Certificate:
         raise in_file(path, error) from None
 
 
-def holds_certificate(path: str | os.PathLike[str]) -> bool:
-    """Whether a path's file has a certificate beside its waypoints."""
-    return str(path).endswith(".json") and IN_PATHS in json_object(read_text(path), "joint_path", "waypoints")
+def certificate_beside(path: str | os.PathLike[str]) -> Certificate | None:
+    """The certificate that a path's file has beside its waypoints; None if it has none.
+
+    Raises:
+        InputError: If it is not sound; the message names the file and the field.
+    """
+    if not str(path).endswith(".json"):
+        return None
+    try:
+        found = json_object(read_text(path), "joint_path", "waypoints").get(IN_PATHS)
+        return None if found is None else from_document(checked_object(found, KIND, "motions"))
+    except InputError as error:
+        raise in_file(path, error) from None
 
 
 def _inside(text: str) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
+    from rrtik_ompl.certificates.certificate import Certificate
     from rrtik_ompl.path import JointPath
     from rrtik_ompl.problem import Problem
 
@@ -89,6 +90,7 @@ def check(
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
     from rrtik_ompl import JointGoal, load_path, load_problem
+    from rrtik_ompl.certificates.certificate import certificate_beside, load_certificate
     from rrtik_ompl.cli.plan_report import wrong_ends
     from rrtik_ompl.world.clearance_curve import clearance_along
     from rrtik_ompl.world.route_check import how_checked
@@ -97,7 +99,7 @@ def check(
     world = question.world
     route = None if path is None else load_path(path, world.robot)
     if route is not None and proof is not None:
-        return _certified(question, route, proof)
+        return _certified(question, route, load_certificate(proof), f"{proof}")
     kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
     say(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}{kept}")
     if isinstance(question.goal, JointGoal):
@@ -113,18 +115,16 @@ def check(
         say(f"{path}: {clearance_along(world, route.waypoints)}{kept}")
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
     say(f"{path}: valid, {how_checked(world, route.waypoints)}; {size}")
-    return _certified(question, route, path, if_any=True)
+    found = None if path is None else certificate_beside(path)
+    return FOUND if found is None else _certified(question, route, found, f"{path}")
 
 
-def _certified(problem: Problem, route: JointPath, file: Path | None, *, if_any: bool = False) -> int:
-    """Say whether the certificate in a file holds; ``if_any``: nothing of a path's file that has none."""
-    from rrtik_ompl.certificates.certificate import holds_certificate
+def _certified(problem: Problem, route: JointPath, certificate: Certificate, file: str) -> int:
+    """Say whether a certificate holds."""
     from rrtik_ompl.cli.plan_report import certified
 
-    if file is None or (if_any and not holds_certificate(file)):
-        return FOUND
-    line, holds = certified(problem, route, file)
-    say(line)
+    line, holds = certified(problem, route, certificate)
+    say(f"{file}: {line}")
     return FOUND if holds else NOT_FOUND
 
 

@@ -20,6 +20,7 @@ from rrtik_ompl.units import reading, shown_unit
 from rrtik_ompl.world.route_check import how_checked
 
 if TYPE_CHECKING:
+    from rrtik_ompl.certificates.certificate import Certificate
     from rrtik_ompl.trajectory import RateLimits, Trajectory
 
 
@@ -188,23 +189,17 @@ def write_certificate(problem: Problem, path: JointPath, file: Path, *, beside: 
     It is for the clearance that the path is known to keep. ``beside``: the file takes the path too.
 
     Raises:
-        InputError: If the file cannot be written.
+        InputError: If the file cannot be written, or the scene has a cloud.
     """
-    from rrtik_ompl.certificates.write import certificate_of
+    from rrtik_ompl.certificates.write import certificate_by
 
-    world = problem.world
-    proved = path if path.proven_in(world) else path.proved(world)
-    kept = 0.0 if proved.proof is None else proved.proof.clearance
-    found = certificate_of(world, path, kept if proved.proven else 0.0)
-    if found is None:
-        gaps = world.prove(path.waypoints, clearance=kept).unproven
-        return f"{file}: no certificate: " + (
-            f"the path is not proven free: {gaps[0]}" if gaps else "links are too near for planes of their pieces"
-        )
+    proved = path if path.proven_in(problem.world) else path.proved(problem.world)
+    if proved.proof is not None and proved.proof.unproven:
+        return f"{file}: no certificate: the path is not proven free: {proved.proof.unproven[0]}"
     if beside:
         proved.save(file, proof=True)
     else:
-        found.save(file)
+        certificate_by(proved.proof, proved.waypoints).save(file)
     return ""
 
 
@@ -217,19 +212,13 @@ def wrong_ends(problem: Problem, path: JointPath) -> list[str]:
     return [text for text, found in wrong.items() if found]
 
 
-def certified(problem: Problem, path: JointPath, proof: Path) -> tuple[str, bool]:
-    """A line on whether a certificate proves that a path solves a problem, and whether it does.
-
-    Raises:
-        InputError: If the file is missing or is no certificate.
-    """
-    from rrtik_ompl.certificates.certificate import load_certificate
+def certified(problem: Problem, path: JointPath, found: Certificate) -> tuple[str, bool]:
+    """A line on whether a certificate proves that a path solves a problem, and whether it does."""
     from rrtik_ompl.certificates.verify import verify_certificate
 
-    found = load_certificate(proof)
     faults = [verify_certificate(found, problem.world, path.waypoints), *wrong_ends(problem, path)]
     if any(faults):
-        return f"{proof}: does not hold: {next(filter(None, faults))}", False
+        return f"does not hold: {next(filter(None, faults))}", False
     kept = f", {1e3 * found.clearance:g} mm kept from obstacles" if found.clearance else ""
     moves = len(found.motions)
-    return f"{proof}: holds: {moves} motion{'s' * (moves != 1)} proven free{kept}, {found.entries} entries", True
+    return f"holds: {moves} motion{'s' * (moves != 1)} proven free{kept}, {found.entries} entries", True
