@@ -74,13 +74,13 @@ def _entry_points(functions: dict[str, Any]) -> Any:
 
 
 def _hide_all_but(module: Any, shown: set[str]) -> None:
-    """Make all else private to the module, and drop what nobody needs."""
+    """Make all else private to the module, so that what is called once is inlined; drop what nobody needs."""
     for item in (*module.functions, *module.global_variables):
         if not item.is_declaration and item.name not in shown:
             item.linkage = "internal"
     machine = llvm.Target.from_triple(module.triple).create_target_machine()
     builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
-    passes = llvm.create_new_module_pass_manager()
+    passes = builder.getModulePassManager()
     passes.add_global_dead_code_eliminate_pass()
     passes.add_strip_dead_prototype_pass()
     passes.run(module, builder)

@@ -17,7 +17,7 @@ from rrtik_ompl.fast.simd.processor import WIDTH, processor_identity
 from rrtik_ompl.fast.simd.targets import Target
 from rrtik_ompl.files.cache import nobody_else_s, one_at_a_time, write_whole
 
-LAYOUT = 2
+LAYOUT = 3
 CHECK_BYTES = 32
 PACKAGE = "rrtik_ompl.fast"
 FOLDER = Path(__file__).parent.parent  # of the package's sources

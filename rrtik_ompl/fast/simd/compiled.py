@@ -56,7 +56,8 @@ def kernel(function: Function) -> Function:
     """Compile a function on its first call; kept on disk, and in memory alone where no folder can be written."""
     module = function.__module__.removeprefix(f"{PACKAGE}.")
     function.__qualname__ = f"{function.__qualname__}_{WIDTH}_{sources_digest(module)[:16]}"
-    compiled: Any = njit(nogil=True, **_OPTIONS)(function)
+    # said, or numba takes it over from the caller, and all that an inlined function calls is inlined again and again
+    compiled: Any = njit(nogil=True, forceinline=False, **_OPTIONS)(function)
     with suppress(RuntimeError):  # numba's word for "no place to keep it"
         compiled._cache = _ForgivingCache(function)
     kept: Function = compiled

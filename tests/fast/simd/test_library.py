@@ -203,6 +203,14 @@ def test_every_entry_of_every_module_is_in_its_library():
         assert entries
 
 
+def test_what_an_inlined_function_calls_is_not_inlined_for_that():
+    called = compiled.kernel(lambda number: number + 1)
+    between = compiled.inlined(lambda number: called(number))
+    compiled.kernel(lambda number: between(number))(1)
+    assert "alwaysinline" in between.inspect_llvm(between.signatures[0])
+    assert "alwaysinline" not in called.inspect_llvm(called.signatures[0])
+
+
 def test_bitcode_of_another_kind_of_processor_is_not_taken():
     foreign = b'target triple = "riscv64-unknown-elf"\n'
     module = bitcode.llvm.parse_assembly(foreign.decode())
