@@ -104,7 +104,7 @@ def pilot_server(first: int, count: int) -> list[str]:
     problem, perception = opened.engine.session.problem, opened.engine.perception
     arm = Witness(problem.robot, problem.start)
     session = Session(problem, arm, seed=first)
-    engine, done = UndrawnEngine(session, perception, simulated=arm), threading.Event()
+    engine, done = UndrawnEngine(session, perception, simulated=(arm,)), threading.Event()
     with silence(faults), PilotServer() as server:
         loop = Loop(engine, server)
         client = threading.Thread(target=_attack, args=(first, count, server, arm, faults, done), daemon=True)

@@ -5,8 +5,8 @@ A step is cut in stages, so that a command never waits for more than one of them
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from typing import Any
+from collections.abc import Hashable, Sequence
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.pilot.arguments import number
-from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import ENDED
 from rrtik_ompl.pilot.devices.perception import Perception
 from rrtik_ompl.pilot.interlock import PROPOSED
@@ -27,16 +26,23 @@ JPEG_QUALITY = 80
 VIEW_COMMANDS = {"turn": ("right", "up"), "zoom": ("factor",), "preset": ("view",), "play": ("share",)}
 
 
+class Simulated(Protocol):
+    """What has a simulated time."""
+
+    def advance(self, seconds: float) -> None:
+        """Advance it."""
+
+
 class Engine:
     """Connects session, perception and pictures. For one thread."""
 
-    def __init__(self, session: Session, perception: Perception, *, simulated: SimulatedArm | None = None) -> None:
+    def __init__(self, session: Session, perception: Perception, *, simulated: Sequence[Simulated] = ()) -> None:
         """Take the parts.
 
         Args:
             session: The session.
             perception: Camera and sensor.
-            simulated: An arm whose simulated time has to advance.
+            simulated: What has a simulated time that has to advance: an arm, a vehicle.
         """
         self.session, self.perception, self._simulated = session, perception, simulated
         self._camera_view = CameraView(perception.camera, session)
@@ -99,8 +105,8 @@ class Engine:
             self.outside.share = None
 
     def _advance(self, time: float) -> None:
-        if self._simulated is not None:
-            self._simulated.advance(max(time - self._advanced, 0.0))
+        for each in self._simulated:
+            each.advance(max(time - self._advanced, 0.0))
         self._advanced = max(time, self._advanced)
         self.session.tick(time)
         self._return_to_now()

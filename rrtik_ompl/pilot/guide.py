@@ -23,10 +23,12 @@ from rrtik_ompl.pilot.routes.route import MAX_END_OFFSET, MAX_END_TURN, Route
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import World
 
 WITHDRAWN = "the route is withdrawn: {}; 'replan' finds another"
 MADE = "all moves are done"
+MAX_SHIFT, MAX_TURN = 5e-3, np.deg2rad(1.0)  # [m], [rad]; a target that has moved farther is not where the route ends
 
 
 class Guided(Protocol):
@@ -78,6 +80,7 @@ class Guide:
         self.progress: Progress | None = None
         self.withdrawn = ""
         self._session = session
+        self._aimed: SeenObject | None = None  # what the route leads to, as it was seen when it was planned
 
     def plan(self) -> str:
         """Propose a route from where the arm is."""
@@ -94,6 +97,7 @@ class Guide:
             advice = escape_advice(session.world, session.q) or otherwise
             return f"no route: {session.fault() or found}; {advice}"
         self.route, self.follower, self.progress = found, Follower(found.path, session.rates), None
+        self._aimed = session.surroundings.named(session.target) if session.target and session.choice else None
         session.mode, session.desired = PROPOSED, frozen(found.path.end)
         return found.summary() + "; 'accept' or 'reject'"
 
@@ -123,7 +127,7 @@ class Guide:
         if self.follower is None:
             raise InputError("there is no route to go back on")
         session.arm.stop()
-        back = self.follower.back(session.q)
+        back, self._aimed = self.follower.back(session.q), None
         self.follower, session.mode, self.progress, self.withdrawn = Follower(back, session.rates), PROPOSED, None, ""
         return f"the way back: {len(back.moves())} moves; 'accept' or 'reject'"
 
@@ -183,22 +187,41 @@ class Guide:
         if self.follower is None:
             return ""
         session = self._session
+        if moved := self._target_moved():
+            return moved
         grasped = session.target is not None and session.choice is not None
         world = session.surroundings.holding(str(session.target)) if grasped else session.surroundings.world
         return path_fault(world, self.follower.rest(session.q))
+
+    def _target_moved(self) -> str:
+        """By how much the target is not where the route ends any more; "" if it is there."""
+        aimed = self._aimed
+        now = None if aimed is None else self._session.surroundings.named(aimed.object.name)
+        if aimed is None or now is None:
+            return ""
+        away, turned = apart(aimed.T_base_object, now.T_base_object)
+        if away <= MAX_SHIFT and turned <= MAX_TURN:
+            return ""
+        far = f"{1e3 * away:.0f} mm and {np.rad2deg(turned):.1f} deg"
+        return f"{aimed.object.name} has moved by {far} since the route was planned"
 
     def _ended(self, follower: Follower) -> str:
         """All moves are made: whether the tip is where the route ends."""
         session = self._session
         session.mode = MANOEUVRE
-        off = session.robot.fk(follower.path.end).actInv(session.robot.fk(session.q))
-        away, turned = float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
+        away, turned = apart(session.robot.fk(follower.path.end), session.robot.fk(session.q))
         if away <= MAX_END_OFFSET and turned <= MAX_END_TURN:
             return MADE
         far = f"{1e3 * away:.1f} mm and {np.rad2deg(turned):.2f} deg"
         return f"all moves are made, but the tip is {far} away from the end of the route; 'replan' may go nearer"
 
     def _leave(self) -> None:
-        self.route = self.follower = self.progress = None
+        self.route = self.follower = self.progress = self._aimed = None
         self.withdrawn = ""
         self._session.mode = CHOOSING if self._session.choice else MANOEUVRE
+
+
+def apart(first: pin.SE3, second: pin.SE3) -> tuple[float, float]:
+    """How far two poses are apart [m], and by which angle they are turned [rad]."""
+    off = first.actInv(second)
+    return float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))

@@ -14,6 +14,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.record import read_record
 from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.pilot.surroundings import Structure
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject
@@ -43,14 +44,18 @@ class RecordedArm:
 class RecordedPerception:
     """Gives the entries of a record to a session when their time has come."""
 
-    def __init__(self, entries: list[Entry], arm: RecordedArm, world: SimulatedCamera) -> None:
+    def __init__(
+        self, entries: list[Entry], arm: RecordedArm, world: SimulatedCamera, structure: Structure | None = None
+    ) -> None:
         """Begin at the beginning.
 
         Args:
             entries: Of a record; see `entries_for`.
             arm: What the session takes for its arm.
             world: Makes the pictures; its places follow the record.
+            structure: To what its obstacles are fixed; None if they move with the base.
         """
+        self._structure = structure
         self._entries, self._arm, self._world, self._next = entries, arm, world, 0
         self.camera, self.T_base_camera, self.arm_in_picture = world.camera, world.T_base_camera, True
         self.picture: NDArray[np.uint8] = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
@@ -68,6 +73,13 @@ class RecordedPerception:
     def close(self) -> None:
         """Nothing to release."""
 
+    def _place(self, seen: list[SeenObject]) -> None:
+        """Put objects, and what is fixed to one of them, where they were seen."""
+        fixed = next((each for each in seen if self._structure and each.object.name == self._structure.name), None)
+        if fixed is not None and self._structure is not None:
+            self._world.T_start_base = self._structure.T_base_object * fixed.T_base_object.inverse()
+        self._world.places = {each.object.name: self._world.T_start_base * each.T_base_object for each in seen}
+
     def _apply(self, entry: Entry, session: Session) -> None:
         time = entry["time"]
         if entry["kind"] == "joints":
@@ -77,7 +89,7 @@ class RecordedPerception:
             session.command(entry["name"], time, **entry["arguments"])
         elif entry["kind"] == "seen":
             seen = [_seen(self._world.marker_map, each) for each in entry["objects"]]
-            self._world.places = {each.object.name: each.T_base_object for each in seen}
+            self._place(seen)
             session.see(seen, time)
 
 

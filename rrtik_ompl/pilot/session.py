@@ -24,7 +24,7 @@ from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.routes.follower import Follower, Progress
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange
 from rrtik_ompl.pilot.routes.route import Route
-from rrtik_ompl.pilot.surroundings import Surroundings
+from rrtik_ompl.pilot.surroundings import Structure, Surroundings
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import World
@@ -42,6 +42,7 @@ class Session:
         record: Record | None = None,
         seed: int = 0,
         past: bool = False,
+        structure: Structure | None = None,
     ) -> None:
         """Begin in manoeuvre.
 
@@ -52,10 +53,11 @@ class Session:
             record: Where the session is recorded.
             seed: Of the random numbers: the same commands give the same routes.
             past: Pictures are not of now, and the arm is a simulated one. Else nothing moves without a picture of now.
+            structure: To what the problem's obstacles are fixed; None if they move with the arm's base.
         """
         self.problem, self.robot, self.arm, self.seed = problem, problem.robot, arm, seed
         self.rates: Vector = joint_rates(self.robot, rates)
-        self.surroundings = Surroundings(problem.world)
+        self.surroundings = Surroundings(problem.world, structure)
         self.mode, self.selected, self.speed = MANOEUVRE, 0, 1.0
         self.target: str | None = None
         self.choice: tuple[str, int] | None = None

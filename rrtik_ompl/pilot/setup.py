@@ -22,6 +22,7 @@ from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for, start_of
 from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.pilot.surroundings import Structure
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -79,13 +80,15 @@ def open_session(options: SessionOptions) -> OpenSession:
         return _replay(options, problem, options.replay)
     if options.arm is not None and isinstance(options.source, Path):
         raise InputError("--arm: an arm is moved by a camera's pictures, not by photographs or a film: leave one out")
-    arm: Arm = _simulated_arm(options, problem) if options.arm is None else _line_arm(problem, options.arm)
-    perception = _perception(options, problem, arm)
+    vehicle = None if options.source is not None else _vehicle(options, problem)
+    arm: Arm = _simulated_arm(vehicle, problem) if options.arm is None else _line_arm(problem, options.arm)
+    source = None if vehicle is None else SimulatedSource(_simulated(vehicle, problem), arm, vehicle.base_motion)
+    perception = _perception(options, vehicle, source)
     record = Record(options.record)
     record.write("begin", 0.0, problem=problem.name, seed=options.seed, q=arm.read().tolist())
     past = isinstance(options.source, Path)
-    session = Session(problem, arm, record=record, seed=options.seed, past=past)
-    simulated = arm if isinstance(arm, SimulatedArm) else None
+    session = Session(problem, arm, record=record, seed=options.seed, past=past, structure=_structure(vehicle))
+    simulated = [each for each in (arm, source) if isinstance(each, SimulatedArm | SimulatedSource)]
     closing, reports = [perception.close, record.close], perception.reports()
     if isinstance(arm, LineArm):
         closing.insert(0, arm.close)
@@ -93,25 +96,34 @@ def open_session(options: SessionOptions) -> OpenSession:
     return OpenSession(Engine(session, perception, simulated=simulated), tuple(closing), reports, record)
 
 
-def _simulated_arm(options: SessionOptions, problem: Problem) -> SimulatedArm:
+def _simulated_arm(vehicle: SimulatedVehicle | None, problem: Problem) -> SimulatedArm:
     """Without errors, or wrong as the file of the simulated vehicle says."""
-    faults = None if options.source is not None else _vehicle(options, problem).faults
-    if faults is None:
+    if vehicle is None or vehicle.faults is None:
         return SimulatedArm(problem.robot, problem.start)
-    return WrongArm(problem.robot, problem.start, faults)
+    return WrongArm(problem.robot, problem.start, vehicle.faults)
 
 
-def _perception(options: SessionOptions, problem: Problem, arm: Arm) -> LivePerception:
-    if options.source is None:
-        vehicle = _vehicle(options, problem)
+def _structure(vehicle: SimulatedVehicle | None) -> Structure | None:
+    """To what the obstacles of the problem are fixed, and where it is when they are where the problem says."""
+    if vehicle is None or vehicle.structure is None:
+        return None
+    return Structure(vehicle.structure, vehicle.places[vehicle.structure])
+
+
+def _perception(
+    options: SessionOptions, vehicle: SimulatedVehicle | None, simulated: SimulatedSource | None
+) -> LivePerception:
+    if vehicle is not None and simulated is not None:
         sensor = Sensor(vehicle.camera, vehicle.marker_map, sigmas=options.sigmas)
-        return LivePerception(sensor, SimulatedSource(_simulated(vehicle, problem), arm), arm_in_picture=True)
+        return LivePerception(sensor, simulated, arm_in_picture=True)
     for name, file in (("--camera-file", options.camera_file), ("--map", options.map_file)):
         if file is None:
             raise InputError(f"pictures need {name} FILE (see: rrtik markers --help)")
     camera, marker_map = load_camera(str(options.camera_file)), load_marker_map(str(options.map_file))
     sensor = Sensor(camera, marker_map, sigmas=options.sigmas)
     source = options.source
+    if source is None:
+        raise InputError("there is no source of pictures")
     return LivePerception(
         sensor, Feed(lambda: _fitting(pictures_from(source), camera), paced=not isinstance(source, int))
     )
@@ -146,7 +158,7 @@ def _recorded(options: SessionOptions, problem: Problem) -> SimulatedVehicle:
 def _simulated(vehicle: SimulatedVehicle, problem: Problem) -> SimulatedCamera:
     return SimulatedCamera(
         vehicle.camera, vehicle.marker_map, problem.robot, problem.world.scene, vehicle.places,
-        vehicle.T_base_camera,
+        vehicle.T_base_camera, fixed=vehicle.structure is not None,
     )  # fmt: skip
 
 
@@ -162,5 +174,7 @@ def _replay(options: SessionOptions, problem: Problem, file: Path) -> OpenSessio
     entries = entries_for(file, problem.name, problem.robot, vehicle.marker_map)
     start, seed = start_of(entries, problem.start)
     arm = RecordedArm(problem.robot, start)
-    perception = RecordedPerception(entries, arm, _simulated(vehicle, problem))
-    return OpenSession(Engine(Session(problem, arm, seed=seed, past=True), perception), (perception.close,))
+    structure = _structure(vehicle)
+    perception = RecordedPerception(entries, arm, _simulated(vehicle, problem), structure)
+    session = Session(problem, arm, seed=seed, past=True, structure=structure)
+    return OpenSession(Engine(session, perception), (perception.close,))

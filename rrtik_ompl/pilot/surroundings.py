@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -12,11 +12,24 @@ import pinocchio as pin
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
 from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import World
 
 MIN_SHIFT, MIN_ROTATION = 1e-3, np.deg2rad(0.2)  # [m], [rad]; smaller changes are noise
+
+
+class Structure(NamedTuple):
+    """What the problem's obstacles are fixed to, where the vehicle may move.
+
+    Attributes:
+        name: Of an object of the marker map.
+        T_base_object: Its pose when the obstacles are where the problem says.
+    """
+
+    name: str
+    T_base_object: pin.SE3
 
 
 class Surroundings:
@@ -27,9 +40,9 @@ class Surroundings:
         version: Counts how often the world became another one.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, structure: Structure | None = None) -> None:
         """Begin with a world without objects."""
-        self._given = world
+        self._given, self._structure = world, structure
         self.world = world
         self.version = 0
         self._seen: dict[str, SeenObject] = {}
@@ -106,10 +119,23 @@ class Surroundings:
         return shifted > MIN_SHIFT or turned > MIN_ROTATION or abs(wider) > MIN_SHIFT
 
     def _with(self, allowed: Sequence[tuple[str, str]]) -> World:
-        given = self._given.scene
+        given = self._fixed_scene()
         scene = scene_with(given, [solid for each in self._seen.values() for solid in each.solids()])
         changed = replace(scene, allowed_collisions=(*given.allowed_collisions, *allowed))
         return self._given.with_accuracy("exact").with_scene(changed)
+
+    def _fixed_scene(self) -> Scene:
+        """The problem's scene where the structure is seen; how far that is uncertain is the margin of its obstacles."""
+        given, fixed = self._given.scene, self._structure
+        seen = None if fixed is None else self._seen.get(fixed.name)
+        if fixed is None or seen is None:
+            return given
+        from_object = fixed.T_base_object.inverse()
+        local = [replace(each, pose=from_object * each.pose) for each in given.obstacles]
+        moved = [
+            replace(each, pose=seen.T_base_object * each.pose, margin=each.margin + seen.margin(each)) for each in local
+        ]
+        return replace(given, obstacles=tuple(moved))
 
 
 def _plain(seen: SeenObject) -> dict[str, Any]:

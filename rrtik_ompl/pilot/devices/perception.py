@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
+from rrtik_ompl.pilot.devices.base_motion import BaseMotion
 from rrtik_ompl.pilot.devices.camera_feed import Feed, PictureSource
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
@@ -103,9 +104,16 @@ class LivePerception:
 class SimulatedSource:
     """Pictures of a simulated camera, made on demand."""
 
-    def __init__(self, camera: SimulatedCamera, arm: Arm) -> None:
-        """Take camera and arm."""
-        self._camera, self._arm, self._count = camera, arm, 0
+    def __init__(self, camera: SimulatedCamera, arm: Arm, motion: BaseMotion | None = None) -> None:
+        """Take camera and arm, and how their base moves."""
+        self._camera, self._arm, self._motion = camera, arm, motion
+        self._count, self._time = 0, 0.0
+
+    def advance(self, seconds: float) -> None:
+        """Advance the simulated time: the base moves."""
+        self._time += seconds
+        if self._motion is not None:
+            self._camera.T_start_base = self._motion.at(self._time)
 
     def latest(self) -> Picture:
         """A picture with the arm at its present configuration."""

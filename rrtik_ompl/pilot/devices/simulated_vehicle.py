@@ -14,8 +14,9 @@ from pydantic import Field
 
 from rrtik_ompl.catalog import problem_folders
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.files.sections import Name, NotNegative, Number, Section, Version, parse
+from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.pilot.devices.base_motion import BaseMotion
 from rrtik_ompl.pilot.devices.wrong_arm import Faults
 from rrtik_ompl.problem_files.scene import PoseEntry
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -36,6 +37,8 @@ class SimulatedVehicle:
         places: ``T_base_object`` by name.
         T_base_camera: Pose of the camera.
         faults: Of the arm; None if it has none.
+        base_motion: How the vehicle moves; None if it stands still.
+        structure: Name of the object to which the problem's obstacles are fixed; None if they move with the vehicle.
     """
 
     camera: Camera
@@ -43,6 +46,21 @@ class SimulatedVehicle:
     places: Mapping[str, pin.SE3]
     T_base_camera: pin.SE3
     faults: Faults | None = None
+    base_motion: BaseMotion | None = None
+    structure: str | None = None
+
+
+class BaseMotionEntry(Section):
+    """How the base moves. In its own frame at the beginning."""
+
+    drift: Annotated[list[float], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: RUF012 - pydantic copies
+    sway: Annotated[list[float], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: RUF012
+    tilt_deg: Annotated[list[float], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: RUF012
+    period: Length = Field(5.0, description="of the sway [s]")
+
+    def build(self) -> BaseMotion:
+        """The motion."""
+        return BaseMotion(self.drift, self.sway, np.deg2rad(self.tilt_deg), self.period)
 
 
 class FaultsEntry(Section):
@@ -75,6 +93,8 @@ class VehicleFile(Section):
     map: Name
     camera_pose: PoseEntry = Field(description="T_base_camera")
     places: Annotated[list[PlaceEntry], Field(min_length=1)]
+    base_motion: BaseMotionEntry | None = Field(None, description="drift [m/s] and sway [m] of the vehicle")
+    structure: Name | None = Field(None, description="the object to which the problem's obstacles are fixed")
     arm: FaultsEntry | None = Field(None, description="by how much the simulated arm is wrong")
 
 
@@ -94,8 +114,14 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
             places[marker_map.named(each.name).name] = each.pose.build()
     with document.at(("arm",)):
         faults = None if entry.arm is None else entry.arm.build()
+    with document.at(("base_motion",)):
+        motion = None if entry.base_motion is None else entry.base_motion.build()
+    with document.at(("structure",)):
+        structure = None if entry.structure is None else marker_map.named(entry.structure).name
+        if structure is not None and structure not in places:
+            raise InputError(f"structure '{structure}' has no place; give one under places")
     camera = load_camera(folder / entry.camera)
-    return SimulatedVehicle(camera, marker_map, places, entry.camera_pose.build(), faults)
+    return SimulatedVehicle(camera, marker_map, places, entry.camera_pose.build(), faults, motion, structure)
 
 
 def find_vehicle(problem: str) -> Path:

@@ -7,6 +7,7 @@ For measurements of the markers themselves use `sensing.synthetic_camera`, which
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -43,6 +44,7 @@ class SimulatedCamera:
         places: Mapping[str, pin.SE3],
         T_base_camera: pin.SE3,
         seed: int = 0,
+        fixed: bool = False,
     ) -> None:
         """Prepare the scene.
 
@@ -54,10 +56,13 @@ class SimulatedCamera:
             places: ``T_base_object`` of objects, by name; objects without one are left out.
             T_base_camera: Pose of the camera.
             seed: Of the noise.
+            fixed: The obstacles stand on the ground like the objects, and do not move with the base.
         """
         self.camera, self.marker_map = camera, marker_map
         self.T_base_camera = rigid(T_base_camera, "pose of the camera")
         self.places = {name: rigid(T, f"pose of object '{name}'") for name, T in places.items()}
+        self.T_start_base = pin.SE3.Identity()  # where the base is
+        self._fixed = fixed
         self._scene, self._arm = scene, Augmenter(robot, camera, TRIANGLES)
         rng, size = np.random.default_rng(seed), (camera.height, camera.width, 1)
         grey = [np.rint(rng.normal(0.0, NOISE, size)).astype(np.int16) for _ in range(NOISE_PICTURES)]
@@ -82,22 +87,27 @@ class SimulatedCamera:
 
     def _still(self) -> tuple[NDArray[np.uint8], list[Obstacle]]:
         """The picture without the arm, and the solids in it; made anew only when an object moved."""
-        key = tuple((name, T.homogeneous.tobytes()) for name, T in sorted(self.places.items()))
+        T_base_start = self.T_start_base.inverse()
+        places = {name: T_base_start * T for name, T in sorted(self.places.items())}
+        key = tuple((name, T.homogeneous.tobytes()) for name, T in places.items())
         if key != self._kept[0]:
-            solids = [*self._scene.obstacles, *self._object_solids()]
+            around = self._scene.obstacles
+            if self._fixed:
+                around = tuple(replace(each, pose=T_base_start * each.pose) for each in around)
+            solids = [*around, *self._object_solids(places)]
             drawn = self._arm.draw(_water(self.camera), self.T_base_camera, obstacles=solids, opacity=1.0)
             depths, T_camera_base = self._arm.depths(), self.T_base_camera.inverse()
             for thing in self.marker_map.objects:
-                if thing.name in self.places:
-                    self._lay_markers(drawn, depths, thing, T_camera_base * self.places[thing.name])
+                if thing.name in places:
+                    self._lay_markers(drawn, depths, thing, T_camera_base * places[thing.name])
             self._kept = (key, drawn, solids)
         return self._kept[1], self._kept[2]
 
-    def _object_solids(self) -> list[Obstacle]:
+    def _object_solids(self, places: Mapping[str, pin.SE3]) -> list[Obstacle]:
         return [
-            Obstacle(f"{thing.name} {k}", solid.shape, self.places[thing.name] * solid.pose)
+            Obstacle(f"{thing.name} {k}", solid.shape, places[thing.name] * solid.pose)
             for thing in self.marker_map.objects
-            if thing.name in self.places
+            if thing.name in places
             for k, solid in enumerate(thing.solids)
         ]
 
