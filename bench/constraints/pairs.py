@@ -17,6 +17,7 @@ from rrtik_ompl.robot import Robot
 TIPS = {"two_titan4": ("left_grip_point", "right_grip_point"), "baxter": ("left_gripper", "right_gripper")}
 REACH = {"two_titan4": 1.6, "baxter": 1.0}  # [m] of the box in which the balls are
 BALLS, ROUNDS = 6, 3
+MOST_SCENES = 40  # that are drawn for one problem
 LIMIT, LONG = 5.0, 10.0  # [s]
 NEAR, TURNED = 1e-3, 1e-2  # [m], [rad] of a tip from its goal
 
@@ -67,7 +68,7 @@ def _robot(name: str) -> Robot:
 def _problem(name: str, number: int) -> tuple[rrtik.Problem, dict[str, pin.SE3]]:
     """Start and goal are free; the goal is the poses of both tips in a free configuration."""
     robot, rng, reach = _robot(name), np.random.default_rng([9, number]), REACH[name]
-    while True:
+    for _ in range(MOST_SCENES):
         balls = [
             rrtik.Obstacle(
                 f"ball{k}",
@@ -81,10 +82,10 @@ def _problem(name: str, number: int) -> tuple[rrtik.Problem, dict[str, pin.SE3]]
         rows = rows[world.valid_batch(rows)]
         rows = rows[world.certify(rows)]
         if len(rows) > 1:
-            break
-    wanted = {tip: _place(robot, rows[1], tip) for tip in TIPS[name]}
-    goal = rrtik.MultiGoal({tip: rrtik.PoseGoal(pose) for tip, pose in wanted.items()})
-    return rrtik.Problem(world, rows[0], goal, name=f"{name} {number}"), wanted
+            wanted = {tip: _place(robot, rows[1], tip) for tip in TIPS[name]}
+            goal = rrtik.MultiGoal({tip: rrtik.PoseGoal(pose) for tip, pose in wanted.items()})
+            return rrtik.Problem(world, rows[0], goal, name=f"{name} {number}"), wanted
+    raise SystemExit(f"{name} {number}: no two free configurations in {MOST_SCENES} scenes")
 
 
 def _place(robot: Robot, q: Vector, frame: str) -> pin.SE3:

@@ -65,7 +65,10 @@ def others(python: str, name: str, kind: str, seed: int) -> Others:
         kind: Of the constraint.
         seed: Of problem and searches.
     """
-    problem = generated(name, kind, seed)
+    problem = generated(name, kind, seed).problem
+    if problem is None:
+        nothing = Other(False, 0.0, 0.0, 0.0, 0, "")
+        return Others(nothing, nothing)
     rrtik.plan(problem, "cbirrt", seconds=LIMIT, seed=seed)  # the tables of the world, which OMPL's checks use too
     first = _seen(problem, *projected(problem, seed), "")
     with TemporaryDirectory() as folder:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pinocchio as pin
 
@@ -17,15 +19,24 @@ from rrtik_ompl.task_region import TaskRegion
 KINDS = ("upright", "plane", "line", "orientation")
 DRAWN = 40  # configurations at a time, until one can be used
 NEAR_BASE = 0.3  # [m] from the base's axis, where no solid is put
+MOST_SCENES = 40  # that are drawn for one problem
 
 
-def generated(name: str, kind: str, seed: int, *, joined_ends: bool = True) -> Problem:
+@dataclass(frozen=True)
+class Generated:
+    """A problem, and how many scenes were drawn until it was one; None after `MOST_SCENES`."""
+
+    problem: Problem | None
+    scenes: int
+
+
+def generated(name: str, kind: str, seed: int, *, joined_ends: bool = True) -> Generated:
     """A problem of a robot: 5 to 20 solids, and a constraint of a kind, in which start and goal are free.
 
     With ``joined_ends`` the goal is one that the constraint is not proven to keep apart from the start.
     """
     robot, rng = rrtik.load_robot(name), np.random.default_rng([seed, *name.encode(), *kind.encode()])
-    while True:
+    for scenes in range(1, MOST_SCENES + 1):
         world = rrtik.World(robot, _scene(robot, rng))
         start = _start(robot, world, kind, rng)
         if start is None:
@@ -39,7 +50,9 @@ def generated(name: str, kind: str, seed: int, *, joined_ends: bool = True) -> P
         rows = rows[world.certify(rows)]
         joined = [q for q in rows if not separation(held, start, q[None])] if joined_ends else list(rows)
         if joined:
-            return Problem(world, start, joined[0], constraints=regions, name=f"{name} {kind} {seed}")
+            problem = Problem(world, start, joined[0], constraints=regions, name=f"{name} {kind} {seed}")
+            return Generated(problem, scenes)
+    return Generated(None, MOST_SCENES)
 
 
 def _scene(robot: Robot, rng: np.random.Generator) -> rrtik.Scene:

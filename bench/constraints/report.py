@@ -1,6 +1,6 @@
 """Measure planning under path constraints on generated problems, and judge every path densely.
 
-Usage: ``python bench/constraints/report.py [--problems 100] [--others 30] [--peers 0 --python PYTHON] [--jobs 1]
+Usage: ``python bench/constraints/report.py [--problems 100] [--others 100] [--peers 0 --python PYTHON] [--jobs 1]
 [--out bench/reports/constraints.md]``; about a second a problem. An interrupted run goes on where it was.
 """
 
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from bench.constraints.pairs import TIPS, Pair, pair
 from bench.constraints.peers import DELTA, Other, Others, others, versions
-from bench.constraints.runs import EXPLORED, LIMIT, LONG, ROUNDS, Outcome, branches, measured
+from bench.constraints.problems import MOST_SCENES
+from bench.constraints.runs import EXPLORED, EXPLORED_LONG, LIMIT, LONG, ROUNDS, Outcome, branches, measured
 from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
@@ -63,13 +64,13 @@ def row(name: str, kind: str, outcomes: list[Outcome]) -> list[str]:
     found = [each for each in outcomes if each.found]
     solvable = sum(each.solvable for each in outcomes)
     if not found:
-        return [name, kind, f"0 / {solvable} / {len(outcomes)}", str(sum(each.apart for each in outcomes)), *["-"] * 7]
+        return [name, kind, f"0 / {solvable} / {len(outcomes)}", *["-"] * 8]
     search, whole = (np.array([getattr(each, what) for each in found]) * 1e3 for what in ("search", "whole"))
     return [
         name,
         kind,
         f"{len(found)} / {solvable} / {len(outcomes)}",
-        str(sum(each.apart for each in outcomes)),
+        _unsolved(outcomes),
         f"{np.median(search):.2f} / {np.quantile(search, 0.95):.1f}",
         f"{np.median(whole):.1f} / {np.quantile(whole, 0.95):.1f}",
         f"{sum(each.proven for each in found)}",
@@ -80,11 +81,18 @@ def row(name: str, kind: str, outcomes: list[Outcome]) -> list[str]:
     ]
 
 
+def _unsolved(outcomes: list[Outcome]) -> str:
+    """How many were not solved, for lack of a way without obstacles, and with one."""
+    left = [each for each in outcomes if not each.solvable]
+    joined = sum(each.joined for each in left)
+    return f"{len(left) - joined} / {joined}" if left else "-"
+
+
 HEADS = [
     "robot",
     "constraint",
     "solved / solvable / all",
-    "proven apart",
+    "no way even without obstacles / one",
     "search, ms (median / 95 %)",
     "auto, ms",
     "proven free",
@@ -100,13 +108,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--problems", type=int, default=100, help="with a cup, of each of two robots")
     parser.add_argument(
-        "--others", nargs="+", default=["30"], metavar="N", help="of each other constraint: a number, or ARM=NUMBER"
+        "--others", nargs="+", default=["100"], metavar="N", help="of each other constraint: a number, or ARM=NUMBER"
     )
     parser.add_argument("--branches", type=int, default=30, help="goals of any branch, of each of four sets")
     parser.add_argument("--pairs", type=int, default=20, help="scenes of each robot with two arms")
     parser.add_argument("--peers", type=int, default=0, help="problems of each set for OMPL and roboplan too")
     parser.add_argument("--python", default=sys.executable, help="interpreter of an environment with roboplan")
-    add_options(parser, "constraints")
+    add_options(parser, "constraints.md")
     given = parser.parse_args()
     cups = [(name, "upright", seed) for name in CUP_ARMS for seed in range(given.problems)]
     counts = _counts(given.others)
@@ -124,7 +132,10 @@ def main() -> None:
     report.intro = (
         "Generated problems: an arm among 5 to 20 boxes, balls and cylinders, a start and a goal that keep the "
         "constraint. Times are processor time of whole calls of `plan()`, with the second check, in a world that has "
-        f"been used before; the quickest of {ROUNDS}. Solvable is what was solved, or was found within {LONG:g} s. The "
+        f"been used before; the quickest of {ROUNDS}. Solvable is what a path is known of: it was solved, or found in "
+        f"{LONG:g} s with another seed. Whether the rest can be solved is not known. A search of {EXPLORED_LONG:,} samples "
+        "that sees no obstacles tells it apart: what that cannot connect either is most likely kept apart by the "
+        "constraint and the limits of the joints. The "
         "judge looks at poses, by Pinocchio alone, at 1/50 of every stored motion and every 2 mm, and at contacts, by "
         "coal alone, at every second of them."
     )
@@ -153,8 +164,11 @@ def main() -> None:
     table += [
         row(name, kind, [outcomes[name, kind, seed] for seed in range(counts[name])]) for name in ARMS for kind in KINDS
     ]
+    most, unmade = max(each.scenes for each in outcomes.values()), sum(not each.made for each in outcomes.values())
     text = (
-        "Beyond: how far the judge saw the frame outside the tolerance; 0.5 mm and 0.2 degrees are allowed between "
+        f"A problem is the first of at most {MOST_SCENES} scenes in which start and goal were found; the most that one "
+        f"took were {most}, and {unmade} of {len(outcomes)} were not made. Beyond: how far the judge saw the frame outside "
+        "the tolerance; 0.5 mm and 0.2 degrees are allowed between "
         "stored configurations. The goals of these problems are not proven to be apart from their starts."
     )
     report.table("Problems", HEADS, table, text=text)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import rrtik_ompl as rrtik
 from bench.constraints.judge import judged
 from bench.constraints.problems import generated
+from bench.shared.problems import goal_joints
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.fast.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.ik.held_tables import held_tables
@@ -15,7 +16,8 @@ from rrtik_ompl.ik.held_tables import held_tables
 ROUNDS = 3  # of which the quickest counts
 LIMIT = 1.0  # [s]
 LONG = 3.0  # [s] for what was not solved, to see whether there is a path
-EXPLORED = 2000  # samples of a search without collisions
+EXPLORED = 2000  # samples of a search without obstacles
+EXPLORED_LONG = 20_000  # likewise, for what was not solved
 
 
 @dataclass(frozen=True)
@@ -23,10 +25,13 @@ class Outcome:
     """Of one problem.
 
     Attributes:
+        scenes: How many were drawn until there was a problem.
+        made: Whether there is a problem; all else is nothing if not.
         solids: How many there are around the arm.
         found: Whether there is a path within the limit.
         apart: Whether the reason is a proof that the constraint keeps start and goal apart.
-        solvable: Whether a path was found, by a long search if need be.
+        solvable: Whether a path was found, by a long search with another seed if need be.
+        joined: Whether a path was found, or a long search without obstacles connects start and goal.
         search: Processor time of `plan()` with "cbirrt" [s].
         whole: Likewise of "auto", which shortens too [s].
         proven: Whether that path is proven.
@@ -34,10 +39,13 @@ class Outcome:
         metres, degrees, tilt, contacts: What the judge saw, the worse of both paths.
     """
 
+    scenes: int
+    made: bool
     solids: int
     found: bool
     apart: bool
     solvable: bool
+    joined: bool
     search: float
     whole: float
     proven: bool
@@ -50,7 +58,10 @@ class Outcome:
 
 def measured(name: str, kind: str, seed: int) -> Outcome:
     """One problem, planned in several rounds and judged."""
-    problem = generated(name, kind, seed)
+    drawn = generated(name, kind, seed)
+    problem = drawn.problem
+    if problem is None:
+        return Outcome(drawn.scenes, False, 0, False, False, False, False, 0.0, 0.0, False, 0, 0.0, 0.0, 0.0, 0)
     rrtik.plan(problem, "cbirrt", seconds=LIMIT, seed=seed)  # kernels and the tables of the world
     times: dict[str, list[float]] = {"cbirrt": [], "auto": []}
     plans = {}
@@ -67,10 +78,13 @@ def measured(name: str, kind: str, seed: int) -> Outcome:
     solvable = found or rrtik.plan(problem, "cbirrt", seconds=LONG, seed=seed + 1).found
     seen = [judged(problem, plan.path.waypoints) for plan in (search, whole) if plan.path is not None]
     return Outcome(
+        drawn.scenes,
+        True,
         len(problem.world.scene.obstacles),
         found,
         apart,
         solvable,
+        solvable or joined_without_obstacles(problem, seed, EXPLORED_LONG),
         min(times["cbirrt"]),
         min(times["auto"]),
         bool(whole.proven),
@@ -101,18 +115,25 @@ class Branches:
 
 def branches(name: str, kind: str, seed: int) -> Branches:
     """A problem whose goal is drawn from all branches, without obstacles."""
-    crowded = generated(name, kind, seed, joined_ends=False)
+    crowded = generated(name, kind, seed, joined_ends=False).problem
+    if crowded is None:
+        return Branches(False, False, False, 0.0)
     world = rrtik.World(crowded.robot)
     problem = rrtik.Problem(world, crowded.start, crowded.goal, constraints=crowded.constraints)
     begin = time.process_time()
     plan = rrtik.plan(problem, "cbirrt", seconds=LIMIT, seed=seed)
     spent = time.process_time() - begin
     apart = not plan.found and "keeps start and goal apart" in plan.reason
+    return Branches(plan.found, apart, joined_without_obstacles(problem, seed, EXPLORED), spent)
+
+
+def joined_without_obstacles(problem: rrtik.Problem, seed: int, samples: int) -> bool:
+    """Whether a search that sees neither obstacles nor the arm itself connects start and goal along the constraint."""
+    world = rrtik.World(problem.robot)
     tables = held_tables(problem.robot, held_regions(problem.robot, world.scene, problem.constraints, None))
     motions = world.motions
     assert tables is not None
     assert motions is not None
     search = ConstrainedSearch(motions, tables.address, *problem.robot.finite_range())
-    ends = problem.start[None], crowded.goal.q[None]  # type: ignore[union-attr]
-    way = search.solve(*ends, seed, max_iterations=EXPLORED, unchecked=True)
-    return Branches(plan.found, apart, way is not None, spent)
+    ends = problem.start[None], goal_joints(problem)[None]
+    return search.solve(*ends, seed, max_iterations=samples, unchecked=True) is not None
