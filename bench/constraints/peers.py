@@ -16,6 +16,7 @@ from ompl import util as ou
 import rrtik_ompl as rrtik
 from bench.constraints.judge import judged
 from bench.constraints.problems import generated
+from bench.constraints.runs import LIMIT, WALL
 from bench.peers.description import task_of
 from bench.peers.host import Host
 from bench.peers.task import Region, Rows
@@ -24,9 +25,7 @@ from rrtik_ompl.ompl_bridge.attempt import quiet
 from rrtik_ompl.ompl_bridge.region_constraint import RegionConstraint
 from rrtik_ompl.problem import Problem
 
-LIMIT = 1.0  # [s]
 DELTA = 0.2  # [rad] of a step along OMPL's manifold; with its own default of 0.05 it is slower
-WALL = 3.0  # times the limit, by the clock, for roboplan: a busy machine is no reason to be out of time
 
 
 @dataclass(frozen=True)

@@ -133,9 +133,9 @@ def main() -> None:
         "Generated problems: an arm among 5 to 20 boxes, balls and cylinders, a start and a goal that keep the "
         "constraint. Times are processor time of whole calls of `plan()`, with the second check, in a world that has "
         f"been used before; the quickest of {ROUNDS}. Solvable is what a path is known of: it was solved, or found in "
-        f"{LONG:g} s with another seed. Whether the rest can be solved is not known. A search of {EXPLORED_LONG:,} samples "
-        "that sees no obstacles tells it apart: what that cannot connect either is most likely kept apart by the "
-        "constraint and the limits of the joints. The "
+        f"{LONG:g} s with another seed. Whether the rest can be solved is not known. A search of {EXPLORED_LONG:,} "
+        "samples that sees no obstacles tells it apart: what that cannot connect either is most likely kept apart by "
+        "the constraint and the limits of the joints. The "
         "judge looks at poses, by Pinocchio alone, at 1/50 of every stored motion and every 2 mm, and at contacts, by "
         "coal alone, at every second of them."
     )
@@ -167,8 +167,8 @@ def main() -> None:
     most, unmade = max(each.scenes for each in outcomes.values()), sum(not each.made for each in outcomes.values())
     text = (
         f"A problem is the first of at most {MOST_SCENES} scenes in which start and goal were found; the most that one "
-        f"took were {most}, and {unmade} of {len(outcomes)} were not made. Beyond: how far the judge saw the frame outside "
-        "the tolerance; 0.5 mm and 0.2 degrees are allowed between "
+        f"took were {most}, and {unmade} of {len(outcomes)} were not made. Beyond: how far the judge saw the frame "
+        "outside the tolerance; 0.5 mm and 0.2 degrees are allowed between "
         "stored configurations. The goals of these problems are not proven to be apart from their starts."
     )
     report.table("Problems", HEADS, table, text=text)
