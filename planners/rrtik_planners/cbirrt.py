@@ -16,8 +16,7 @@ from rrtik_ompl.fast.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ik.held_tables import HeldTables, held_tables
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
-from rrtik_ompl.world.holding_world import HoldingWorld
-from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
+from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, keeps_constraints
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree
 from rrtik_planners.one_joint_options import iteration_limit
 
@@ -66,7 +65,7 @@ class CBiRRT(SafePlanner):
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         world = self._world
         motions, tables = None, None
-        if isinstance(world, HoldingWorld):
+        if keeps_constraints(world):
             motions, tables = world.free_motions, held_tables(world.robot, world.constraints)
             if motions is None or tables is None:
                 raise InputError("path constraints need searches in kernels: install numba")
@@ -103,7 +102,7 @@ class CBiRRT(SafePlanner):
 
     def _box(self, motions: FastMotions) -> tuple[Vector, Vector]:
         lower, upper = self.bounds()
-        if isinstance(self._world, HoldingWorld):
+        if keeps_constraints(self._world):
             robot = self._world.robot
             return np.maximum(lower, robot.lower), np.minimum(upper, robot.upper)
         return lower, upper
@@ -111,7 +110,7 @@ class CBiRRT(SafePlanner):
 
 def _separation(world: object, starts: Matrix, goals: Matrix) -> str:
     """Why the path constraints of a world keep all starts and goals apart, in a line; "" where that is not proven."""
-    if not isinstance(world, HoldingWorld):
+    if not keeps_constraints(world):
         return ""
     said = [separation(world.constraints, start, goals) for start in starts]
     return said[0] if all(said) else ""

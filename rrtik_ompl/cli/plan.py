@@ -156,7 +156,7 @@ def _shortened(
     if path is None or method == "none" or len(path.waypoints) < 2:
         return path, 0.0
     begin = time.perf_counter()
-    kept = MoveRules(problem.robot.joint_names, **rules) if rules and path.one_joint_at_a_time else None
+    kept = MoveRules.of_robot(problem.robot, **rules) if rules and path.one_joint_at_a_time else None
     limit = possible_clearance(problem.world, clearance, path.waypoints)
     shorter = shorten(path, problem, method=method, seed=seed, rules=kept, clearance=limit)
     return shorter, time.perf_counter() - begin

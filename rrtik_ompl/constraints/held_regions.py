@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +32,10 @@ class HeldRegions:
 
     def __init__(self, regions: Iterable[HeldRegion]) -> None:
         self.regions = tuple(regions)
+
+    def of_robot(self, robot: Robot) -> HeldRegions:
+        """The same regions of the same arm whose joints are counted in other units (its chain's ``gain``)."""
+        return HeldRegions(replace(region, robot=robot) for region in self.regions)
 
     def held(self, Q: Matrix) -> Mask:
         """Which configurations, shape (m, dof), are in all regions, shape (m,)."""

@@ -9,11 +9,24 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector, bounded_array, frozen, positive
-from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.arrays import Matrix, Vector, frozen, positive
+from rrtik_ompl.description.named_numbers import by_name
+from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.goal import joint_difference
 from rrtik_ompl.robot import Robot
 
 LIGHTEST, HEAVIEST = 1e-3, 1e3
+
+
+def given_weights(robot: Robot) -> list[float]:
+    """The weight of each joint as it was given, 1 for those without."""
+    return [robot.joint_weights.get(joint, 1.0) for joint in robot.joint_names]
+
+
+def weighted_difference(robot: Robot, Q: Matrix, q: Vector) -> Matrix:
+    """``Q - q`` per joint, the short way round, multiplied by the weights. Shape of Q, (..., dof)."""
+    away = joint_difference(robot, Q, q)
+    return away * weights_of(robot) if robot.joint_weights else away
 
 
 @lru_cache(maxsize=64)
@@ -22,7 +35,7 @@ def weights_of(robot: Robot) -> Vector:
 
     Steps of searches are shares of that box.
     """
-    given = np.array([robot.joint_weights.get(joint, 1.0) for joint in robot.joint_names])
+    given = np.array(given_weights(robot))
     lower, upper = robot.finite_range()
     return frozen(given * (np.linalg.norm(upper - lower) / np.linalg.norm(given * (upper - lower))))
 
@@ -32,8 +45,9 @@ def weighted(robot: Robot, weights: Mapping[str, float]) -> Robot:
 
     A joint of weight w counts w times as much as one without: :func:`rrtik_ompl.plan`, ``plan(improve=)``,
     :func:`rrtik_ompl.shorten` and :class:`rrtik_ompl.Task` make the length small in which each joint's way is
-    multiplied by its weight, and planners measure distances so. Only proportions matter. Paths of single-joint moves
-    (``joint_costs`` is their rule) and those under path constraints know no weights. ``JointPath.length`` is without.
+    multiplied by its weight, also under path constraints, and planners measure distances so. Of several solutions
+    of inverse kinematics the nearest is the one whose weighted way is shortest. For paths of single-joint moves the
+    weights are the ``joint_costs``, unless these are given. Only proportions matter. ``JointPath.length`` is without.
 
     Args:
         robot: The robot; weights that it has already are replaced.
@@ -51,14 +65,14 @@ def weighted(robot: Robot, weights: Mapping[str, float]) -> Robot:
     """
     require(robot, Robot, "robot to weight", "use load_robot(name or file)")
     require(weights, Mapping, f"joint weights of robot '{robot.name}'", "use {name of a joint: weight}")
-    given = {}
-    for joint, value in weights.items():
-        if joint not in robot.joint_names:
-            raise UnknownNameError(f"joint of robot '{robot.name}'", joint, robot.joint_names, where="joint_weights")
-        what = f"joint_weights of robot '{robot.name}': {joint}"
-        given[joint] = positive(float(bounded_array(value, (), what)), what)
-        if not LIGHTEST <= given[joint] <= HEAVIEST:
-            raise InputError(f"{what}: must be from {LIGHTEST:g} to {HEAVIEST:g}, got {given[joint]:g}")
+    given = by_name(robot, "joint_weights", "joint", robot.joint_names, weights, _in_range)
     source = dict(robot.source) | {"joint_weights": dict(given)}
     kept = {joint: weight for joint, weight in given.items() if weight != 1.0}
     return replace(robot, joint_weights=MappingProxyType(kept), source=MappingProxyType(source))
+
+
+def _in_range(weight: float, what: str) -> float:
+    weight = positive(weight, what)
+    if not LIGHTEST <= weight <= HEAVIEST:
+        raise InputError(f"{what}: must be from {LIGHTEST:g} to {HEAVIEST:g}, got {weight:g}")
+    return weight

@@ -7,8 +7,9 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TypeAlias
 
-from rrtik_ompl.arrays import bounded_array, not_negative
-from rrtik_ompl.errors import UnknownNameError, require
+from rrtik_ompl.arrays import not_negative
+from rrtik_ompl.description.named_numbers import by_name
+from rrtik_ompl.errors import require
 from rrtik_ompl.robot import Robot
 
 Padding: TypeAlias = float | Mapping[str, float]
@@ -36,13 +37,8 @@ def padded(robot: Robot, padding: Padding) -> Robot:
         0.01
     """
     require(robot, Robot, "robot to pad", "use load_robot(name or file)")
-    what = f"padding of robot '{robot.name}'"
-    links = robot.link_names
-    given = padding if isinstance(padding, Mapping) else dict.fromkeys(links, padding)
-    for link in given:
-        if link not in links:
-            raise UnknownNameError(f"link of robot '{robot.name}'", link, links, where="padding")
-    thick = {link: not_negative(float(bounded_array(value, (), what)), what) for link, value in given.items()}
+    given = padding if isinstance(padding, Mapping) else dict.fromkeys(robot.link_names, padding)
+    thick = by_name(robot, "padding", "link", robot.link_names, given, not_negative)
     source = dict(robot.source) | {"padding": dict(thick) if isinstance(padding, Mapping) else float(padding)}
     kept = {link: value for link, value in thick.items() if value > 0.0}
     return replace(robot, padding=MappingProxyType(kept), source=MappingProxyType(source))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
 from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.copies import as_value, in_one_line
+from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
 from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
@@ -115,7 +116,7 @@ def _by_closed_form(
     found = branches_of(robot, targets, np.broadcast_to(near, (len(targets), robot.dof)))
     valid = np.array(found.valid)
     valid[valid] = free_of_collision(world, found.branches[valid])
-    distance = np.linalg.norm(joint_difference(robot, found.branches, near), axis=2)
+    distance = np.linalg.norm(weighted_difference(robot, found.branches, near), axis=2)
     best = np.argmin(np.where(valid, distance, np.inf), axis=1)
     done = np.flatnonzero(valid.any(axis=1))
     q[done] = robot.clamp(found.branches[done, best[done]])

@@ -9,6 +9,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.choices import IkMethod
+from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.goal import (
     GoalSet,
     JointGoal,
@@ -239,7 +240,7 @@ def _chosen(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
     robot = problem.world.robot
     away = joint_difference(robot, rows, problem.start)
     turned = np.where(robot.continuous, problem.start + away, rows)
-    distance = np.linalg.norm(away, axis=1)
+    distance = np.linalg.norm(weighted_difference(robot, rows, problem.start), axis=1)
     apart = np.full(len(rows), np.inf)  # largest joint difference from the nearest of those chosen
     for row in known:
         apart = np.minimum(apart, np.abs(joint_difference(robot, turned, row)).max(axis=1))

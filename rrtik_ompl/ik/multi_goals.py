@@ -13,6 +13,7 @@ from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions
+from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.goal import MultiGoal, joint_difference
 from rrtik_ompl.ik.held_tables import projected_onto
 from rrtik_ompl.ik.method_interface import IkResult, different_rows
@@ -48,7 +49,7 @@ def at_all_tips(
         own = projected_onto(robot, HeldRegions((region,)), starts)
         if len(own) == 0:
             return own
-        own = own[np.argsort(np.linalg.norm(own - near, axis=1))]
+        own = own[np.argsort(np.linalg.norm(weighted_difference(robot, own, near), axis=1))]
         rows = np.append(0, rng.integers(len(own), size=STARTS - 1))  # the nearest ones of all tips first
         moved = _moving(robot, region)
         joined[:, moved] = own[rows][:, moved]
@@ -86,7 +87,8 @@ def solve_all_tips(
         free = found[accept(found)]
         if len(free):
             turned = joint_difference(robot, free, near)
-            kept = different_rows(turned, np.vecdot(turned, turned).argsort(kind="stable"))
+            away = weighted_difference(robot, free, near)
+            kept = different_rows(turned, np.vecdot(away, away).argsort(kind="stable"))
             rows = np.where(robot.continuous, near + turned[kept], free[kept])
             return _result(rows, _residuals(robot, goal, rows), "", "", rounds, begin)
         if len(found):

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
 from rrtik_ompl.choices import IkMethod, one_of
+from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import (
     MultiGoal,
@@ -69,7 +70,8 @@ def solve_ik(
             drawn from a region, or the curve of a singular pose, bring none) numeric, or projection onto task-space
             regions; the others are there to be compared. Of several tips it is projection.
         near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None. A closed form
-            gives the nearest one there is (of a singular pose its nearest representative), a numeric method the
+            gives the nearest one there is (of a singular pose its nearest representative; where joints have weights, by
+            their weighted way), a numeric method the
             first that it finds on its way from there.
         all: Every solution that the method finds, not just one: a closed form gives all there are (of a singular
             pose representatives), a numeric one those it comes across, full turns of a joint counted apart.
@@ -127,7 +129,8 @@ def _solved(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> IkR
             return other
     turned = joint_difference(robot, q, request.near)
     (rows,) = free.nonzero()
-    order = rows[np.vecdot(turned, turned)[rows].argsort(kind="stable")]
+    away = weighted_difference(robot, q, request.near)
+    order = rows[np.vecdot(away, away)[rows].argsort(kind="stable")]
     kept = different_rows(turned, order) if request.all else order[:1]
     reason, detail = ("", "") if len(kept) else _why(request, answer, name, q)
     return IkResult(
@@ -193,7 +196,7 @@ def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
     robot, goal = request.robot, request.goal
     inside = robot.clamp(q[robot.within_limits(q)])
     if len(inside) > 1:
-        away = joint_difference(robot, inside, request.near)
+        away = weighted_difference(robot, inside, request.near)
         nearest = int(np.vecdot(away, away).argmin())
         inside = inside[nearest : nearest + 1]
     reaching, residuals = _at_goal(robot, goal, inside)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, whole_number
+from rrtik_ompl.description.joint_weights import given_weights
 from rrtik_ompl.errors import InputError, UnknownNameError, at_most, listed, name_of
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.transitions import merge_moves
 
 MOST_JOINTS = 1_000  # of an arm
@@ -61,6 +64,11 @@ class MoveRules:
         self.last_joints = joint_numbers(last_joints, names, dof, "last_joints")
         self.smallest_move = smallest_moves(smallest_move, dof)
 
+    @classmethod
+    def of_robot(cls, robot: Robot, **options: Any) -> MoveRules:
+        """Those of a robot; weights of its joints are their costs, unless others are given."""
+        return cls(robot.joint_names, **weights_as_costs(robot) | options)
+
     def kept_by(self, route: Matrix) -> bool:
         """Whether a route of single-joint moves, shape (k, n), keeps to all of them.
 
@@ -89,6 +97,11 @@ class MoveRules:
         if len(route) == 0:
             raise InputError("route: needs at least one row")
         return route
+
+
+def weights_as_costs(robot: Robot) -> dict[str, Any]:
+    """The option ``joint_costs`` that the weights of a robot's joints make; nothing if it has none."""
+    return {"joint_costs": given_weights(robot)} if robot.joint_weights else {}
 
 
 def long_enough(route: Matrix, smallest_move: Vector) -> bool:

@@ -12,6 +12,7 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.moves.rules import weights_as_costs
 from rrtik_ompl.ompl_bridge.inspection.settings import keyword_parameters
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
@@ -48,7 +49,10 @@ def safe_planner(
     """
     if options:
         _check_names(factory, name, options)
-    goal: dict[str, Any] = {"goal": problem.goal} if "goal" in keyword_parameters(factory) else {}
+    taken = keyword_parameters(factory)
+    goal: dict[str, Any] = {"goal": problem.goal} if "goal" in taken else {}
+    if "joint_costs" in taken:
+        options = weights_as_costs(problem.robot) | dict(options)
     try:
         return factory(si, world=problem.world, seed=seed, **goal, **options)
     except TypeError as error:

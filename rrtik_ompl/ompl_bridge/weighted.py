@@ -18,7 +18,7 @@ class WeightedProblem:
         problem: With a start and motions in these coordinates; its goal is as it was.
 
     Args:
-        problem: Of a robot with joint weights, without path constraints.
+        problem: Of a robot with joint weights.
         motions: What says which motions are free; the problem's world if None.
     """
 
@@ -45,5 +45,5 @@ class WeightedProblem:
 
 
 def has_weights(problem: Problem) -> bool:
-    """Whether lengths are weighted: the robot has joint weights, and there are no path constraints."""
-    return bool(problem.robot.joint_weights) and not problem.constraints
+    """Whether lengths are weighted: the robot has joint weights."""
+    return bool(problem.robot.joint_weights)

@@ -13,8 +13,7 @@ from rrtik_ompl.ik.held_tables import held_tables
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening.task import Task
 from rrtik_ompl.transitions import route_length
-from rrtik_ompl.world.holding_world import HoldingWorld
-from rrtik_ompl.world.motion_queries import is_conservative
+from rrtik_ompl.world.motion_queries import HoldingQueries, is_conservative, keeps_constraints
 
 TRIES = 200  # where there is no end to the time
 PATIENCE = 40  # tries without gain that end the work
@@ -27,7 +26,7 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
     The whole way is tried first. Where the world has no kernels the route stays as it is.
     """
     world = problem.world
-    if not isinstance(world, HoldingWorld) or (motions := world.free_motions) is None:
+    if not keeps_constraints(world) or (motions := world.free_motions) is None:
         return route
     tables = held_tables(world.robot, world.constraints)
     if tables is None:
@@ -52,7 +51,7 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
     return route
 
 
-def _box(world: HoldingWorld, route: Matrix) -> tuple[Vector, Vector]:
+def _box(world: HoldingQueries, route: Matrix) -> tuple[Vector, Vector]:
     """Finite bounds around a route, within the limits, shapes (n,)."""
     lower = np.maximum(world.robot.lower, route.min(axis=0) - np.pi)
     upper = np.minimum(world.robot.upper, route.max(axis=0) + np.pi)

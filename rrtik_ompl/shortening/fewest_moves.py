@@ -86,7 +86,7 @@ def fewest_moves(
         )
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
-    kept = MoveRules(world.robot.joint_names) if rules is None else rules
+    kept = MoveRules.of_robot(world.robot) if rules is None else rules
     work = _Work(rows, world, kept, rounds, seed, stop)
     best, bound, taken = rows, lower_bound(rows[0], rows[-1]), False
     levels = clearance_levels(world, rows[[0, -1]], clearance)

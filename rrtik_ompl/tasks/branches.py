@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rrtik_ompl.arrays import Vector
-from rrtik_ompl.description.joint_weights import weights_of
+from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.errors import InputError, ProblemError
-from rrtik_ompl.goal import JointGoal, joint_difference
+from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
@@ -173,7 +173,7 @@ class Expander:
 
 def way_of(robot: Robot, a: Vector, b: Vector) -> float:
     """Of the joints from one configuration to another, weighted [rad, metres counted alike]."""
-    return float(np.linalg.norm(joint_difference(robot, b, a) * weights_of(robot)))
+    return float(np.linalg.norm(weighted_difference(robot, b, a)))
 
 
 def _way(branch: Branch, stage: Straight) -> Way:

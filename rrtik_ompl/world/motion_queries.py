@@ -17,6 +17,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.search.motions.motion_table import MotionsFree as MotionsFree
@@ -83,6 +84,22 @@ class KernelWorld(MotionQueries, Protocol):
         """What counts as free where the kernels cannot decide."""
 
 
+class HoldingQueries(MotionQueries, Protocol):
+    """A world with path constraints; :func:`keeps_constraints` says whether a world is one."""
+
+    @property
+    def robot(self) -> Robot:
+        """The arm."""
+
+    @property
+    def constraints(self) -> HeldRegions:
+        """What is held."""
+
+    @property
+    def free_motions(self) -> FastMotions | None:
+        """How kernels check motions for collisions alone; None where they cannot."""
+
+
 def kernel_tables(world: object) -> FastWorld | None:
     """The tables that kernels read of a world, or None where it has none."""
     return getattr(world, "fast", None)
@@ -111,6 +128,11 @@ def _certain(fast: FastWorld, chain: Chain, corners: Matrix) -> bool:
 def is_conservative(world: object) -> bool:
     """Whether a world counts as blocked what its kernels cannot decide; one that does not say is taken to be exact."""
     return bool(getattr(world, "accuracy", "exact") == "conservative")
+
+
+def keeps_constraints(world: object) -> TypeGuard[HoldingQueries]:
+    """Whether motions in a world also have to keep path constraints."""
+    return getattr(world, "constraints", None) is not None
 
 
 def turning_joints(world: object) -> Mask | None:

@@ -13,10 +13,11 @@ import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world.motion_queries import MotionQueries, is_conservative, kernel_tables
+from rrtik_ompl.world.motion_queries import MotionQueries, is_conservative, keeps_constraints, kernel_tables
 
 
 class WeightedMotions(MotionQueries):
@@ -25,6 +26,7 @@ class WeightedMotions(MotionQueries):
     Attributes:
         robot: The arm with limits and joint values of these coordinates.
         fast, motions: What kernels read; None where the world has none.
+        constraints, free_motions: See :class:`~rrtik_ompl.world.holding_world.HoldingWorld`; None where there are none.
         weights, motion_resolution, accuracy: See :class:`rrtik_ompl.World`.
 
     Args:
@@ -41,6 +43,12 @@ class WeightedMotions(MotionQueries):
         motions: FastMotions | None = getattr(world, "motions", None)
         self.motions = None if motions is None else motions.scaled(weights)
         self.fast: FastWorld | None = None if motions is None else kernel_tables(world)
+        self.constraints: HeldRegions | None = None
+        self.free_motions: FastMotions | None = None
+        if keeps_constraints(world):
+            self.constraints = world.constraints.of_robot(self.robot)
+            free = world.free_motions
+            self.free_motions = None if free is None else free.scaled(weights)
         self.weights: Vector = world.weights / weights
         self.motion_resolution = float(world.motion_resolution)
         self.accuracy: Accuracy = "conservative" if is_conservative(world) else "exact"
