@@ -71,8 +71,7 @@ def solve_ik(
             regions; the others are there to be compared. Of several tips it is projection.
         near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None. A closed form
             gives the nearest one there is (of a singular pose its nearest representative; where joints have weights, by
-            their weighted way), a numeric method the
-            first that it finds on its way from there.
+            their weighted way), a numeric method the first that it finds on its way from there.
         all: Every solution that the method finds, not just one: a closed form gives all there are (of a singular
             pose representatives), a numeric one those it comes across, full turns of a joint counted apart.
         world: If given, solutions in collision are left out. Its robot must be this one.

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.constraints.held_regions import held_regions
+from rrtik_ompl.constraints.residuals import projected_rows
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.planning.path_costs import least_cost, length
 
@@ -96,13 +98,51 @@ def test_goals_of_the_tip_are_reached(problem):
 
 
 @pytest.mark.kernels
-def test_single_joint_moves_know_no_weights(problem):
-    plain, heavy, _ = problem
-    one, other = (rrtik.plan(each, "bicrdt", seed=1).path for each in (plain, heavy))
-    assert (one.waypoints == other.waypoints).all()
-    again = rrtik.shorten(other, heavy)
-    assert again.one_joint_at_a_time
-    assert (again.waypoints == rrtik.shorten(one, plain).waypoints).all()
+def test_weights_are_the_costs_of_single_joint_moves_unless_these_are_given(problem):
+    plain, heavy, weights = problem
+    costs, even = {"joint_costs": weights.tolist()}, {"joint_costs": 1.0}
+    one, other = (rrtik.plan(plain, "bicrdt", seed=1, parameters=given).path for given in (costs, {}))
+    assert (rrtik.plan(heavy, "bicrdt", seed=1).path.waypoints == one.waypoints).all()
+    assert (rrtik.plan(heavy, "bicrdt", seed=1, parameters=even).path.waypoints == other.waypoints).all()
+    rules = rrtik.MoveRules(plain.robot.joint_names, **costs)
+    shorter = rrtik.shorten(one, heavy)
+    assert (shorter.waypoints == rrtik.shorten(one, plain, rules=rules).waypoints).all()
+
+
+@pytest.mark.kernels
+def test_paths_under_constraints_are_shortened_by_weighted_length_and_held():
+    base, ratios = rrtik.load_robot("panda"), []
+    upright = [rrtik.upright(base, tolerance_deg=10.0)]
+    for k, (world, heavy, start, _, weights) in enumerate(cases(4)):
+        rows = np.random.default_rng(k).uniform(*base.finite_range(), (400, base.dof))
+        rows, there = projected_rows(base, held_regions(base, world.scene, upright, start), rows)
+        goal = rows[there & world.valid_batch(rows)][0]
+        plain, other = (rrtik.Problem(each, start, goal, constraints=upright) for each in (world, heavy))
+        path = rrtik.plan(other, "cbirrt", seed=0).path
+        assert path.violations(other.world) == ()
+        assert (path.waypoints[[0, -1]] == [start, goal]).all()
+        shorter = rrtik.shorten(path, other, seed=0)
+        assert shorter.violations(other.world) == ()
+        assert weighted_length(shorter, weights) <= weighted_length(path, weights)
+        ratios.append(weighted_length(shorter, weights) / weighted_length(rrtik.shorten(path, plain, seed=0), weights))
+    assert np.mean(ratios) < 0.98
+
+
+def test_the_nearest_solution_of_inverse_kinematics_is_so_by_the_weighted_way():
+    base = rrtik.load_robot("puma560")
+    heavy = rrtik.weighted(base, {base.joint_names[0]: 100.0})
+    near, scale = base.finite_range()[0] * 0.5, np.array([100.0, *[1.0] * 5])
+    poses = base.fk_batch(np.random.default_rng(3).uniform(*base.finite_range(), (12, 6)))
+    best, changed = rrtik.solve_ik_batch(heavy, poses, near=near).q, 0
+    for pose, found in zip(poses, best, strict=True):
+        goal = rrtik.PoseGoal(pose)
+        every = rrtik.solve_ik(heavy, goal, near=near, all=True).solutions
+        ways = np.linalg.norm((every - near) * scale, axis=1)
+        assert (np.diff(ways) >= 0.0).all()
+        assert found == pytest.approx(every[0], abs=1e-9)
+        assert rrtik.solve_ik(heavy, goal, near=near).solutions[0] == pytest.approx(every[0], abs=1e-9)
+        changed += not np.allclose(rrtik.solve_ik(base, goal, near=near).solutions[0], every[0])
+    assert changed > 0
 
 
 def test_weights_are_an_option_of_every_robot_and_stand_in_files(tmp_path):
