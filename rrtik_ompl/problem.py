@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import TAU, Vector, frozen
 from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.constraints.contradiction import contradiction
 from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.copies import as_value, in_notebook, shallow_copy
@@ -82,9 +83,9 @@ class Problem:
         self.constraints = tuple(each.region for each in held.regions)
         if held.regions:
             self.world = world = HoldingWorld(world, held)
-            _keep(held, self.start, "start")
+            _keep(world.robot, held, self.start, "start")
         if isinstance(wanted, JointGoal):
-            _keep(held, ends["goal"], "goal")
+            _keep(world.robot, held, ends["goal"], "goal")
             wanted = JointGoal(_nearest_turn(world, self.start, ends["goal"]), wanted.tolerance)
         elif any(part.frame or part.from_start for part in parts_of(wanted) if isinstance(part, TaskRegion)):
             raise InputError("goal region: frame and from_start are for path constraints; a goal is of the tip")
@@ -173,9 +174,10 @@ def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
     return ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs, part=what)
 
 
-def _keep(held: HeldRegions, q: Vector, what: str) -> None:
+def _keep(robot: Robot, held: HeldRegions, q: Vector, what: str) -> None:
     if fault := held.explain(q):
-        raise ProblemError(f"{what} breaks {fault}; move it, or widen the tolerance", part=what)
+        remedy = contradiction(robot, held) or "move it, or widen the tolerance"
+        raise ProblemError(f"{what} breaks {fault}; {remedy}", part=what)
 
 
 def _nearest_turn(world: World, start: Vector, q: Vector) -> Vector:

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.constraints.held_region import HeldRegion, frame_place, held_region
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, listed
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.task_region import TaskRegion
@@ -91,7 +91,7 @@ def held_regions(robot: Robot, scene: Scene, regions: Iterable[TaskRegion], star
         InputError: If one of them is no region, names no frame, or cannot be held.
     """
     prepared = []
-    for number, region in enumerate(regions, 1):
+    for number, region in enumerate(listed(regions, "path constraints"), 1):
         label = f"path constraint {number}"
         if not isinstance(region, TaskRegion):
             raise InputError(

@@ -26,7 +26,7 @@ FIRST_ITERATIONS = 4_000  # of each planner for a motion between postures; four 
 GROWTH = 4
 ROUNDS = 8
 NAMED = 6  # stages whose failures a reason names
-MOST_WORDS = 160  # letters of one failure
+MOST_WORDS = 300  # letters of one failure
 
 
 @dataclass(frozen=True, slots=True, eq=False)

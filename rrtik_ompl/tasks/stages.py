@@ -170,7 +170,8 @@ class Gripper:
             not_negative(self.width, "width of Gripper")
 
     def __str__(self) -> str:
-        return f"Gripper '{self.state}'"
+        width = "" if self.width is None else f" to {1e3 * self.width:g} mm"
+        return f"Gripper '{self.state}'{width}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
@@ -37,11 +38,13 @@ from rrtik_ompl.problem_files.scene import PoseEntry, SceneEntry, pose_data
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.tasks import Task
+from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight
 from rrtik_ompl.tasks.through import placed_constraints
 from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
 
 NO_STAGES = "it has a goal and no stages"
+NUMBER = re.compile(r"stage (\d+)")
 OF_TASKS = ("task", "goals")  # keys, one of which a task file has
 
 
@@ -231,7 +234,21 @@ def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
         world = World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
     with document.at(("start",)):
         start = usable_configuration(world, entry.start.configuration(robot), "start")
-    return LoadedTask(world, start, Task(_stages(document, entry, world, start)), path.stem)
+    task = Task(_stages(document, entry, world, start))
+    for key in OF_TASKS:
+        if getattr(entry, key) is not None:
+            _check(document, key, task, world)
+    return LoadedTask(world, start, task, path.stem)
+
+
+def _check(document: YamlDocument, key: str, task: Task, world: World) -> None:
+    """Refuse what can never be done, with the line of the stage."""
+    try:
+        check_program(steps_of(task.stages), world)
+    except InputError as error:
+        first = NUMBER.match(str(error))
+        with document.at((key, int(first[1]) - 1) if first else (key,)):
+            raise
 
 
 def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector) -> list[Stage]:

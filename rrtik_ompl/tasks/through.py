@@ -50,7 +50,7 @@ def placed_constraints(
     Raises:
         ProblemError: If the start does not keep them, or cannot be used.
     """
-    held = tuple(constraints)
+    held = listed(constraints, "path constraints")
     return Problem(world, start, start, constraints=held).constraints if held else ()
 
 

@@ -167,8 +167,20 @@ def test_a_start_or_goal_outside_is_refused_by_name_and_amount(ur5):
         rrtik.Problem(world, START, goal, constraints=[rrtik.inside(T, [9, 9, 9]), rrtik.upright(ur5)])
 
 
+def test_constraints_that_contradict_each_other_or_are_out_of_reach_are_named(ur5):
+    world, T = rrtik.World(ur5), ur5.fk(START)
+    low, high = (rrtik.on_plane(T.act(np.array([0.0, 0.0, z])), T.rotation[:, 2]) for z in (0.0, 0.3))
+    with pytest.raises(ProblemError, match=r"keeps both path constraint 2 and path constraint 3: .* missed by 29\d mm"):
+        rrtik.Problem(world, START, START, constraints=[rrtik.upright(ur5), low, high])
+    far = rrtik.on_plane([0.0, 0.0, 5.0], [0.0, 0.0, 1.0])
+    with pytest.raises(ProblemError, match="no configuration was found that keeps path constraint 1: is its region in"):
+        rrtik.Problem(world, START, START, constraints=[far])
+
+
 def test_what_makes_no_sense_is_refused_in_a_line(ur5):
     world, T = rrtik.World(ur5), ur5.fk(START)
+    with pytest.raises(InputError, match="path constraints must be a list, got TaskRegion"):
+        rrtik.Problem(world, START, START, constraints=rrtik.upright(ur5))
     with pytest.raises(UnknownNameError, match="frame of path constraint 1"):
         rrtik.Problem(world, START, START, constraints=[rrtik.upright(ur5, frame="mug")])
     with pytest.raises(InputError, match="path constraint 1 must be a TaskRegion, got str"):

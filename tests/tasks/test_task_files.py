@@ -139,6 +139,11 @@ def test_the_page_plays_a_task_in_the_time_that_it_takes(small):
     [
         ("attach: {object: part,", "attach: {object: cup,", "no obstacle 'cup'"),
         ("detach: part", "detach: [part]", "detach"),
+        (
+            "  - straight: {by: [0, 0, 0.05]}\n",
+            "  - detach: part\n",
+            "small.yaml:9: task[0]: stage 1 (Detach 'part'): ",
+        ),
         ("by: [0, 0, 0.05], frame: tip", "frame: tip", "needs exactly one of by, to"),
         ("by: [0, 0, 0.05], frame: tip", "by: [0, 0, 0], frame: tip", "leads nowhere"),
         ("posture: up", "posture: down", "posture"),
