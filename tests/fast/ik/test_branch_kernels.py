@@ -18,12 +18,13 @@ from rrtik_ompl.ik.analytic.reference_branches import reference_branches
 from rrtik_ompl.poses import pose_from_rpy
 from rrtik_robots.puma560 import singular_samples as puma_samples
 from rrtik_robots.titan4 import singular_samples as titan_samples
+from rrtik_tests.sizes import how_many
 
 pytestmark = pytest.mark.kernels
 
 ARMS = ("titan4", "puma560")
 ROUNDING = 1e-12
-COUNT = 100_000
+COUNT = how_many(100_000, 20_000)
 BASE = pose_from_rpy([1.0, -2.0, 0.5], [0.4, -0.7, 2.0])
 ULP = np.finfo(np.float64).eps
 

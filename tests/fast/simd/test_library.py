@@ -110,9 +110,9 @@ def test_plain_numpy_answers_the_same(filled):
 
 @pytest.mark.slow
 def test_both_widths_answer_the_same(filled, tmp_path):
-    for width in ("8", "16"):
-        answers, _, said = finished(start(RRTIK_CACHE=str(tmp_path), RRTIK_LANES=width))
-        assert (answers, said) == (filled[1], "compiling\n")
+    other = "8" if compiled.WIDTH == 16 else "16"
+    answers, _, said = finished(start(RRTIK_CACHE=str(tmp_path), RRTIK_LANES=other))
+    assert (answers, said) == (filled[1], "compiling\n")
 
 
 @pytest.mark.slow
