@@ -13,6 +13,7 @@ from rrtik_ompl.world.proof import Prover
 class MovingProver(Prover):
     """As :class:`Prover`; obstacles are moved in its table, which is packed once."""
 
+    _fixed = False
     _room: Sequence[float] | None = None
     _moved: MovedObstacles | None = None
 

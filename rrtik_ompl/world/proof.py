@@ -118,6 +118,8 @@ class Prover:
         self_margin: What links, and what they hold, keep from each other [m].
     """
 
+    _fixed = True  # whether obstacles stay where they are
+
     def __init__(
         self,
         robot: Robot,
@@ -203,8 +205,7 @@ class Prover:
     def table(self, clearance: float) -> int:
         """Where the table is for kernels that prove motions of their own, with a clearance [m] until the next proof.
 
-        They keep a little more than what is asked for, so that a proof from the other end of a motion agrees. Planes
-        are forgotten, so that nothing depends on what was proven before.
+        They keep a little more, so that a proof from the other end of a motion agrees, and forget earlier planes.
         """
         packed = self._packed_for(clearance, SPARE)
         packed.table[WAYS][:] = 0.0
@@ -287,7 +288,8 @@ class Prover:
         """The table, with a clearance and a slack to keep."""
         if self._packed is None:
             solids = [convex_solids(body.geometry) for body in self.bodies]
-            self._packed = proof_pairs(self.robot.chain, self.bodies, self.pairs, solids, strokes(self.robot))
+            arm = self.robot.chain, self.bodies, self.pairs
+            self._packed = proof_pairs(*arm, solids, strokes(self.robot), fixed=self._fixed)
         self._packed.keep(clearance, slack)
         return self._packed
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from rrtik_ompl.fast.checks.broad_phase import primitives_in_reach
 from rrtik_ompl.fast.checks.check_kernels import load_row, sound_count
 from rrtik_ompl.fast.checks.kinematics import forward_kinematics
 from rrtik_ompl.fast.checks.obstacle_kernels import (
     UNBOUNDED_DISTANCE,
     ZERO,
     primitive_gap,
-    primitives_in_reach,
 )
 from rrtik_ompl.fast.checks.sphere_kernels import place_cluster, placed_centre, prepare
 from rrtik_ompl.fast.simd.compiled import WIDTH, entry, inlined, kernel

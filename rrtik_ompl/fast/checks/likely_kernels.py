@@ -6,7 +6,8 @@ that meets something moves up by one place [62]; one that was found in the full 
 
 from __future__ import annotations
 
-from rrtik_ompl.fast.checks.obstacle_kernels import meets_primitives, primitives_in_reach
+from rrtik_ompl.fast.checks.broad_phase import primitives_in_reach
+from rrtik_ompl.fast.checks.obstacle_kernels import meets_primitives
 from rrtik_ompl.fast.checks.sphere_kernels import checked_primitives, placed_centre
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.tables.accessors import (

@@ -1,8 +1,8 @@
 """Kernels of one ball against one primitive: whether it meets the ball, and how far it is away, in all lanes at once.
 
-The broad phase, that is which primitives are in reach of a ball, stands here too. A set of lanes is an integer, one bit
-a lane. Primitives: see :mod:`rrtik_ompl.fast.tables.layout`; a primitive of an unknown kind counts as met everywhere,
-and :func:`kinds_known` says so.
+Which primitives are in reach of a ball at all: :mod:`rrtik_ompl.fast.checks.broad_phase`. A set of lanes is an integer,
+one bit a lane. Primitives: see :mod:`rrtik_ompl.fast.tables.layout`; a primitive of an unknown kind counts as met
+everywhere, and :func:`kinds_known` says so.
 """
 
 from __future__ import annotations
@@ -19,12 +19,8 @@ from rrtik_ompl.fast.simd.lanes import (
     absolute,
     bits,
     choose,
-    first_bit,
-    highest,
     int_at,
-    lanes_at,
     larger,
-    lowest,
     set_int,
     smaller,
     spread,
@@ -34,7 +30,6 @@ from rrtik_ompl.fast.simd.vectors import along, squared
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.accessors import (
     Vector,
-    boxes_of,
     centre_of,
     end_plane_of,
     first_axis_of,
@@ -45,7 +40,6 @@ from rrtik_ompl.fast.tables.accessors import (
     kind_of,
     normal_of,
     offset_of,
-    padded_count_of,
     plane_at,
     planes_of,
     primitive_count_of,
@@ -59,7 +53,6 @@ from rrtik_ompl.fast.tables.accessors import (
 from rrtik_ompl.fast.tables.layout import (
     KIND_COUNT,
     NO_MARKS,
-    LaneArray,
     Marks,
     PlaneArray,
     PrimitiveHead,
@@ -263,33 +256,3 @@ def meets_primitives(
                 body = standing_body_of(head)
                 set_int(marks, body, int_at(marks, body) | found)
     return meeting, kept
-
-
-@inlined
-def box_side(boxes: LaneArray, side: int, run: int, block: int) -> Any:
-    """A side of ``WIDTH`` bounding boxes."""
-    return lanes_at(boxes, side * run + block)
-
-
-@kernel
-def primitives_in_reach(primitives: PrimitiveTable, x: Any, y: Any, z: Any, radius: float, found: PrimitiveList) -> int:
-    """List the primitives whose bounding box meets the box around a ball in all lanes; returns their number.
-
-    Here the lanes hold primitives, not configurations.
-    """
-    low_x, high_x = lowest(x) - radius, highest(x) + radius
-    low_y, high_y = lowest(y) - radius, highest(y) + radius
-    low_z, high_z = lowest(z) - radius, highest(z) + radius
-    boxes = boxes_of(primitives)
-    run = padded_count_of(primitives) // WIDTH
-    count = 0
-    for k in range(run):
-        inside_x = (box_side(boxes, layout.LOW_X, run, k) < high_x) & (box_side(boxes, layout.HIGH_X, run, k) > low_x)
-        inside_y = (box_side(boxes, layout.LOW_Y, run, k) < high_y) & (box_side(boxes, layout.HIGH_Y, run, k) > low_y)
-        inside_z = (box_side(boxes, layout.LOW_Z, run, k) < high_z) & (box_side(boxes, layout.HIGH_Z, run, k) > low_z)
-        left = bits(inside_x & inside_y & inside_z)
-        while left != 0:
-            set_int(found, count, k * WIDTH + first_bit(left))
-            count += 1
-            left &= left - 1
-    return count

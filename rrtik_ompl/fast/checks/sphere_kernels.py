@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from rrtik_ompl.fast.checks.obstacle_kernels import meets_primitives, primitives_in_reach
+from rrtik_ompl.fast.checks.broad_phase import primitives_in_reach
+from rrtik_ompl.fast.checks.obstacle_kernels import meets_primitives
 from rrtik_ompl.fast.checks.watch_kernels import ZERO, set_clear, slack_at
 from rrtik_ompl.fast.simd.compiled import inlined, kernel
 from rrtik_ompl.fast.simd.lanes import int_at, set_int

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +14,7 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.cloud_frames import cloud_bodies, cloud_poses
+from rrtik_ompl.fast.proof.groups import Members, compared_as_one
 from rrtik_ompl.fast.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
 from rrtik_ompl.fast.tables.cloud_tables import cloud_table
 from rrtik_ompl.fast.tables.layout import CLOUD_SOLID, HALF_SPACE_SOLID
@@ -24,7 +24,6 @@ from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, Solids, placed_bodi
 from rrtik_ompl.robot import Chain
 
 ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
-Members: TypeAlias = tuple[int, ...]  # numbers of bodies
 KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE, CLOUD_SOLID: CLOUD}
 SIZED = (IS_CONVEX, CLOUD_SOLID)  # have a ball and a box around them
 
@@ -64,6 +63,8 @@ def proof_pairs(
     pairs: Sequence[tuple[int, int]],
     solids: Sequence[Solids],
     strokes: ArrayLike,
+    *,
+    fixed: bool = True,
 ) -> ProofPairs:
     """Pack a proof.
 
@@ -73,6 +74,7 @@ def proof_pairs(
         pairs: Numbers of those that must not touch; pairs that both stand still are left out.
         solids: For each body convex solids around it, in its own frame.
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
+        fixed: Whether obstacles stay where they are; neighbours among many are compared as one then.
     """
     joints = len(chain.parent)
     parts = [own.around or (_NOTHING,) for own in placed_bodies(solids, body_arrays(bodies).placements)]
@@ -87,8 +89,8 @@ def proof_pairs(
     on = [body.joint for body in bodies]
     common = cache(partial(_common, chain))
     moving = [(i, j) for i, j in pairs if on[i] or on[j]]
-    groups = _groups(bodies, parts, moving)
-    grouped = {(member, still): None for (members, still) in groups for member in members}  # in this order
+    groups = compared_as_one(bodies, parts, moving, fixed=fixed)
+    grouped = {(k, still): None for members, blocks in groups for block in blocks for still in block for k in members}
     for i, j in [*grouped, *(pair for pair in moving if pair not in grouped and pair[::-1] not in grouped)]:
         base = common(on[i], on[j])
         one, other = (i, j) if base == on[j] else (j, i)
@@ -105,19 +107,22 @@ def proof_pairs(
         numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
         span = (first, len(of_parts))
         whole.append((ends[one], ends[other], base, *own, *span, one, numbers[0], other, numbers[1]))
-    of_groups, first = [], -len(whole)
-    for number, (members, still) in enumerate(groups):
+    together: dict[Members, int] = {}  # numbers of the solids around several bodies
+    of_groups, first = [], 0
+    for members, blocks in groups:
+        mover = together.setdefault(members, ends[-1] + len(together)) if len(members) > 1 else ends[members[0]]
         sweep = sweeps.setdefault((members, 0), len(sweeps))
-        parted = (first, first + len(members))
-        of_groups.append((ends[-1] + number, ends[still], 0, sweep, -1, *parted, members[0], -1, still, -1))
-        first += len(members)
+        for block in blocks:
+            other = together.setdefault(block, ends[-1] + len(together)) if len(block) > 1 else ends[block[0]]
+            parted = (first, first + len(members) * len(block))
+            of_groups.append((mover, other, 0, sweep, -1, *parted, members[0], -1, block[0], -1))
+            first = parted[1]
     rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 4)
-    split_rows = np.r_[: len(whole), len(whole) + len(of_parts) : len(rows)]
-    rows[split_rows, layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
+    rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
     top = [*range(len(whole) + len(of_parts), len(rows)), *range(len(grouped), len(whole))]
     sides = rows[:, layout.PAIR_SIZE :]
     named = np.sort(sides[:, ::2], axis=1)
-    packed = _solid_arrays(bodies, parts, [members for members, _ in groups])
+    packed = _solid_arrays(bodies, parts, list(together))
     clouds = [cloud_table(bodies[k].geometry) for k in cloud_bodies(bodies)]
     made = table(
         {
@@ -155,20 +160,10 @@ def proof_pairs(
     )
     arrays = body_arrays(bodies)
     beside = np.asarray(arrays.obstacles[named].any(axis=1))
-    return ProofPairs(made, named, sides, arrays.kept_apart(named), beside)
-
-
-def _groups(
-    bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], pairs: Sequence[tuple[int, int]]
-) -> list[tuple[Members, int]]:
-    """Bodies of one joint with one padding, two or more, each with a body that stands still and is none's to touch."""
-    found: dict[tuple[int, float, int], list[int]] = {}
-    convex = [all(solid.kind == IS_CONVEX for solid in own) for own in parts]
-    for i, j in pairs:
-        mover, still = (i, j) if bodies[j].joint == 0 else (j, i)
-        if bodies[still].joint == 0 and convex[mover] and convex[still]:
-            found.setdefault((bodies[mover].joint, bodies[mover].padding, still), []).append(mover)
-    return [(tuple(members), still) for (_, _, still), members in found.items() if len(members) > 1]
+    margins = arrays.kept_apart(named)
+    for row in range(len(whole) + len(of_parts), len(rows)):
+        margins[row] = margins[slice(*rows[row, layout.PARTS_FIRST : layout.PARTS_END + 1])].max()
+    return ProofPairs(made, named, sides, margins, beside)
 
 
 _NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)

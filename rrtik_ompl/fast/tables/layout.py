@@ -113,9 +113,11 @@ BOUND_BLOCKS, BOUNDS = range(2)
 # Primitives: what stands still. BOXES: BOX_RUNS of PADDED_COUNT floats · NUMBERS: the heads · PRIMITIVES: the
 # shapes · CHECKED: one int for each moving and standing body, 0 to ignore that pair ·
 # EXCLUDING: for each moving body whether it has a pair to ignore · OWN: for each standing body the primitive that has
-# its formula, or any of its balls, -1 if it has none · CLOUDS: addresses of the tables of clouds
+# its formula, or any of its balls, -1 if it has none · CLOUDS: addresses of the tables of clouds · BLOCK_BOXES: as
+# BOXES, around each BLOCK primitives, BLOCK_COUNT of them; 0 where primitives are few
 PRIMITIVE_COUNT, PADDED_COUNT, BOXES, PRIMITIVES, NUMBERS, PLANES, STANDING_COUNT, CHECKED, EXCLUDING, OWN = range(10)
-CLOUDS = 10
+CLOUDS, BLOCK_COUNT, BLOCK_BOXES = range(10, 13)
+BLOCK = 16  # primitives: boxes are compared this many at a time, or half as many
 LOW_X, HIGH_X, LOW_Y, HIGH_Y, LOW_Z, HIGH_Z = BOX_RUNS = range(6)
 # Head of a primitive (ints): kind, number of its standing body, planes from, to (of a cloud: its number among these).
 HEAD_INTS = 4

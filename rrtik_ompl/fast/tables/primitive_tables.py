@@ -1,4 +1,4 @@
-"""Primitives as a flat table for the kernels: sorted by kind, with their bounding boxes.
+"""Primitives as a flat table for the kernels: sorted by kind, with their bounding boxes, and boxes around neighbours.
 
 The outer primitives of a scene (they contain its bodies) and the inner ones (the bodies contain them) have tables of
 the same layout, so that one kernel serves both.
@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.tables.layout import (
+    BLOCK,
+    BLOCK_BOXES,
+    BLOCK_COUNT,
     BOX_RUNS,
     BOXES,
     CHECKED,
@@ -42,8 +45,9 @@ from rrtik_ompl.fast.tables.layout import (
     STANDING_COUNT,
 )
 from rrtik_ompl.fast.tables.memory import Table, table
+from rrtik_ompl.fast.tables.z_order import z_order
 
-LANE_PADDING = 16  # boxes are compared this many at a time, or half as many
+MANY = 64  # primitives, from which on those that are near each other are looked at as a block first
 UNBOUNDED_COORDINATE = 1e30  # [m]
 
 Detail: TypeAlias = Matrix | Table | None
@@ -108,7 +112,7 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table
     unknown = sorted(set(primitives.kinds.tolist()) - set(KINDS))
     if unknown:
         raise InputError(f"primitives for kernels: unknown kind {unknown[0]}; have {KINDS.start} to {KINDS.stop - 1}")
-    ordered = primitives.only(np.lexsort((primitives.bodies, primitives.kinds)))
+    ordered = primitives.only(_order(primitives))
     heads = np.zeros((len(ordered), HEAD_INTS), dtype=np.int32)
     planes = [detail for detail in ordered.details if isinstance(detail, np.ndarray)]
     clouds = [detail for detail in ordered.details if isinstance(detail, Table)]
@@ -118,7 +122,8 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table
     heads[ordered.kinds == CLOUD, FIRST_PLANE] = np.arange(len(clouds))
     own = np.full(checked.shape[1], -1, dtype=np.int32)
     own[ordered.bodies] = np.arange(len(ordered))  # the last one of a body remains
-    boxes = _bounding_boxes(ordered)
+    boxes = _bounding_boxes(ordered.lows, ordered.highs)
+    blocks = _blocks(ordered)
     return table(
         {
             PRIMITIVE_COUNT: len(ordered),
@@ -132,18 +137,35 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table
             EXCLUDING: np.asarray((~checked).any(axis=1), dtype=np.int32),
             OWN: own,
             CLOUDS: np.array([cloud.address for cloud in clouds], dtype=np.int64),
+            BLOCK_COUNT: blocks.shape[1],
+            BLOCK_BOXES: blocks,
         },
         clouds,
     )
 
 
-def _bounding_boxes(primitives: Primitives) -> NDArray[np.float32]:
-    """Sides of boxes around primitives, a run for each side, filled up with boxes that nothing meets."""
-    padded = -(-len(primitives) // LANE_PADDING) * LANE_PADDING
+def _bounding_boxes(lows: Matrix, highs: Matrix) -> NDArray[np.float32]:
+    """Sides of boxes, a run for each side, filled up with boxes that nothing meets."""
+    padded = -(-len(lows) // BLOCK) * BLOCK
     boxes = np.empty((len(BOX_RUNS), padded), dtype=np.float32)
     low, high = boxes[LOW_X : HIGH_Z + 1 : 2], boxes[HIGH_X : HIGH_Z + 1 : 2]
     low[:], high[:] = UNBOUNDED_COORDINATE, -UNBOUNDED_COORDINATE
-    lows, highs = (ends.T.astype(np.float32) for ends in (primitives.lows, primitives.highs))
-    low[:, : len(primitives)] = np.nextafter(lows, np.float32(-np.inf))
-    high[:, : len(primitives)] = np.nextafter(highs, np.float32(np.inf))
+    low[:, : len(lows)] = np.nextafter(lows.T.astype(np.float32), np.float32(-np.inf))
+    high[:, : len(highs)] = np.nextafter(highs.T.astype(np.float32), np.float32(np.inf))
     return boxes
+
+
+def _blocks(primitives: Primitives) -> NDArray[np.float32]:
+    """Boxes around each BLOCK primitives; none where these are few."""
+    if len(primitives) < MANY:
+        return _bounding_boxes(primitives.lows[:0], primitives.highs[:0])
+    firsts = np.arange(0, len(primitives), BLOCK)
+    return _bounding_boxes(np.minimum.reduceat(primitives.lows, firsts), np.maximum.reduceat(primitives.highs, firsts))
+
+
+def _order(primitives: Primitives) -> NDArray[np.int64]:
+    """By kind, then by body, or where there are many so that neighbours come one after the other."""
+    if len(primitives) < MANY:
+        return np.lexsort((primitives.bodies, primitives.kinds))
+    order = z_order(0.5 * primitives.lows + 0.5 * primitives.highs)
+    return order[np.argsort(primitives.kinds[order], kind="stable")]

@@ -43,6 +43,19 @@ function primitiveOf(kernels, obstacle, pose, grow) {
   return { numbers: [...centre, ...z, tall, radius], spread, thickness: Math.min(radius, tall) };
 }
 
+/** Boxes around neighbours, of which one has moved. */
+function placeBlock(kernels, table, row) {
+  const [boxes, padded, blocks, count] = ["BOXES", "PADDED_COUNT", "BLOCK_BOXES", "BLOCK_COUNT"].map((name) => table.get(name));
+  if (count === 0) return;
+  const size = kernels.plan.names.table.BLOCK;
+  const block = Math.floor(row / size);
+  for (let side = 0; side < 6; side += 1) {
+    const first = boxes / LANE_BYTES + side * padded + block * size;
+    const own = kernels.floats.subarray(first, first + size);
+    kernels.floats[blocks / LANE_BYTES + side * count + block] = side % 2 === 0 ? Math.min(...own) : Math.max(...own);
+  }
+}
+
 function placePrimitive(kernels, tableName, obstacle, pose, grow) {
   const names = kernels.plan.names.table;
   const table = kernels.table(kernels.world.get(tableName), names);
@@ -60,6 +73,7 @@ function placePrimitive(kernels, tableName, obstacle, pose, grow) {
     kernels.floats[boxes + 2 * i * padded + row] = nextFloat(low, false);
     kernels.floats[boxes + (2 * i + 1) * padded + row] = nextFloat(high, true);
   }
+  placeBlock(kernels, table, row);
 }
 
 function placeSolid(kernels, obstacle, pose) {

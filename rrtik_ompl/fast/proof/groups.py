@@ -1,0 +1,59 @@
+"""What proofs compare as one at first: bodies of one joint, and obstacles that stand near each other.
+
+A ball and a box around all of them answer for many pairs at once, wherever an arm is far from a part of the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.fast.tables.layout import CONVEX_SOLID
+from rrtik_ompl.fast.tables.solid_tables import ConvexSolid
+from rrtik_ompl.fast.tables.z_order import z_order
+
+MANY = 32  # obstacles, from which on neighbours among them are compared as one
+BLOCK = 16  # so many neighbours
+
+Members: TypeAlias = tuple[int, ...]  # numbers of bodies
+Parts: TypeAlias = Sequence[Sequence[ConvexSolid]]
+
+
+def compared_as_one(
+    bodies: Sequence[Body], parts: Parts, pairs: Sequence[tuple[int, int]], *, fixed: bool
+) -> list[tuple[Members, list[Members]]]:
+    """Bodies of one joint with one padding, each with blocks of standing bodies that none of them may touch.
+
+    One that is alone is listed beside many obstacles only.
+
+    Args:
+        bodies: All bodies.
+        parts: The solids of each.
+        pairs: Those that must not touch.
+        fixed: Whether obstacles stay where they are; of many, neighbours are blocks then, otherwise each is one.
+    """
+    movers: dict[tuple[int, float, int], list[int]] = {}
+    convex = [all(solid.kind == CONVEX_SOLID for solid in own) for own in parts]
+    for i, j in pairs:
+        mover, still = (i, j) if bodies[j].joint == 0 else (j, i)
+        if bodies[still].joint == 0 and convex[mover] and convex[still]:
+            movers.setdefault((bodies[mover].joint, bodies[mover].padding, still), []).append(mover)
+    beside: dict[Members, list[int]] = {}
+    for (_, _, still), members in movers.items():
+        beside.setdefault(tuple(members), []).append(still)
+    made = []
+    for members, stills in beside.items():
+        if fixed and len(stills) >= MANY:
+            made.append((members, _blocks(parts, stills)))
+        elif len(members) > 1:
+            made.append((members, [(still,) for still in stills]))
+    return made
+
+
+def _blocks(parts: Parts, stills: Sequence[int]) -> list[Members]:
+    """Neighbours in space, up to BLOCK of them at a time."""
+    order = z_order(np.array([parts[k][0].corners.mean(axis=0) for k in stills])).tolist()
+    return [tuple(stills[k] for k in order[first : first + BLOCK]) for first in range(0, len(order), BLOCK)]
