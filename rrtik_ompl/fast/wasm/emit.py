@@ -54,7 +54,8 @@ def _exported(code: Code, name: str, layout: str) -> str:
     text = re.sub(r'target datalayout = "[^"]*"', f'target datalayout = "{layout}"', text)
     for entry in code.entries:
         shown = f"{name}_{entry}"
-        old, new = rf"(define [^\n]*)@{PREFIX}{entry}(\([^\n]*?\))", rf'\1@{shown}\2 "wasm-export-name"="{shown}"'
+        old = rf"(define [^\n]*)@{PREFIX}{entry}(\([^\n]*?\)(?: local_unnamed_addr| unnamed_addr)?)"
+        new = rf'\1@{shown}\2 "wasm-export-name"="{shown}"'
         text, count = re.subn(old, new, text)
         if count != 1:
             raise RuntimeError(f"WebAssembly: {name} has {count} functions {entry}")

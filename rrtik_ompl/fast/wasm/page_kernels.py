@@ -19,7 +19,7 @@ LIBRARIES = {
     "check": "checks.check_kernels",
     "distance": "checks.distance_kernels",
 }
-LAYOUT = 1
+LAYOUT = 2
 COMPILING_PAGES = "compiling the kernels of pages that plan, once per machine: some 20 s"
 
 
