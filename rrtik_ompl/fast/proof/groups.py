@@ -45,11 +45,11 @@ def compared_as_one(
     for (_, _, still), members in movers.items():
         beside.setdefault(tuple(members), []).append(still)
     made = []
-    for members, stills in beside.items():
+    for together, stills in beside.items():
         if fixed and len(stills) >= MANY:
-            made.append((members, _blocks(parts, stills)))
-        elif len(members) > 1:
-            made.append((members, [(still,) for still in stills]))
+            made.append((together, _blocks(parts, stills)))
+        elif len(together) > 1:
+            made.append((together, [(still,) for still in stills]))
     return made
 
 
