@@ -107,16 +107,7 @@ def proof_pairs(
         numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
         span = (first, len(of_parts))
         whole.append((ends[one], ends[other], base, *own, *span, one, numbers[0], other, numbers[1]))
-    together: dict[Members, int] = {}  # numbers of the solids around several bodies
-    of_groups, first = [], 0
-    for members, blocks in groups:
-        mover = together.setdefault(members, ends[-1] + len(together)) if len(members) > 1 else ends[members[0]]
-        sweep = sweeps.setdefault((members, 0), len(sweeps))
-        for block in blocks:
-            other = together.setdefault(block, ends[-1] + len(together)) if len(block) > 1 else ends[block[0]]
-            parted = (first, first + len(members) * len(block))
-            of_groups.append((mover, other, 0, sweep, -1, *parted, members[0], -1, block[0], -1))
-            first = parted[1]
+    of_groups, together = _group_rows(groups, ends, sweeps)
     rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 4)
     rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
     top = [*range(len(whole) + len(of_parts), len(rows)), *range(len(grouped), len(whole))]
@@ -161,9 +152,36 @@ def proof_pairs(
     arrays = body_arrays(bodies)
     beside = np.asarray(arrays.obstacles[named].any(axis=1))
     margins = arrays.kept_apart(named)
-    for row in range(len(whole) + len(of_parts), len(rows)):
-        margins[row] = margins[slice(*rows[row, layout.PARTS_FIRST : layout.PARTS_END + 1])].max()
+    margins[len(whole) + len(of_parts) :] = [
+        margins[row[layout.PARTS_FIRST] : row[layout.PARTS_END]].max() for row in of_groups
+    ]
     return ProofPairs(made, named, sides, margins, beside)
+
+
+def _group_rows(
+    groups: Sequence[tuple[Members, Sequence[Members]]], ends: Sequence[int], sweeps: dict[tuple[Members, int], int]
+) -> tuple[list[tuple[int, ...]], dict[Members, int]]:
+    """Pairs of several bodies, made of those that begin the table, and the numbers of the solids around several.
+
+    Args:
+        groups: Bodies of one joint, each with blocks of obstacles.
+        ends: The number of each body's solid, and how many there are.
+        sweeps: Numbers of the sweeps; those of the groups are added.
+    """
+    rows: list[tuple[int, ...]] = []
+    together: dict[Members, int] = {}
+    first = 0
+
+    def solid(members: Members) -> int:
+        return ends[members[0]] if len(members) == 1 else together.setdefault(members, ends[-1] + len(together))
+
+    for members, blocks in groups:
+        sweep = sweeps.setdefault((members, 0), len(sweeps))
+        for block in blocks:
+            end = first + len(members) * len(block)
+            rows.append((solid(members), solid(block), 0, sweep, -1, first, end, members[0], -1, block[0], -1))
+            first = end
+    return rows, together
 
 
 _NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)
