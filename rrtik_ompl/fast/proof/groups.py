@@ -53,6 +53,32 @@ def compared_as_one(
     return made
 
 
+def group_rows(
+    groups: Sequence[tuple[Members, Sequence[Members]]], ends: Sequence[int], sweeps: dict[tuple[Members, int], int]
+) -> tuple[list[tuple[int, ...]], dict[Members, int]]:
+    """Pairs of several bodies, made of those that begin the table, and the numbers of the solids around several.
+
+    Args:
+        groups: Bodies of one joint, each with blocks of obstacles.
+        ends: The number of each body's solid, and how many there are.
+        sweeps: Numbers of the sweeps; those of the groups are added.
+    """
+    rows: list[tuple[int, ...]] = []
+    together: dict[Members, int] = {}
+    first = 0
+
+    def solid(members: Members) -> int:
+        return ends[members[0]] if len(members) == 1 else together.setdefault(members, ends[-1] + len(together))
+
+    for members, blocks in groups:
+        sweep = sweeps.setdefault((members, 0), len(sweeps))
+        for block in blocks:
+            end = first + len(members) * len(block)
+            rows.append((solid(members), solid(block), 0, sweep, -1, first, end, members[0], -1, block[0], -1))
+            first = end
+    return rows, together
+
+
 def _blocks(parts: Parts, stills: Sequence[int]) -> list[Members]:
     """Neighbours in space, up to BLOCK of them at a time."""
     order = z_order(np.array([parts[k][0].corners.mean(axis=0) for k in stills])).tolist()

@@ -14,7 +14,7 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.cloud_frames import cloud_bodies, cloud_poses
-from rrtik_ompl.fast.proof.groups import Members, compared_as_one
+from rrtik_ompl.fast.proof.groups import Members, compared_as_one, group_rows
 from rrtik_ompl.fast.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
 from rrtik_ompl.fast.tables.cloud_tables import cloud_table
 from rrtik_ompl.fast.tables.layout import CLOUD_SOLID, HALF_SPACE_SOLID
@@ -107,7 +107,7 @@ def proof_pairs(
         numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
         span = (first, len(of_parts))
         whole.append((ends[one], ends[other], base, *own, *span, one, numbers[0], other, numbers[1]))
-    of_groups, together = _group_rows(groups, ends, sweeps)
+    of_groups, together = group_rows(groups, ends, sweeps)
     rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 4)
     rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
     top = [*range(len(whole) + len(of_parts), len(rows)), *range(len(grouped), len(whole))]
@@ -152,36 +152,9 @@ def proof_pairs(
     arrays = body_arrays(bodies)
     beside = np.asarray(arrays.obstacles[named].any(axis=1))
     margins = arrays.kept_apart(named)
-    margins[len(whole) + len(of_parts) :] = [
-        margins[row[layout.PARTS_FIRST] : row[layout.PARTS_END]].max() for row in of_groups
-    ]
+    spans = [slice(*row[layout.PARTS_FIRST : layout.PARTS_END + 1]) for row in of_groups]
+    margins[len(whole) + len(of_parts) :] = [margins[span].max() for span in spans]
     return ProofPairs(made, named, sides, margins, beside)
-
-
-def _group_rows(
-    groups: Sequence[tuple[Members, Sequence[Members]]], ends: Sequence[int], sweeps: dict[tuple[Members, int], int]
-) -> tuple[list[tuple[int, ...]], dict[Members, int]]:
-    """Pairs of several bodies, made of those that begin the table, and the numbers of the solids around several.
-
-    Args:
-        groups: Bodies of one joint, each with blocks of obstacles.
-        ends: The number of each body's solid, and how many there are.
-        sweeps: Numbers of the sweeps; those of the groups are added.
-    """
-    rows: list[tuple[int, ...]] = []
-    together: dict[Members, int] = {}
-    first = 0
-
-    def solid(members: Members) -> int:
-        return ends[members[0]] if len(members) == 1 else together.setdefault(members, ends[-1] + len(together))
-
-    for members, blocks in groups:
-        sweep = sweeps.setdefault((members, 0), len(sweeps))
-        for block in blocks:
-            end = first + len(members) * len(block)
-            rows.append((solid(members), solid(block), 0, sweep, -1, first, end, members[0], -1, block[0], -1))
-            first = end
-    return rows, together
 
 
 _NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)
