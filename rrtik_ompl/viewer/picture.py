@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.goal import Goal, JointGoal, as_task_region, parts_of
+from rrtik_ompl.goal import Goal, JointGoal, MultiGoal, as_task_region, parts_of
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.constraint_picture import draw_constraints
@@ -49,7 +49,9 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
         if len(subject.waypoints) > 1:
             doubtful = () if subject.curve is None else subject.curve.unproven
             beads = subject.run is None and subject.times is None
-            draw_trail(vis, robot, subject.waypoints, 0.0035 * frame.arm, beads=beads, unproven=doubtful)
+            goal = subject.goal
+            arms = [arm for arm, _ in goal.each(robot)] if isinstance(goal, MultiGoal) else [robot]
+            draw_trail(vis, arms, subject.waypoints, 0.0035 * frame.arm, beads=beads, unproven=doubtful)
         if subject.before is not None:
             draw_before(vis, robot, subject.before, 0.0035 * frame.arm)
     draw_scene(vis, scene, frame, subject.touching)

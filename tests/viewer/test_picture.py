@@ -10,10 +10,11 @@ import pytest
 import umsgpack
 from scipy.spatial import ConvexHull
 
+from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.constraints.shorthands import on_plane, upright
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalSet, MultiGoal, PoseGoal, PositionGoal
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
@@ -174,3 +175,13 @@ def test_regions_of_path_constraints_are_drawn(crane: Robot) -> None:
     window, _ = draw(subject_of(held))
     assert {"/meshcat/constraints/0/axis", "/meshcat/constraints/1/place"} <= set(window.paths)
     assert "/meshcat/constraints/0/place" not in window.paths
+
+
+def test_the_ways_of_both_tips_are_drawn() -> None:
+    two = load_robot("two_titan4")
+    left, right = (PositionGoal([1.5, y, 0.0]) for y in (0.4, -0.4))
+    goal = MultiGoal({"left_grip_point": left, "right_grip_point": right})
+    rows = two.posture("ready") + np.array([[0.0], [0.05]])
+    window, _ = draw(subject_of(Problem(World(two), rows[0], goal), rows))
+    trails = [path for path in window.paths if path.startswith("/meshcat/trail/")]
+    assert trails == ["/meshcat/trail/piece 0", "/meshcat/trail/piece 0/tip 2"]

@@ -1,4 +1,4 @@
-"""The trail of the tip: one tube per move, so that the page can highlight the present move."""
+"""The trail of the tip, or of several: one tube per move, so that the page can highlight the present move."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ def draw_before(vis: Node, robot: Robot, waypoints: Matrix, radius: float) -> No
 
 def draw_trail(
     vis: Node,
-    robot: Robot,
+    arms: Sequence[Robot],
     waypoints: Matrix,
     radius: float,
     *,
     beads: bool = True,
     unproven: Sequence[int] = (),
 ) -> None:
-    """Draw the tip's trail under ``trail/piece N`` and a bead at every waypoint under ``beads``.
+    """Draw the trails of tips under ``trail/piece N``, and under ``beads`` a bead at every waypoint of the first.
 
     Args:
         vis: The root of the tree of nodes.
-        robot: The arm.
+        arms: The arm, once for each of its tips whose trail is drawn.
         waypoints: Shape (k, dof) with k at least 2.
         radius: Of the tube [m].
         beads: Whether to draw them.
@@ -57,12 +57,16 @@ def draw_trail(
     doubtful = set(piece[list(unproven)].tolist())
     for k in np.unique(piece):
         first, last = np.flatnonzero(piece == k)[[0, -1]]
-        tips = robot.fk_batch(_dense(robot, waypoints[first : last + 2], len(waypoints)))[:, :3, 3]
-        tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
-        if len(tips) > 1:  # a turning wrist need not move the tip
-            draw_tube(vis["trail"][f"piece {k}"], tips, radius, palette.UNPROVEN if k in doubtful else palette.TRAIL)
+        rows = _dense(arms[0], waypoints[first : last + 2], len(waypoints))
+        for number, arm in enumerate(arms):
+            tips = arm.fk_batch(rows)[:, :3, 3]
+            tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
+            node = vis["trail"][f"piece {k}"]
+            if len(tips) > 1:  # a turning wrist need not move the tip
+                color = palette.UNPROVEN if k in doubtful else palette.TRAIL
+                draw_tube(node if number == 0 else node[f"tip {number + 1}"], tips, radius, color)
     if beads and len(waypoints) <= MAX_PIECES:
-        for k, tip in enumerate(robot.fk_batch(waypoints)):
+        for k, tip in enumerate(arms[0].fk_batch(waypoints)):
             bead = vis["beads"][f"waypoint {k}"]
             bead.set_object(SphereGeometry(2.0 * radius), Material(color=palette.number(palette.TRAIL)))
             bead.set_transform(tip)
