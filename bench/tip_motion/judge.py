@@ -42,14 +42,15 @@ class Judge:
         """How deep anything enters anything else [m]; 0 if nothing touches."""
         pin.forwardKinematics(self.model, self.data, self.robot.pinocchio_configuration(q)[0])
         bodies, deepest = self.world.bodies, 0.0
-        places = [self._place(body) for body in bodies]
+        places = [self.place(body) for body in bodies]
         for i, j in self.world.pairs:
             request, result = coal.CollisionRequest(), coal.CollisionResult()
             if coal.collide(bodies[i].geometry, places[i], bodies[j].geometry, places[j], request, result):
                 deepest = max(deepest, -result.getContact(0).penetration_depth, TOUCHES)
         return deepest
 
-    def _place(self, body) -> coal.Transform3s:
+    def place(self, body) -> coal.Transform3s:
+        """Where a body is in the configuration that was looked at last."""
         pose = body.placement if body.joint == 0 else self.data.oMi[body.joint] * body.placement
         return coal.Transform3s(pose.rotation, pose.translation)
 
