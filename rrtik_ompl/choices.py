@@ -65,4 +65,4 @@ def one_of(names: Iterable[Name], name: str, kind: str) -> Name:
     for each in known:
         if isinstance(name, str) and each == name:
             return each
-    raise UnknownNameError(kind, str(name), known)
+    raise UnknownNameError(kind, type(name).__name__ if callable(name) else str(name), known)

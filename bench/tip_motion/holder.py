@@ -26,7 +26,7 @@ from rrtik_ompl.world import World
 SHAFT, PLAY = 0.06, 0.0005  # [m]: side of the square shaft, and room on each side of it
 LONG, DEEP, THICK = 0.30, 0.16, 0.05  # [m]: the tool, the holder along its axis, the walls of the holder
 BACK, REACHED = 0.25, 0.12  # [m]: tip before the middle of the tool at first, and how far it goes on to grasp
-OUT, UP = 0.2, 0.1  # [m]: that the tool is drawn out, and lifted
+OUT, UP = 0.12, 0.1  # [m]: that the tool is drawn out, and lifted
 LIMIT, ROUNDS = 20.0, 2  # [s], calls
 EVERY = 25  # of the judge's 50 parts of a motion, for all pairs; the tool in its holder is looked at in all of them
 GRASP = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # the tip's z axis is the tool's x axis
@@ -114,6 +114,13 @@ def _room(world: World, rows: Matrix) -> float:
     return float(least)
 
 
+def _kind(reason: str) -> str:
+    """The stage that failed, and why, without numbers."""
+    stage, _, why = reason.partition(" failed")
+    kinds = {"inverse kinematics": "out of reach", "limit of joint": "limit of a joint", "singular": "singular posture"}
+    return f"{stage}: {next((text for words, text in kinds.items() if words in why), why)}"
+
+
 def main() -> None:
     """Run everything and write the page."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -136,7 +143,7 @@ def main() -> None:
     report.bar("titan4: tool and holder while it is drawn out", "> 0 mm apart", f"{1e3 * room:.3f} mm", room > 0.0)
     spread = f"{np.median(times):.0f} / {np.quantile(times, 0.95):.0f} / {times.max():.0f}"
     report.table("Plans", ["found", "ms, median / 95 % / worst"], [[f"{len(found)} of {len(own)}", spread]])
-    reasons = Counter(each.reason.partition(";")[0].partition(" misses it")[0] for each in own if not each.found)
+    reasons = Counter(_kind(each.reason) for each in own if not each.found)
     if reasons:
         report.table("Not found", ["reason", "scenes"], [[why, str(count)] for why, count in reasons.most_common()])
     raise SystemExit(report.finish(options.out))

@@ -154,7 +154,8 @@ def _options(name: str) -> tuple[str, ...]:
     try:
         return options_of(name)
     except UnknownNameError as error:
-        error.args = (f"{error}; OMPL's wheel lacks {', '.join(unbound_planners())}",)
+        if name in unbound_planners():
+            error.args = (f"{error}; OMPL's wheel lacks {name}",)
         raise
 
 

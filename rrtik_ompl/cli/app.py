@@ -24,7 +24,7 @@ from rrtik_ompl.cli.reach import reach
 from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.task import straight, task
-from rrtik_ompl.cli.terminal import ProblemName, drop_output, note, prepare_streams, say, warn
+from rrtik_ompl.cli.terminal import ProblemName, command, drop_output, note, prepare_streams, say, suggest, warn
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.files import notice
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
@@ -105,18 +105,22 @@ def check(
     if isinstance(question.goal, JointGoal):
         say(f"{question.name}: goal is free, clearance {_millimetres(world.clearance(question.goal.q))}{kept}")
     if route is None:
+        suggest(command("plan", problem), command("show", problem))
         return FOUND
     faults = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(world)] + wrong_ends(question, route)
     for fault in faults:
         say(f"{path}: {fault}")
     if faults:
+        suggest(f"look at it: {command('show', problem, path)}")
         return NOT_FOUND
     if any(body.kind == "obstacle" for body in world.bodies):
         say(f"{path}: {clearance_along(world, route.waypoints)}{kept}")
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
     say(f"{path}: valid, {how_checked(world, route.waypoints)}; {size}")
     found = None if path is None else certificate_beside(path)
-    return FOUND if found is None else _certified(question, route, found, f"{path}")
+    code = FOUND if found is None else _certified(question, route, found, f"{path}")
+    suggest(f"see it: {command('show', problem, path)}", f"time it: {command('time', problem, path)}")
+    return code
 
 
 def _certified(problem: Problem, route: JointPath, certificate: Certificate, file: str) -> int:

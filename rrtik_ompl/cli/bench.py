@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rrtik_ompl.cli.terminal import counter, note, progress, say
+from rrtik_ompl.cli.terminal import counter, note, progress, say, suggest
 
 
 def bench(
@@ -69,4 +69,5 @@ def bench(
         say(terminal_table(results), f"this round: {counts or 'no runs were left'}")
         say(*(f"{problem}, {planner}: {number} x {why}" for problem, planner, number, why in failures(results)))
         say(*(f"wrote {each}" for each in files))
+        suggest(*(f"open {each}" for each in files if each.suffix == ".html"))
     return 1 if always_refused(results) else 0

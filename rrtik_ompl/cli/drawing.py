@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rrtik_ompl.cli.terminal import ProblemName, note, progress, say, shown_names
+from rrtik_ompl.cli.terminal import ProblemName, note, progress, say, shown_names, suggest
 from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.files.text import check_target
 
@@ -69,6 +69,7 @@ def show(
     written = [file for file in (film, html) if file is not None]
     if written:
         say(*(f"wrote {file}" for file in written))
+        suggest(*(f"open {file}" for file in written))
         return int(bool(fault))
 
     def ready(url: str) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from rrtik_ompl.cli.ik_rows import count, each, followed, milliseconds, point, refuse_orientation
-from rrtik_ompl.cli.terminal import note, progress, say
+from rrtik_ompl.cli.terminal import note, progress, say, suggest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target, comma_numbers
 
@@ -240,6 +240,8 @@ def _many(
 def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
     """The page: the first solution as the arm and the others as ghosts, or the arm moving through all of them."""
     if output.html is None:
+        if not output.as_json and not output.as_csv:
+            suggest("see it: --html ik.html", *(["every solution: --all"] if len(q) == 1 else []))
         return
     from rrtik_ompl import Scene
     from rrtik_ompl.viewer import view
@@ -253,6 +255,7 @@ def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, mo
             view(shown, ghosts=q, html=output.html, title=f"{given.robot.name}: {count(len(q), 'solution')}")
     if not output.as_json and not output.as_csv:
         say(f"wrote {output.html}")
+        suggest(f"open {output.html}")
 
 
 def _more(rows: int) -> list[str]:

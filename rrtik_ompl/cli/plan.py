@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from rrtik_ompl.choices import CommandShortening, Name, ProofMode, one_of
-from rrtik_ompl.cli.terminal import ProblemName, note, progress, say
+from rrtik_ompl.cli.terminal import ProblemName, command, note, progress, say, suggest
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
@@ -111,11 +111,21 @@ def plan(
     else:
         say(*report.summary(question, found, path, shorten_seconds, named=planner))
         _say_path(path, (out, html, None if lack else certificate))
+        suggest(*_next_steps(problem, path, out, html))
     if lack:
         note(lack)
     elif less := report.less_clearance(path, clearance):
         note(less)
     return 0 if found.found and not lack else 1
+
+
+def _next_steps(problem: str, path: JointPath | None, out: Path | None, html: Path | None) -> list[str]:
+    """What may come after a plan."""
+    if path is None:
+        return [f"look at it: {command('show', problem)}", "give it more time: --seconds"]
+    seen = f"see it move: {command('plan', problem, '--html', 'plan.html')}" if html is None else f"open {html}"
+    kept = "keep it: --out path.json" if out is None else f"time it: {command('time', problem, out)}"
+    return [seen, kept]
 
 
 def _say_path(path: JointPath | None, written: tuple[Path | None, ...]) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, progress, say
+from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, command, progress, say, suggest
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -73,6 +73,8 @@ def straight(
         why = f": {made.reason}" if made.reason else f", {waypoints} waypoints, proven free"
         say(f"{question.name}: {100.0 * made.fraction:.4g} % of the line{why}")
         say(*(f"wrote {file}" for file in written))
+        if made.path is not None:
+            suggest("see it: --html line.html" if html is None else f"open {html}")
     return 0 if made.fraction == 1.0 else 1
 
 
@@ -119,8 +121,11 @@ def task(
         say(*_lines(loaded.name, plan))
         say(*([] if duration is None else [f"  in {duration:.2f} s, each rest of {pause:g} s"]))
         say(*(f"wrote {file}" for file in (out, trajectory, html) if file is not None))
+        seen = f"see it: {command('task', task, '--html', 'task.html')}" if html is None else f"open {html}"
+        suggest(seen, *(["time it: --trajectory task.json"] if trajectory is None else []))
     else:
         say(f"{loaded.name}: not found: {plan.reason}")
+        suggest("give it more time: --seconds")
     return 0 if plan.found else 1
 
 

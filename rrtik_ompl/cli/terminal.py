@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -48,6 +49,17 @@ def say(*items: Any) -> None:
         for item in items:
             console.print(item)
     print(captured.get(), end="")
+
+
+def suggest(*steps: str) -> None:
+    """Say in a last line what may come next, where a person reads it: on a terminal, not in a file or a pipe."""
+    if steps and sys.stdout.isatty():
+        say(f"next: {'; '.join(steps)}")
+
+
+def command(*words: object) -> str:
+    """A command of ours as it is typed."""
+    return shlex.join(["rrtik", *map(str, words)])
 
 
 @contextmanager

@@ -48,7 +48,7 @@ def safe_planner(
         InputError: If it refuses an option.
     """
     if options:
-        _check_names(factory, name, options)
+        check_options(factory, name, options)
     taken = keyword_parameters(factory)
     goal: dict[str, Any] = {"goal": problem.goal} if "goal" in taken else {}
     if "joint_costs" in taken:
@@ -79,7 +79,7 @@ def other_planner(
     require(planner, ob.Planner, f"what planner '{name}' makes of a SpaceInformation")
     try:
         for key, value in options.items():
-            _check_names(type(planner), name, (key,))
+            check_options(type(planner), name, (key,))
             _set(planner, name, key, value)
     except InputError:
         planner.setProblemDefinition(definition)  # AORRTC ends the process if it is destroyed before it was set up
@@ -96,7 +96,12 @@ def _why_not_made(factory: PlannerFactory, error: TypeError) -> str:
     return f"it cannot be made from an ompl.base.SpaceInformation: {str(error).splitlines()[0]}"
 
 
-def _check_names(factory: PlannerFactory, name: str, keys: Iterable[str]) -> None:
+def check_options(factory: PlannerFactory, name: str, keys: Iterable[str]) -> None:
+    """Refuse options that a planner does not have.
+
+    Raises:
+        UnknownNameError: It names the option.
+    """
     options = planner_options(factory)
     for key in keys:
         if key not in options:

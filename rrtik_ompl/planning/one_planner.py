@@ -11,6 +11,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.methods import load_kernels
+from rrtik_ompl.ompl_bridge.planner_options import check_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, planners_with, traits_of
 from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.planning.search import Search
@@ -47,7 +48,11 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
         request.clearance,
         iterations=request.iterations,
     )
-    path = search.still() if _nothing_to_do(problem) else search.run()  # some planners would find a detour
+    if _nothing_to_do(problem):  # some planners would find a detour
+        check_options(factory, name, request.parameters)
+        path = search.still()
+    else:
+        path = search.run()
     elapsed, reason = time.perf_counter() - begin - search.counting, search.reason
     if path is None and elapsed >= request.seconds:
         attempts = search.totals["attempts"]
