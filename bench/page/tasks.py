@@ -7,6 +7,7 @@ Run it as ``python bench/page/tasks.py [--single FOLDER]``; it writes ``tasks.pn
 from __future__ import annotations
 
 import argparse
+import tempfile
 from pathlib import Path
 
 import cv2
@@ -44,24 +45,27 @@ def page_of(name: str) -> str:
     return page(problem, plan.path, still=True)
 
 
+def drawn_once(name: str, folder: Path) -> Image.Image:
+    """The picture that stands in the sheet; those that a folder has already are not drawn again."""
+    files = [folder / f"{name}_{k}.png" for k in range(MOMENTS)]
+    if not all(file.exists() for file in files):
+        for file, picture in zip(files, drawn(page_of(name), MOMENTS, FULL), strict=True):
+            picture.save(file)
+    return Image.open(files[MOMENTS // 2]).convert("RGB")
+
+
 def main() -> None:
     """Draw all of them and write the sheet."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--single", type=Path, help="a folder for the pictures in full size")
-    parser.add_argument("--only", nargs="+", choices=SHOWN, default=list(SHOWN), help="no sheet if some are left out")
+    parser.add_argument("--single", type=Path, help="a folder for the pictures in full size; its pictures are kept")
     given = parser.parse_args()
-    small = []
-    for name in given.only:
-        pictures = drawn(page_of(name), MOMENTS, FULL)
-        if given.single is not None:
-            given.single.mkdir(parents=True, exist_ok=True)
-            for k, picture in enumerate(pictures):
-                picture.save(given.single / f"{name}_{k}.png")
-        small.append(cv2.resize(np.asarray(pictures[MOMENTS // 2]), (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA))
-        print(name, flush=True)
-    if tuple(given.only) == SHOWN:
-        rows = [np.hstack(small[k : k + COLUMNS]) for k in range(0, len(small), COLUMNS)]
-        Image.fromarray(np.vstack(rows)).save(REPORTS / "tasks.png", optimize=True)
+    with tempfile.TemporaryDirectory() as spare:
+        folder = given.single or Path(spare)
+        folder.mkdir(parents=True, exist_ok=True)
+        size = WIDTH, HEIGHT
+        small = [cv2.resize(np.asarray(drawn_once(name, folder)), size, interpolation=cv2.INTER_AREA) for name in SHOWN]
+    rows = [np.hstack(small[k : k + COLUMNS]) for k in range(0, len(small), COLUMNS)]
+    Image.fromarray(np.vstack(rows)).save(REPORTS / "tasks.png", optimize=True)
 
 
 if __name__ == "__main__":
