@@ -268,7 +268,7 @@ def test_a_gripper_that_closes_into_something_at_the_end_is_no_plan(kitchen):
     reach = grasp(0.0)[:2]
     plan = Task([*reach, Gripper("close", width=0.03)]).plan(kitchen, "ready", seed=1)
     assert not plan.found
-    assert "stage 3 (Gripper 'close')" in plan.reason
+    assert "stage 3 (Gripper 'close' to 30 mm)" in plan.reason
     assert "finger" in plan.reason
     assert "attach the object" in plan.reason
 
