@@ -92,14 +92,25 @@ class Guide:
                         session.seed)  # fmt: skip
         self.withdrawn = ""
         if isinstance(found, NoRoute):
-            self._leave()
+            self.leave()
             otherwise = "choose another grasp" if session.choice else "drive the arm elsewhere, or choose an object"
             advice = escape_advice(session.world, session.q) or otherwise
             return f"no route: {session.fault() or found}; {advice}"
-        self.route, self.follower, self.progress = found, Follower(found.path, session.rates), None
-        self._aimed = session.surroundings.named(session.target) if session.target and session.choice else None
-        session.mode, session.desired = PROPOSED, frozen(found.path.end)
-        return found.summary() + "; 'accept' or 'reject'"
+        aimed = session.surroundings.named(session.target) if session.target and session.choice else None
+        return self.propose(found, aimed)
+
+    def propose(self, route: Route, aimed: SeenObject | None = None) -> str:
+        """Propose a route that begins where the arm is.
+
+        Args:
+            route: The route.
+            aimed: What it leads to; it is withdrawn when that has moved.
+        """
+        session = self._session
+        self.route, self.follower, self.progress = route, Follower(route.path, session.rates), None
+        self.withdrawn, self._aimed = "", aimed
+        session.mode, session.desired = PROPOSED, frozen(route.path.end)
+        return route.summary() + "; 'accept' or 'reject'"
 
     def accept(self) -> str:
         """Follow the route that is proposed."""
@@ -117,7 +128,7 @@ class Guide:
     def reject(self) -> str:
         """Leave the route."""
         self._session.arm.stop()
-        self._leave()
+        self.leave()
         self._session.desired = self._session.q
         return "rejected"
 
@@ -189,8 +200,9 @@ class Guide:
         session = self._session
         if moved := self._target_moved():
             return moved
-        grasped = session.target is not None and session.choice is not None
-        world = session.surroundings.holding(str(session.target)) if grasped else session.surroundings.world
+        around, target = session.surroundings, session.target
+        known = target is not None and session.choice is not None and around.named(target) is not None
+        world = around.holding(str(target)) if known else around.world_at(session.q, target)
         return path_fault(world, self.follower.rest(session.q))
 
     def _target_moved(self) -> str:
@@ -215,7 +227,8 @@ class Guide:
         far = f"{1e3 * away:.1f} mm and {np.rad2deg(turned):.2f} deg"
         return f"all moves are made, but the tip is {far} away from the end of the route; 'replan' may go nearer"
 
-    def _leave(self) -> None:
+    def leave(self) -> None:
+        """Forget the route."""
         self.route = self.follower = self.progress = self._aimed = None
         self.withdrawn = ""
         self._session.mode = CHOOSING if self._session.choice else MANOEUVRE

@@ -14,7 +14,8 @@ MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
 STALE_SECONDS = 0.5  # a picture older than that does not show the present
 
 MOVING: Final = ("jog", "go", "next")  # held: the arm moves only as long as they are renewed
-PRESENT: Final = (*MOVING, "move", "plan", "replan", "accept", "back")  # need the arm and a picture of now
+# What needs the arm and a picture of now:
+PRESENT: Final = (*MOVING, "move", "plan", "replan", "accept", "back", "close", "open", "lift")
 ALWAYS: Final = ("stop", "release", "halt", "select", "speed", "object", "grasp", "reject", "settle")
 
 _MANUAL = (MANOEUVRE, CHOOSING, PROPOSED), "a route is being followed: 'next' makes its next move, 'stop' leaves it"
@@ -22,6 +23,9 @@ _ONLY_IN: Final = {
     "jog": _MANUAL,
     "go": _MANUAL,
     "move": _MANUAL,
+    "close": _MANUAL,
+    "open": _MANUAL,
+    "lift": _MANUAL,
     "accept": ((PROPOSED,), "there is no route to accept; 'plan' proposes one"),
     "settle": ((FOLLOWING,), "no route is being followed"),
     "next": ((FOLLOWING,), "no route is being followed; 'plan' and 'accept' one first"),

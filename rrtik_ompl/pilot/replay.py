@@ -40,6 +40,9 @@ class RecordedArm:
     def stop(self) -> None:
         """Without effect: the record holds the result."""
 
+    def grip(self, closed: bool) -> None:
+        """Without effect: the record holds the result."""
+
 
 class RecordedPerception:
     """Gives the entries of a record to a session when their time has come."""
@@ -86,6 +89,7 @@ class RecordedPerception:
             self._arm.q = self._arm.robot.configuration(entry["q"], "q")
             session.tick(time)
         elif entry["kind"] == "command":
+            session.tick(time)  # as before every command that was given
             session.command(entry["name"], time, **entry["arguments"])
         elif entry["kind"] == "seen":
             seen = [_seen(self._world.marker_map, each) for each in entry["objects"]]

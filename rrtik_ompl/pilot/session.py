@@ -17,6 +17,7 @@ from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.guide import Guide
+from rrtik_ompl.pilot.hand import Hand
 from rrtik_ompl.pilot.held import Held
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, MOVING, PROPOSED, Knowledge, refusal
 from rrtik_ompl.pilot.lamps import Lamp
@@ -68,7 +69,7 @@ class Session:
         self.picture_time = -np.inf
         self.feasibility = FeasibilityCache(self.surroundings)
         self.guide = Guide(self)
-        self.held = Held(self)
+        self.held, self.hand = Held(self), Hand(self)
         self._past, self._trouble, self._seen_at = past, "", dict[str, float]()
         self._record = record or Record(None)
         self._commands: dict[str, Callable[..., str]] = {
@@ -76,7 +77,8 @@ class Session:
             "next": self.held.next, "release": self.held.release, "speed": self.held.set_speed, "stop": self._stop,
             "object": self._object, "grasp": self._grasp, "plan": self.guide.plan, "replan": self.guide.plan,
             "accept": self.guide.accept, "reject": self.guide.reject, "back": self.guide.back,
-            "settle": self.guide.settle, "halt": self._halt,
+            "settle": self.guide.settle, "close": self.hand.close, "open": self.hand.open,
+            "lift": self.hand.lift, "halt": self._halt,
         }  # fmt: skip
 
     # --- input -------------------------------------------------------------------------------------------
@@ -98,6 +100,7 @@ class Session:
         before, self.q = self.q, frozen(self.arm.read())
         if not np.array_equal(before, self.q):
             self._record.write("joints", time, q=self.q.tolist())
+            self.surroundings.settle(self.q)
         self.held.expire(time)
         self._watch()
         self.message = self.guide.watch() or self._record.news() or self.message
@@ -119,7 +122,7 @@ class Session:
             given = fitting(act, verb, arguments)
             if verb not in (*MOVING, "release"):
                 self.held.end()
-            refused = refusal(verb, self.mode, self.known)
+            refused = refusal(verb, self.mode, self.known) or self.hand.refusal(verb)
             if refused:
                 raise InputError(refused)
             if not goes_on:

@@ -37,6 +37,7 @@ def state_document(session: Session) -> dict[str, Any]:
         "arm_lost": session.arm.lost,
         "trouble": session.known.trouble,
         "speed": session.held.speed,
+        "gripper": {"closed": session.hand.closed, "holds": session.hand.holds or session.hand.fixed},
         "driving": session.held.drive.active,
     }
 

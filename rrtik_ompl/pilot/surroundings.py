@@ -12,7 +12,7 @@ import pinocchio as pin
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import World
@@ -32,12 +32,21 @@ class Structure(NamedTuple):
     T_base_object: pin.SE3
 
 
+class HeldObject(NamedTuple):
+    """What the gripper holds: as it was seen last, its place in the gripper, what it may touch until it is clear."""
+
+    seen: SeenObject
+    T_tip_object: pin.SE3
+    rests: tuple[tuple[str, str], ...]
+
+
 class Surroundings:
     """Worlds with the objects as they were seen last.
 
     Attributes:
         world: The world in which nothing may be touched.
         version: Counts how often the world became another one.
+        held: What the gripper holds, as part of the arm; None if nothing.
     """
 
     def __init__(self, world: World, structure: Structure | None = None) -> None:
@@ -45,6 +54,7 @@ class Surroundings:
         self._given, self._structure = world, structure
         self.world = world
         self.version = 0
+        self.held: HeldObject | None = None
         self._seen: dict[str, SeenObject] = {}
         self._holding: dict[str, World] = {}
 
@@ -81,21 +91,53 @@ class Surroundings:
 
     def see(self, objects: Sequence[SeenObject]) -> bool:
         """Update by the objects that the camera sees; True if one moved or is new, so that the world changed."""
-        news = [each for each in objects if self._moved(each)]
+        held = "" if self.held is None else self.held.seen.object.name
+        news = [each for each in objects if each.object.name != held and self._moved(each)]
         if not news:
             return False
         self._seen |= {each.object.name: each for each in news}
-        self.world = self._with(())
-        self._holding.clear()
-        self.version += 1
+        self._renew()
         return True
+
+    def hold(self, seen: SeenObject, T_tip_object: pin.SE3, q: Vector) -> None:
+        """An object moves with the gripper from now on; what it touches at q, (dof,), it may until it is clear."""
+        self._seen.pop(seen.object.name, None)
+        self.held = HeldObject(seen, T_tip_object, ())
+        mine = set(seen.object.solid_names)
+        touching = [(c.first, c.second) for c in self._with(()).contacts(q)]
+        rests = tuple(pair for pair in touching if mine & set(pair))
+        self.held = HeldObject(seen, T_tip_object, rests)
+        self._renew()
+
+    def release(self, T_base_tip: pin.SE3) -> None:
+        """What is held stays where it is for a pose of the tip."""
+        if self.held is None:
+            return
+        held, self.held = self.held, None
+        place = T_base_tip * held.T_tip_object
+        self._seen[held.seen.object.name] = replace(held.seen, T_base_object=place, sighting=None)
+        self._renew()
+
+    def settle(self, q: Vector) -> None:
+        """What is held may not touch again what it has left, by an arm at q, shape (dof,)."""
+        held = self.held
+        if held is not None and held.rests and self._with(()).valid(q):
+            self.held = held._replace(rests=())
+            self._renew()
+
+    def held_solids(self, T_base_tip: pin.SE3) -> tuple[Obstacle, ...]:
+        """The solids of what is held, for a pose of the tip."""
+        held = self.held
+        return () if held is None else replace(held.seen, T_base_object=T_base_tip * held.T_tip_object).solids()
 
     def holding(self, name: str) -> World:
         """The world in which the gripper may touch an object."""
         if name not in self._holding:
             solids = [solid.name for solid in self._seen[name].solids()]
-            pairs = [(link, solid) for link in gripper_links(self.world.robot) for solid in solids]
-            self._holding[name] = self._with(pairs)
+            mine = () if self.held is None else self.held.seen.object.solid_names
+            touching = (*gripper_links(self.world.robot), *mine)
+            pairs = [(link, solid) for link in touching for solid in solids]
+            self._holding[name] = self._with((*pairs, *self._rests()))
         return self._holding[name]
 
     def world_at(self, q: Vector, target: str | None) -> World:
@@ -121,8 +163,29 @@ class Surroundings:
     def _with(self, allowed: Sequence[tuple[str, str]]) -> World:
         given = self._fixed_scene()
         scene = scene_with(given, [solid for each in self._seen.values() for solid in each.solids()])
-        changed = replace(scene, allowed_collisions=(*given.allowed_collisions, *allowed))
+        attached = (*given.attached, *self._attached())
+        changed = replace(scene, attached=attached, allowed_collisions=(*given.allowed_collisions, *allowed))
         return self._given.with_accuracy("exact").with_scene(changed)
+
+    def _renew(self) -> None:
+        """After a change: worlds are made anew."""
+        self.world = self._with(self._rests())
+        self._holding.clear()
+        self.version += 1
+
+    def _rests(self) -> tuple[tuple[str, str], ...]:
+        return () if self.held is None else self.held.rests
+
+    def _attached(self) -> list[AttachedObject]:
+        """What is held, as part of the arm; the uncertainty of its place is its padding."""
+        held, robot = self.held, self._given.robot
+        if held is None:
+            return []
+        near, thing = gripper_links(robot), held.seen.object
+        return [
+            AttachedObject(name, robot.tip, solid.shape, held.T_tip_object * solid.pose, near, held.seen.margin(solid))
+            for name, solid in zip(thing.solid_names, thing.solids, strict=True)
+        ]
 
     def _fixed_scene(self) -> Scene:
         """The problem's scene where the structure is seen; how far that is uncertain is the margin of its obstacles."""

@@ -117,8 +117,10 @@ class OutsideView:
         session = self._session
         eye = orbit_pose(self.centre, self.distance, self.azimuth, self.elevation)
         shown = session.q if self.share is None else along(session, self.share)
+        around = session.surroundings
+        obstacles = (*around.world.scene.obstacles, *around.held_solids(session.robot.fk(shown)))
         return self._arm.draw(
-            self._sky, eye, shown, ghosts=ghosts(session), obstacles=session.surroundings.world.scene.obstacles,
+            self._sky, eye, shown, ghosts=ghosts(session), obstacles=obstacles,
             trail=trail(session), frames=[session.robot.fk(shown), *_objects(session)], opacity=1.0,
         )  # fmt: skip
 

@@ -48,7 +48,7 @@ def put_into(planned, mode, link, picture):
     made.q = arm.read()
     made.desired = made.q.copy()
     made.desired[0] += 0.2
-    made.held._press = ("", -1.0)
+    made.held._press, made.hand.closed = ("", -1.0), False
     return made, arm
 
 

@@ -74,10 +74,11 @@ def test_the_server_answers_nonsense_with_one_line():
         lines = connection.makefile("rw")
         assert json.loads(lines.readline())["joints"] == list(ROBOT.joint_names)
         for asked, word in [
-            ({"do": "fly"}, "read, move or stop"),
+            ({"do": "fly"}, "read, move, grip or stop"),
             ({"do": "move", "joint": 9, "target": 0}, "from 0 to 5"),
             ({"do": "move", "joint": 0, "target": float("nan")}, "finite"),
             ({"do": "move", "joint": [0], "target": 0}, "from 0 to 5"),
+            ({"do": "grip", "closed": 1}, "true or false"),
         ]:
             lines.write(json.dumps(asked) + "\n")
             lines.flush()

@@ -33,6 +33,9 @@ class Arm(Protocol):
     def stop(self) -> None:
         """Stop at once."""
 
+    def grip(self, closed: bool) -> None:
+        """Close or open the gripper."""
+
 
 def joint_rates(robot: Robot, rates: ArrayLike | None = None) -> Vector:
     """How fast each joint goes when it is driven, shape (dof,) [rad/s or m/s]: given, or default ones below its limit.
@@ -59,7 +62,7 @@ class SimulatedArm:
             InputError: If the configuration does not fit the robot.
         """
         self.robot = robot
-        self.lost = ""
+        self.lost, self.closed = "", False
         self._q = robot.configuration(start, "start")
         self._rates = joint_rates(robot, rates)
         self._goal: tuple[int, float] | None = None
@@ -94,6 +97,10 @@ class SimulatedArm:
     def stop(self) -> None:
         """Stop at once."""
         self._goal = self._course = None
+
+    def grip(self, closed: bool) -> None:
+        """Close or open the gripper."""
+        self.closed = closed
 
     def advance(self, seconds: float) -> None:
         """Advance the simulated time."""

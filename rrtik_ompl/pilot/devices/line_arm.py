@@ -7,6 +7,7 @@ The protocol is one JSON object a line, UTF-8, at most 64 kB. Joints are in the 
 - ``{"do": "move", "joint": 2, "target": 0.5}`` sends one joint (counted from 0) on its way; a new move takes the place
   of the last; answered by ``{"q": [..]}``
 - ``{"do": "follow", "q": [..]}`` sends all joints to set points, for trajectories; answered by ``{"q": [..]}``
+- ``{"do": "grip", "closed": true}`` closes or opens the gripper; answered by ``{"q": [..]}``
 - ``{"do": "stop"}`` stops at once; answered by ``{"q": [..]}``
 - a request that cannot be fulfilled is answered by ``{"error": "one line"}``
 
@@ -102,6 +103,7 @@ class LineArm:
         self.robot, self._address, self.lost = robot, (host, port), ""
         self.reported = time.monotonic()
         self._request: dict[str, Any] | None = None
+        self._grip: dict[str, Any] | None = None  # goes first, and no move takes its place
         self._lock, self._ended, self._wake = threading.Lock(), threading.Event(), threading.Event()
         try:
             self._line = self._connect()
@@ -139,6 +141,18 @@ class LineArm:
     def stop(self) -> None:
         """Stop at once; without connection the server does so itself."""
         self._send_later({"do": "stop"})
+
+    def grip(self, closed: bool) -> None:
+        """Close or open the gripper.
+
+        Raises:
+            InputError: If the connection is lost.
+        """
+        if self.lost:
+            raise InputError(self.lost)
+        with self._lock:
+            self._grip = {"do": "grip", "closed": bool(closed)}
+        self._wake.set()
 
     def close(self) -> None:
         """Stop, and end the connection."""
@@ -188,7 +202,9 @@ class LineArm:
             self._wake.wait(POLL_SECONDS)
             self._wake.clear()
             with self._lock:
-                message, self._request = self._request or {"do": "read"}, None
+                message, self._grip = self._grip, None
+                if message is None:
+                    message, self._request = self._request or {"do": "read"}, None
             try:
                 if self.lost:
                     self._line, message = self._connect(), {"do": "read"}  # a move from before is out of date
@@ -201,7 +217,7 @@ class LineArm:
                 self.lost = f"the connection to the arm is lost: {why}; the joints are the last known ones"
                 self._ended.wait(RETRY_SECONDS)
             self.reported = time.monotonic()
-            if self._ended.is_set() and self._request is None:
+            if self._ended.is_set() and self._request is None and self._grip is None:
                 return
 
 
@@ -269,11 +285,15 @@ class LineServer:
             if not (numbers and 0 <= joint < self.arm.robot.dof and abs(target) < LARGEST):  # type: ignore[operator,arg-type]
                 return f"move needs a joint from 0 to {self.arm.robot.dof - 1} and a finite target"
             self.arm.move(int(joint), float(target))  # type: ignore[arg-type]
+        elif what == "grip":
+            if not isinstance(request.get("closed"), bool):
+                return "grip needs closed: true or false"
+            self.arm.grip(request["closed"])
         elif what == "follow":
             try:
                 self.arm.follow(request.get("q"))  # type: ignore[arg-type]
             except InputError as error:
                 return str(error)
         elif what != "read":
-            return "do must be read, move or stop, or follow"
+            return "do must be read, move, grip or stop, or follow"
         return ""

@@ -20,6 +20,7 @@ from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.frames import base_from_camera
 from rrtik_ompl.sensing.sensor import Sensor, View
 
+FINGERS = 0.02  # [m]; a gripper that closes this near to a grasp takes the object
 EXPLANATION_SECONDS = 5.0  # between two searches for unknown markers
 
 
@@ -108,6 +109,8 @@ class SimulatedSource:
         """Take camera and arm, and how their base moves."""
         self._camera, self._arm, self._motion = camera, arm, motion
         self._count, self._time = 0, 0.0
+        self._was_closed = False
+        self._carried: tuple[str, pin.SE3] | None = None  # an object that the gripper has taken, and T_tip_object
 
     def advance(self, seconds: float) -> None:
         """Advance the simulated time: the base moves."""
@@ -119,7 +122,31 @@ class SimulatedSource:
         """A picture with the arm at its present configuration."""
         self._count += 1
         arm = self._arm
-        return self._camera.picture(arm.links() if isinstance(arm, SimulatedArm) else arm.read(), float(self._count))
+        q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
+        if isinstance(arm, SimulatedArm):
+            self._carry(arm, arm.robot.fk(q))
+        return self._camera.picture(q, float(self._count))
+
+    def _carry(self, arm: SimulatedArm, T_base_tip: pin.SE3) -> None:
+        """Objects that can be carried move with a closed gripper, if it was closed where they can be grasped."""
+        tip, camera = self._camera.T_start_base * T_base_tip, self._camera
+        if not arm.closed:
+            self._carried, self._was_closed = None, False
+            return
+        if not self._was_closed:
+            self._was_closed = True
+            near = [
+                (float(np.linalg.norm(tip.actInv(camera.places[thing.name] * level).translation)), thing.name)
+                for thing in camera.marker_map.objects
+                if thing.loose and thing.name in camera.places
+                for grasp in thing.grasps
+                for level in grasp.levels
+            ]
+            if near and min(near)[0] <= FINGERS:
+                name = min(near)[1]
+                self._carried = (name, tip.actInv(camera.places[name]))
+        if self._carried is not None:
+            camera.places = {**camera.places, self._carried[0]: tip * self._carried[1]}
 
     def close(self) -> None:
         """Nothing to release."""

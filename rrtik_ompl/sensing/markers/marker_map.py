@@ -81,6 +81,7 @@ class MarkedObject:
         markers: Where they sit; several are used together.
         solids: What it is made of, with poses ``T_object_solid``.
         grasps: Its grasp types.
+        loose: Whether a gripper can carry it away.
     """
 
     name: str
@@ -88,6 +89,7 @@ class MarkedObject:
     markers: tuple[MountedMarker, ...]
     solids: tuple[Obstacle, ...] = ()
     grasps: tuple[GraspType, ...] = ()
+    loose: bool = False
 
     def __post_init__(self) -> None:
         for word in ("markers", "solids", "grasps"):

@@ -53,12 +53,14 @@ class ObjectEntry(Section):
     markers: Annotated[list[MarkerEntry], Field(min_length=1)]
     solids: list[SolidEntry] = Field(default=[], description="with poses in the frame of the object")
     grasps: list[GraspEntry] = Field(default=[])
+    loose: bool = Field(False, strict=True, description="whether a gripper can carry it away")
 
     def build(self, folder: Path) -> MarkedObject:
         """The object; files of meshes are relative to ``folder``."""
         solids = [Obstacle(each.name, each.build_shape(folder), each.build_pose()) for each in self.solids]
         grasps = [each.build() for each in self.grasps]
-        return MarkedObject(self.name, self.role, tuple(m.build() for m in self.markers), tuple(solids), tuple(grasps))
+        markers = tuple(each.build() for each in self.markers)
+        return MarkedObject(self.name, self.role, markers, tuple(solids), tuple(grasps), self.loose)
 
 
 class MarkerMapFile(Section):

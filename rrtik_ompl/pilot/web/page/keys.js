@@ -19,6 +19,8 @@ const KEYS = [
   ["N", ["n"], "hold: make the next move", null, () => ["next", {}]],
   ["B", ["b"], "plan the way back", () => send("back")],
   ["Y", ["y"], "plan anew from where the arm is", () => send("replan")],
+  ["C", ["c"], "close the gripper, or open it", () => toggleGripper()],
+  ["U", ["u"], "plan the way up with what is held", () => send("lift")],
   ["X", ["x"], "play the route in the outside view", () => togglePlay()],
   ["[ ]", ["[", "]"], "scrub back, on", (key) => scrub(key === "[" ? -0.02 : 0.02)],
   ["PgUp PgDn", ["PageUp", "PageDown"], "preview one move back, on", (key) => stepPreview(key === "PageUp" ? -1 : 1)],

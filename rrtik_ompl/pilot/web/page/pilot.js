@@ -5,7 +5,7 @@ const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1];  // shares of the joints' rates
 const PRESETS = ["corner", "side", "top", "behind"];
 const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
 const NEAR_LIMIT = 0.04, MARK = 0.006, UNSEEN_S = 1, HOLD_MS = 3000;
-const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|withdrawn|stopped:|but the tip|no nearer|left;|outside|collision|away from the goal/;
+const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|no lift|nothing is|withdrawn|stopped:|but the tip|no nearer|left;|outside|collision|away from the goal/;
 const FIRST_WORDS = "Choose a grasp with G and L, then plan with P. Or choose a joint with 1 … 9 and hold ← or → to drive it.";
 let state = null, role = { role: "watching", free: false, pages: 1 }, preset = 0, receivedAt = 0, playing = null;
 let previousAlert = "", heldUntil = 0;
@@ -42,6 +42,7 @@ function chooseGrasp(byType, byLevel) {
   const level = state.choice ? state.choice.level + byLevel : 0;
   send("grasp", { type, level: level % levels });
 }
+function toggleGripper() { send(state?.gripper.closed ? "open" : "close"); }
 function nextPreset() { preset = (preset + 1) % PRESETS.length; send("preset", { view: PRESETS[preset] }); }
 
 // --- preview of the route ---------------------------------------------------------------------------------------
@@ -100,7 +101,7 @@ function showState(said) {
   for (const item of byId("modes").children)
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
   if (newMessage || performance.now() > heldUntil) say(inWords(said.message) || FIRST_WORDS, WORRYING.test(said.message), 0);
-  showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showPreview(); showAge();
+  showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showGripper(); showPreview(); showAge();
   if (said.mode !== "proposed" && playing) pausePlay();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
@@ -307,6 +308,16 @@ function showButtons() {
   for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || state.mode !== "proposed";
 }
 
+function showGripper() {
+  const { closed, holds } = state.gripper;
+  set(byId("grip").firstChild, closed ? "Open gripper" : "Close gripper");
+  byId("grip").setAttribute("aria-pressed", String(closed));
+  set(byId("holds"), holds ? `holds ${holds}` : closed ? "closed, empty" : "open");
+  const free = role.role === "pilot" && !state.replay && !state.trouble && state.mode !== "following";
+  byId("grip").disabled = !free;
+  byId("lift").disabled = !free || !holds;
+}
+
 function showPreview() {
   const previewed = state.playing !== null && Boolean(state.route);
   byId("preview_tag").hidden = !previewed;
@@ -317,6 +328,8 @@ function showPreview() {
 // --- buttons, mouse ---------------------------------------------------------------------------------------------
 
 for (const name of ["plan", "replan", "accept", "reject", "back", "take", "hand_over", "pause"]) byId(name).onclick = () => send(name);
+byId("grip").onclick = toggleGripper;
+byId("lift").onclick = () => send("lift");
 byId("stop").onpointerdown = stopNow;
 byId("stop").onclick = stopNow;
 holdButton(byId("next"), () => ["next", {}]);
