@@ -60,6 +60,8 @@ class Engine:
         self._advance(time)
         arguments = dict(command)
         name = quoted(arguments.pop("name", ""))
+        if "object" in arguments:  # which one, for "name" is that of the command
+            arguments["name"] = arguments.pop("object")
         if name not in VIEW_COMMANDS:
             self.session.command(name, time, **arguments)
             self._return_to_now()

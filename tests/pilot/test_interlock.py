@@ -202,3 +202,10 @@ def test_the_outside_view_returns_to_now_when_a_route_is_accepted_or_anything_mo
 def test_an_arm_over_a_line_is_not_moved_on_photographs(tmp_path):
     with pytest.raises(InputError, match="photographs or a film"):
         open_session(SessionOptions("titan4_sdu", source=tmp_path, arm="127.0.0.1:1"))
+
+
+def test_the_page_chooses_an_object_by_its_name():
+    engine = open_session(SessionOptions("titan4_sdu")).engine
+    engine.update(0.0)
+    engine.execute({"name": "object", "object": "valve"}, 0.1)
+    assert engine.session.message == "valve chosen; now a grasp"

@@ -153,3 +153,36 @@ def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is
         page.ask(f"push({button}, false)")
         time.sleep(0.1)
     page.ask("delete navigator.getGamepads; 0")
+
+
+@pytest.mark.slow
+def test_a_whole_route_by_a_gamepad_alone(page, running):
+    session = running.opened.engine.session
+    session.rates.flags.writeable = True
+    usual = session.rates.copy()
+    session.rates[:] = session.arm._rates[:] = 3.0
+    page.ask(PAD)
+
+    def tap(button, until):
+        page.ask(f"push({button}, true)")
+        page.wait(until)
+        page.ask(f"push({button}, false)")
+        time.sleep(0.1)
+
+    tap(6, "state.choice !== null")
+    if page.ask("document.querySelector('.lamp[aria-pressed=true]').dataset.color") != "green":
+        tap(7, "state.choice.level === 1")
+    tap(2, "state.mode === 'proposed'")
+    tap(3, "state.mode === 'following'")
+    page.ask("push(4, true)")
+    for _ in range(40):
+        if page.ask("state.mode") != "following":
+            break
+        now = page.ask("state.route.moves.findIndex(m => m.status === 'current')")
+        keep_pushed(
+            page, 0, f"state.mode !== 'following' || (state.route.moves[{now}].status === 'done' && !state.driving)"
+        )
+        page.wait("state.mode !== 'following' || state.route.moves.some(m => m.status === 'current')")
+    page.wait("state.message === 'all moves are done'")
+    assert page.ask("state.aim.distance") < 0.002
+    session.rates[:] = session.arm._rates[:] = usual

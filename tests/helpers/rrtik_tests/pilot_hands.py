@@ -87,7 +87,7 @@ def follow(browser, hands, look):
 def pick_and_place(browser, running, kind, look=lambda: None):
     """Take the tool, lift it, carry it to the rack and put it down; `look` is called whenever something has changed."""
     browser.open(running.server.url)
-    browser.wait("state && state.objects.length === 2 && role.role === 'pilot' && window.measured.frames.C > 2")
+    browser.wait("state && state.objects.length === 2 && role.role === 'pilot' && window.measured.frames.C > 0", 90.0)
     faster(running)
     hands = kind(browser)
     if browser.ask("state.target") != "tool":

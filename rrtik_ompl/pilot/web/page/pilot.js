@@ -31,7 +31,7 @@ function changeSpeed(by) {
 }
 function nextObject() {
   const names = state.objects.filter((each) => each.graspable).map((each) => each.name);
-  if (names.length) send("object", { name: names[(names.indexOf(state.target) + 1) % names.length] });
+  if (names.length) send("object", { object: names[(names.indexOf(state.target) + 1) % names.length] });
 }
 function chooseGrasp(byType, byLevel) {
   const types = [...new Set(state.lamps.map((lamp) => lamp.type))];
@@ -345,7 +345,7 @@ byId("value").onkeydown = (event) => {
   event.target.value = "";
   event.target.blur();
 };
-byId("target").onchange = (event) => { send("object", { name: event.target.value }); event.target.blur(); };
+byId("target").onchange = (event) => { send("object", { object: event.target.value }); event.target.blur(); };
 byId("play").onclick = togglePlay;
 byId("live").onclick = showNow;
 byId("step_back").onclick = () => stepPreview(-1);
