@@ -147,7 +147,7 @@ def rpy_matrices(angles: Matrix) -> NDArray[np.float64]:
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
         [-sp, cp * sr, cp * cr],
     ]
-    matrices: NDArray[np.float64] = np.moveaxis(np.array(rows), 2, 0)
+    matrices: NDArray[np.float64] = np.array(rows).transpose(2, 0, 1)
     return matrices
 
 

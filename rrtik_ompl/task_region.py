@@ -149,9 +149,7 @@ class TaskRegion(WithinTolerances):
     def poses(self, coordinates: Matrix) -> NDArray[np.float64]:
         """T_world_tip for displacements, shape (m, 6): (m, 4, 4)."""
         coordinates = _rows(coordinates, (6,), "displacements in a region")
-        D = np.tile(np.eye(4), (len(coordinates), 1, 1))
-        D[:, :3, :3], D[:, :3, 3] = rpy_matrices(coordinates[:, 3:]), coordinates[:, :3]
-        poses: NDArray[np.float64] = self.T_world_w.homogeneous @ D @ self.T_w_tip.homogeneous
+        poses: NDArray[np.float64] = self.T_world_w.homogeneous @ displacements(coordinates) @ self.T_w_tip.homogeneous
         return poses
 
     def drawn(self, count: int, rng: np.random.Generator) -> Matrix:
@@ -178,6 +176,13 @@ class TaskRegion(WithinTolerances):
         poses = self.poses(self.nearest(tips))
         position: Vector = np.linalg.norm(tips[:, :3, 3] - poses[:, :3, 3], axis=1)
         return position, rotation_angles(np.swapaxes(poses[:, :3, :3], 1, 2) @ tips[:, :3, :3])
+
+
+def displacements(coordinates: Matrix) -> NDArray[np.float64]:
+    """The transforms D of rows of x, y, z [m] and roll, pitch, yaw [rad], shape (m, 6): (m, 4, 4)."""
+    D = np.zeros((len(coordinates), 4, 4))
+    D[:, :3, :3], D[:, :3, 3], D[:, 3, 3] = rpy_matrices(coordinates[:, 3:]), coordinates[:, :3], 1.0
+    return D
 
 
 def _rows(values: ArrayLike, shape: tuple[int, ...], what: str) -> NDArray[np.float64]:
@@ -228,10 +233,15 @@ def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
 
     The trace of R^T Rz Ry Rx is a cosine of each angle.
     """
-    x, y, z = (rpy_matrices(angles * unit) for unit in np.eye(3))
-    before, after = ((z @ y, None), (z, x), (None, y @ x))[k]
-    C = np.swapaxes(R, 1, 2) if before is None else np.swapaxes(R, 1, 2) @ before
-    C = C if after is None else after @ C
+    turns = [None if other == k else rpy_matrices(angles * unit) for other, unit in enumerate(np.eye(3))]
+    C = np.swapaxes(R, 1, 2)
+    match turns:
+        case None, y, z:
+            C = C @ (z @ y)
+        case x, None, z:
+            C = x @ (C @ z)
+        case x, y, None:
+            C = (y @ x) @ C
     i, j = (k + 1) % 3, (k + 2) % 3
     angle: Vector = np.arctan2(C[:, i, j] - C[:, j, i], C[:, i, i] + C[:, j, j])
     return angle

@@ -35,7 +35,7 @@ from rrtik_ompl.world import World
 
 PLATE, NEEDLE = 1e-4, 2e-4  # [m] thickness, radius
 PLANNERS = ("fastrrtconnect", "bicrdt", "RRTConnect")
-SECONDS = 2.0  # for a plan
+SECONDS = 10.0  # for a plan: enough on a busy machine
 FEWEST = 2.0  # [s] for fewest-moves
 BRIEF = 1e-6  # share of a motion
 TURNS = 5

@@ -29,7 +29,7 @@ from rrtik_ompl.ik.multi_goals import at_all_tips
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
 from rrtik_ompl.ik.numeric.projection import project, projected
 from rrtik_ompl.ik.solve import DRAWS, solve_ik
-from rrtik_ompl.ik.targets import leaves_freedom, targets
+from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
@@ -104,7 +104,8 @@ class GoalSearch:
         if self.exhausted or isinstance(goal, JointGoal):
             return False
         if self._rounds == 0 and self._problem in _first_rounds and not isinstance(goal, MultiGoal):
-            self._draw(goal)
+            skip_targets(goal, DRAWS, self._rng)
+            self._rng.integers(2**31)  # the seed of that round
             self._rounds = 1
             self.rows, self._found, self.exhausted = _first_rounds[self._problem]
             return len(self.rows) > 0

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU
+from rrtik_ompl.arrays import TAU, Matrix
 from rrtik_ompl.goal import GoalPart, PoseGoal, PositionGoal, TipGoal, parts_of
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.task_region import TaskRegion, displacements
 
 
 def targets(goal: TipGoal, most: int, rng: np.random.Generator) -> list[PoseGoal | PositionGoal]:
     """Goals without freedom: the goal itself, or up to ``most`` of a region's parts, with draws where they are free."""
-    parts = parts_of(goal)
-    if len(parts) > most:
-        parts = tuple(parts[k] for k in rng.permutation(len(parts))[:most])
-    count = most if any(leaves_freedom(part) for part in parts) else len(parts)
-    return [_drawn(parts[k % len(parts)], rng) for k in range(count)]
+    parts, coordinates = _drawn(goal, most, rng)
+    places = iter(displacements(coordinates))
+    return [_target(part, next(places)) if isinstance(part, TaskRegion) else part for part in parts]
+
+
+def skip_targets(goal: TipGoal, most: int, rng: np.random.Generator) -> None:
+    """Draw the random numbers of :func:`targets`, and make nothing of them."""
+    _drawn(goal, most, rng)
 
 
 def leaves_freedom(part: GoalPart) -> bool:
@@ -23,10 +26,20 @@ def leaves_freedom(part: GoalPart) -> bool:
     return isinstance(part, TaskRegion) and bool(part.free.any())
 
 
-def _drawn(part: GoalPart, rng: np.random.Generator) -> PoseGoal | PositionGoal:
-    if not isinstance(part, TaskRegion):
-        return part
-    (pose,) = part.poses(part.drawn(1, rng))
+def _drawn(goal: TipGoal, most: int, rng: np.random.Generator) -> tuple[list[GoalPart], Matrix]:
+    """The parts of which targets are made, and for each region among them a displacement, shape (regions, 6)."""
+    parts = parts_of(goal)
+    if len(parts) > most:
+        parts = tuple(parts[k] for k in rng.permutation(len(parts))[:most])
+    count = most if any(leaves_freedom(part) for part in parts) else len(parts)
+    drawn = [parts[k % len(parts)] for k in range(count)]
+    bounds = np.array([part.bounds for part in drawn if isinstance(part, TaskRegion)]).reshape(-1, 6, 2)
+    return drawn, rng.uniform(bounds[..., 0], bounds[..., 1])
+
+
+def _target(part: TaskRegion, displacement: Matrix) -> PoseGoal | PositionGoal:
+    """The goal without freedom that a displacement of a region is, shape (4, 4)."""
+    pose = part.T_world_w.homogeneous @ displacement @ part.T_w_tip.homogeneous
     any_turn = (part.bounds[3:, 1] - part.bounds[3:, 0] >= TAU).all()
     if any_turn and not part.T_w_tip.translation.any():
         return PositionGoal(pose[:3, 3], part.position_tolerance)
