@@ -176,7 +176,7 @@ class GoalSet:
     def member_at(self, robot: Robot, q: ArrayLike) -> int | None:
         """Number of the member that a configuration, shape (dof,), reaches, from 0, the nearest of several; or None."""
         each = self.member_errors(robot, np.atleast_2d(q))[:, 0]
-        reached = [bool((errors <= _tolerances(part)).all()) for errors, part in zip(each, self.parts, strict=True)]
+        reached = [bool((errors <= tolerances(part)).all()) for errors, part in zip(each, self.parts, strict=True)]
         away = np.where(reached, each[:, 0] + metres_per_radian(robot) * each[:, 1], np.inf)
         return int(away.argmin()) if any(reached) else None
 
@@ -250,10 +250,10 @@ def parts_of(goal: TipGoal | MultiGoal) -> tuple[GoalPart, ...]:
     return goal.parts if isinstance(goal, GoalSet | MultiGoal) else (goal,)
 
 
-def _tolerances(part: GoalPart) -> tuple[float, float]:
-    """How far the tip may be from a goal that it is at [m], and turned by [rad]."""
+def tolerances(part: GoalPart) -> tuple[float, float]:
+    """What the errors of a goal may be at most: distance [m] and angle [rad] (0 for a position)."""
     if isinstance(part, PositionGoal):
-        return part.tolerance, np.inf
+        return part.tolerance, 0.0
     return part.position_tolerance, part.orientation_tolerance
 
 

@@ -12,11 +12,10 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_ne
 from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.description.joint_weights import weighted_difference
-from rrtik_ompl.goal import PoseGoal, joint_difference
+from rrtik_ompl.goal import PoseGoal, joint_difference, tolerances
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
 from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
 from rrtik_ompl.ik.goal_rows import POSE, pose_rows
-from rrtik_ompl.ik.method_interface import tolerances
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
 from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, mid_range_configuration, solve_ik

@@ -80,13 +80,6 @@ class Method:
     run: Callable[[IkRequest], IkResponse]
 
 
-def tolerances(target: Target) -> tuple[float, float]:
-    """What the errors of a target may be at most: distance [m] and angle [rad] (0 for a position)."""
-    if isinstance(target, PositionGoal):
-        return target.tolerance, 0.0
-    return target.position_tolerance, target.orientation_tolerance
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class IkResult:
     """What inverse kinematics found.

@@ -13,7 +13,7 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.fast.ik import branch_layout, ik_layout
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.goal import PositionGoal, tolerances
 from rrtik_ompl.ik.analytic.closed_form import branches_of, family, form_of, has_closed_form
 from rrtik_ompl.ik.analytic.kernel_branches import valid_branches
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
@@ -24,7 +24,7 @@ from rrtik_ompl.ik.baselines.joint_axes import coupled_fault
 from rrtik_ompl.ik.baselines.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.genetic.method import genetic
 from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, Target, tolerances
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, Target
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric
 from rrtik_ompl.ik.numeric.projection import projection
 from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, Walk, restarted

@@ -24,9 +24,10 @@ from rrtik_ompl.goal import (
     joint_difference,
     parts_of,
     tip_errors,
+    tolerances,
 )
 from rrtik_ompl.ik.mb_rrt.search import out_of_reach
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, different_rows, tolerances
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, different_rows
 from rrtik_ompl.ik.method_interface import IkResult as IkResult
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.multi_goals import PROJECTION, solve_all_tips

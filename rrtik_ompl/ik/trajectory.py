@@ -15,12 +15,12 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_ne
 from rrtik_ompl.choices import FrameAxis, GeneticPreset, IkMethod, TrajectoryIkMethod, one_of
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors
+from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors, tolerances
 from rrtik_ompl.ik.analytic.branch_choice import JUMP, follow
 from rrtik_ompl.ik.analytic.closed_form import check_poses, form_of
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
-from rrtik_ompl.ik.method_interface import Target, tolerances
+from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric.track import Tracker
 from rrtik_ompl.ik.random_stream import RandomStream

@@ -15,6 +15,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik import goal_configurations
 from rrtik_ompl.ik.goal_configurations import GoalSearch
+from rrtik_ompl.ik.targets import skip_targets, targets
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
 from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners, traits_of
 from rrtik_ompl.planning import list_planners, plan
@@ -343,3 +344,27 @@ def test_what_random_numbers_decide_is_searched_for_anew():
     assert np.array_equal(rows[0], rows[2])
     fresh = GoalSearch(Problem(problem.world, problem.start, problem.goal), 2).first()
     assert np.array_equal(rows[1], fresh)
+
+
+def test_targets_lie_in_their_parts_and_skipping_them_draws_the_same_numbers():
+    bounds = np.array([[-0.1, 0.1], [0.0, 0.0], [0.0, 0.2], [0.0, 0.0], [0.0, 0.0], [-1.0, 2.0]])
+    region = TaskRegion(pose([0.4, 0.1, 0.2]), bounds, pose([0.0, 0.1, 0.0]))
+    goal = GoalSet([PositionGoal([0.3, 0.2, 0.1]), region])
+    one, other = np.random.default_rng(3), np.random.default_rng(3)
+    made = targets(goal, 6, one)
+    skip_targets(goal, 6, other)
+    assert one.random() == other.random()
+    assert [type(target) for target in made] == [PositionGoal, PoseGoal] * 3
+    tips = np.array([target.T_world_tip.homogeneous for target in made[1::2]])
+    inside = region.nearest(tips)
+    assert np.allclose(region.poses(inside), tips, atol=1e-12)
+    assert len(np.unique(inside[:, 5])) == 3
+
+
+def test_a_goal_set_says_which_member_is_reached_by_tolerances_of_each():
+    robot, q = load_robot("ur5"), HERE
+    tip = robot.fk_batch(q[None])[0]
+    near = PoseGoal(pose(tip[:3, 3] + [0.0, 0.0, 2e-3]), orientation_tolerance=4.0)
+    exact, far = PositionGoal(tip[:3, 3]), PositionGoal(tip[:3, 3] + 0.1)
+    assert GoalSet([far, near]).member_at(robot, q) is None
+    assert GoalSet([far, near, exact]).member_at(robot, q) == 2
