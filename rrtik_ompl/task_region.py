@@ -233,15 +233,14 @@ def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
 
     The trace of R^T Rz Ry Rx is a cosine of each angle.
     """
-    turns = [None if other == k else rpy_matrices(angles * unit) for other, unit in enumerate(np.eye(3))]
+    first, second = (rpy_matrices(angles * np.eye(3)[other]) for other in range(3) if other != k)
     C = np.swapaxes(R, 1, 2)
-    match turns:
-        case None, y, z:
-            C = C @ (z @ y)
-        case x, None, z:
-            C = x @ (C @ z)
-        case x, y, None:
-            C = (y @ x) @ C
+    if k == 0:
+        C = C @ (second @ first)
+    elif k == 1:
+        C = first @ (C @ second)
+    else:
+        C = (second @ first) @ C
     i, j = (k + 1) % 3, (k + 2) % 3
     angle: Vector = np.arctan2(C[:, i, j] - C[:, j, i], C[:, i, i] + C[:, j, j])
     return angle
