@@ -80,9 +80,7 @@ class PositionGoal:
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Distance of the tip from the point for each row of Q, shape (m,) [m]."""
         require(robot, Robot, "robot of a goal")
-        tips = robot.fk_batch(Q)[:, :3, 3]
-        distances: Vector = np.linalg.norm(tips - self.position, axis=1)
-        return distances
+        return np.asarray(np.linalg.norm(robot.fk_batch(Q)[:, :3, 3] - self.position, axis=1))
 
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
         """Distance [m] of each row of Q, and an angle of 0, shapes (m,)."""
@@ -298,9 +296,4 @@ def _freed(goal: PoseGoal, free_rotation_axis: FrameAxis | None, box: Vector) ->
     bounds[:3] = np.outer(box, [-0.5, 0.5])
     if free_rotation_axis is not None:
         bounds[3 + "xyz".index(free_rotation_axis)] = -np.pi, np.pi
-    return TaskRegion(
-        goal.T_world_tip,
-        bounds,
-        position_tolerance=goal.position_tolerance,
-        orientation_tolerance=goal.orientation_tolerance,
-    )
+    return TaskRegion(goal.T_world_tip, bounds, pin.SE3.Identity(), *tolerances(goal))
