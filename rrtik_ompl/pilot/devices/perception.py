@@ -130,11 +130,7 @@ class SimulatedSource:
     def _carry(self, arm: SimulatedArm, T_base_tip: pin.SE3) -> None:
         """Objects that can be carried move with a closed gripper, if it was closed where they can be grasped."""
         tip, camera = self._camera.T_start_base * T_base_tip, self._camera
-        if not arm.closed:
-            self._carried, self._was_closed = None, False
-            return
-        if not self._was_closed:
-            self._was_closed = True
+        if arm.closed and not self._was_closed:
             near = [
                 (float(np.linalg.norm(tip.actInv(camera.places[thing.name] * level).translation)), thing.name)
                 for thing in camera.marker_map.objects
@@ -147,6 +143,9 @@ class SimulatedSource:
                 self._carried = (name, tip.actInv(camera.places[name]))
         if self._carried is not None:
             camera.places = {**camera.places, self._carried[0]: tip * self._carried[1]}
+        if not arm.closed:  # it was laid where the gripper has opened
+            self._carried = None
+        self._was_closed = arm.closed
 
     def close(self) -> None:
         """Nothing to release."""

@@ -1,0 +1,27 @@
+"""A whole task on the page in a browser, by a keyboard and by a gamepad: a tool is taken and put into its rack."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
+from rrtik_ompl.pilot.setup import SessionOptions
+from rrtik_tests.browser import Running
+from rrtik_tests.pilot_hands import HANDS, pick_and_place
+
+TOOL = Path(find_vehicle("titan4_sdu")).with_name("titan4_tool.yaml")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", sorted(HANDS))
+def test_a_tool_is_taken_and_put_into_its_rack(browser, kind):
+    with Running(SessionOptions("titan4_sdu", vehicle=TOOL, seed=1)) as running:
+        pick_and_place(browser, running, HANDS[kind])
+        made = running.opened.engine.perception._source._camera.places["tool"]
+        assert running.opened.engine.session.hand.holds == ""
+    vehicle = load_vehicle(TOOL)
+    pick, put = (vehicle.marker_map.named(name).grasp(grasp).levels[0]
+                 for name, grasp in (("tool", "straight"), ("rack", "put")))  # fmt: skip
+    wanted = vehicle.places["rack"] * put * pick.inverse()
+    assert np.linalg.norm(made.translation - wanted.translation) < 2e-3
