@@ -14,13 +14,16 @@ from dataclasses import fields
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.solids import bvh, is_mesh, mesh_arrays
 from rrtik_ompl.copies import packed, unpacked
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 
+LIMITS = tuple(f"{end}{what}Limit" for what in ("Position", "Velocity", "Effort") for end in ("lower", "upper"))
 MOST_ROBOTS = 16  # that arrived and are kept, so that the next copy of one is the same object
 _known: OrderedDict[bytes, Robot] = OrderedDict()
 _lock = threading.Lock()
@@ -45,6 +48,7 @@ def robot_from_bytes(data: bytes) -> Robot:
             return _known[key]
     state: dict[str, Any] = {name: unpacked(value) for name, value in pickle.loads(data).items()}
     state |= {name: _geometry(state[name]) for name in ("collision", "visual")}
+    state["model"] = _with_limits(*state["model"])
     return _remember(key, Robot(**state))
 
 
@@ -61,12 +65,25 @@ def _remember(key: bytes, robot: Robot) -> Robot:
 def _bytes_of(robot: Robot) -> bytes:
     state = {field.name: packed(getattr(robot, field.name)) for field in fields(robot)}
     state |= {name: _items(state[name]) for name in ("collision", "visual")}
+    state["model"] = _without_limits(robot.model)
     try:
         return pickle.dumps(state, protocol=5)
     except (pickle.PicklingError, TypeError, AttributeError) as error:
         raise InputError(
             f"robot '{robot.name}' cannot be sent to another process: {error}; define its closed_form in a module"
         ) from None
+
+
+def _without_limits(model: Any) -> tuple[Any, dict[str, Vector]]:
+    """A copy of a model without its limits, and these: Pinocchio 4.0 does not read the infinite ones that it writes."""
+    limits = {name: np.array(getattr(model, name)) for name in LIMITS}
+    return _with_limits(model.copy(), {name: np.zeros_like(row) for name, row in limits.items()}), limits
+
+
+def _with_limits(model: Any, limits: dict[str, Vector]) -> Any:
+    for name, row in limits.items():
+        setattr(model, name, row)
+    return model
 
 
 def _items(geometry: Any) -> list[tuple[Any, ...]]:

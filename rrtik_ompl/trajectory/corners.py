@@ -31,7 +31,7 @@ def vertices(waypoints: Matrix) -> Matrix:
 
 def spaced(rows: Matrix, apart: float) -> NDArray[np.int64]:
     """Numbers of the rows that are farther than ``apart`` from the last one kept; the last row always, shape (m,)."""
-    steps = np.linalg.norm(np.diff(rows, axis=0), axis=1)
+    steps = np.linalg.norm(rows[1:] - rows[:-1], axis=1)
     if (steps > apart).all():
         return np.arange(len(rows))
     kept, at = [0], 1
@@ -54,9 +54,9 @@ def first_radii(corners: Matrix, blend: float) -> Vector:
     At most as far as ``blend`` and the nearest end of the path, and so that the corner by itself leaves the path by at
     most ``ROUNDED_SHARE`` of the blend: the rounding of radius r leaves it by r / 6 of the change of direction.
     """
-    edges = np.diff(corners, axis=0)
+    edges = corners[1:] - corners[:-1]
     directions = edges / np.linalg.norm(edges, axis=1)[:, None]
-    turns = np.linalg.norm(np.diff(directions, axis=0), axis=1)
+    turns = np.linalg.norm(directions[1:] - directions[:-1], axis=1)
     cosines = (directions[1:] * directions[:-1]).sum(axis=1)
     radii: Vector = np.minimum(blend, 6.0 * ROUNDED_SHARE * blend / np.maximum(turns, 1e-300))
     radii[cosines < MIN_CORNER_COSINE] = 0.0

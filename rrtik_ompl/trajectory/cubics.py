@@ -20,7 +20,7 @@ def jerks_of(
 
 def ends_of(times: Vector, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> Matrix:
     """Where the cubic of each piece ends, shape (m - 1, n)."""
-    h = np.diff(times)[:, None]
+    h = (times[1:] - times[:-1])[:, None]
     v, a, j = velocities[:-1], accelerations[:-1], jerks_of(times, velocities, accelerations)
     ends: Matrix = positions[:-1] + h * (v + h * (a / 2.0 + h * j / 6.0))
     return ends

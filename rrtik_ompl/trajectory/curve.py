@@ -71,7 +71,7 @@ class Curve:
     @classmethod
     def of(cls, vertices: Matrix, radii: Vector) -> Curve:
         """The curve through vertices, shape (k, n), whose inner ones are rounded, shape (k - 2,)."""
-        edges = np.diff(vertices, axis=0)
+        edges = vertices[1:] - vertices[:-1]
         lengths = np.linalg.norm(edges, axis=1)
         along = np.concatenate([np.zeros(1), np.cumsum(lengths)])
         widths = np.zeros(len(along))
@@ -134,10 +134,10 @@ class Curve:
         """
         at, radii = self.along[1:-1], self.radii[1:-1]
         knots = np.unique(np.concatenate([at - radii, at, at + radii, self.along[[0, -1]]]))
-        knots = knots[np.concatenate([[True], np.diff(knots) > SAME_PLACE * self.length])]
+        knots = knots[np.concatenate([[True], knots[1:] - knots[:-1] > SAME_PLACE * self.length])]
         knots[-1] = self.length
         middles = 0.5 * (knots[1:] + knots[:-1])
-        widths = np.diff(knots)
+        widths = knots[1:] - knots[:-1]
         tightest = self.tightest(middles)
         steps = np.where(np.isinf(tightest), widths / STEPS_PER_LINE, tightest / STEPS_PER_RADIUS)
         steps = np.minimum(steps, self.length / LEAST_STEPS)

@@ -115,5 +115,5 @@ def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) 
         squares = task[layout.SQUARES].copy()
     speeds = np.sqrt(squares)
     with np.errstate(divide="ignore"):
-        steps = 2.0 * np.diff(grid) / (speeds[1:] + speeds[:-1])
+        steps = 2.0 * (grid[1:] - grid[:-1]) / (speeds[1:] + speeds[:-1])
     return PathTiming(grid, squares, np.concatenate([np.zeros(1), np.cumsum(steps)]))

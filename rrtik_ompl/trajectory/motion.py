@@ -94,7 +94,7 @@ class Trajectory:
         path = JointPath(positions, joint_names, prismatic, robot_name)
         rows = path.waypoints
         clock = finite_array(times, (len(rows),), "trajectory times")
-        if len(clock) < 2 or clock[0] != 0.0 or not (np.diff(clock) > 0.0).all():
+        if len(clock) < 2 or clock[0] != 0.0 or not (clock[1:] > clock[:-1]).all():
             raise InputError("trajectory times: expected two or more, beginning with 0, each greater than the last")
         rates = finite_array(velocities, rows.shape, "trajectory velocities")
         if accelerations is None:
@@ -151,7 +151,7 @@ class Trajectory:
     def peaks(self) -> Peaks:
         """The largest velocity, acceleration and jerk of each joint: exact, not sampled, for every piece is a cubic."""
         # joints in rows: numpy looks for the largest number along a row much faster than down a column
-        h = np.diff(self.times)
+        h = self.times[1:] - self.times[:-1]
         v, a, j = (np.ascontiguousarray(rows.T) for rows in (self.velocities, self.accelerations, self.jerks))
         with np.errstate(divide="ignore", invalid="ignore"):
             turn = -a[:, :-1] / j
@@ -165,7 +165,7 @@ class Trajectory:
         rest = np.abs(a[:, [0, -1]]) <= jump  # before its beginning and after its end the arm does not move
         smooth |= apart <= jump
         steady = smooth.all(axis=1) & rest.all(axis=1)
-        jerk = np.where(steady, np.abs(np.diff(a, axis=1) / h).max(axis=1), np.inf)
+        jerk = np.where(steady, np.abs((a[:, 1:] - a[:, :-1]) / h).max(axis=1), np.inf)
         return Peaks(velocity, acceleration, jerk)
 
     def _noise(self, h: Vector) -> Vector:

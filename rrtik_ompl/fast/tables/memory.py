@@ -32,12 +32,18 @@ COPIED_WORDS = 4096  # up to so many it is quicker to copy a whole piece than to
 
 def aligned(array: NDArray[Any]) -> NDArray[Any]:
     """A flat copy that starts on a multiple of ``ALIGNMENT`` bytes, between guard words; even an empty one does."""
+    return _placed(array)[0]
+
+
+def _placed(array: NDArray[Any]) -> tuple[NDArray[Any], int]:
+    """What :func:`aligned` makes, and its address, which numpy takes long to give."""
     memory = np.empty(array.nbytes + 3 * ALIGNMENT, dtype=np.uint8)
-    start = ALIGNMENT + -memory.ctypes.data % ALIGNMENT
+    begin = int(memory.ctypes.data)
+    start = ALIGNMENT + -begin % ALIGNMENT
     memory[:start] = memory[start + array.nbytes :] = GUARD
     copy: NDArray[Any] = np.ndarray(array.size, array.dtype, memory, start)
     copy[:] = array.ravel()
-    return copy
+    return copy, begin + start
 
 
 def is_intact(array: NDArray[Any]) -> bool:
@@ -77,8 +83,9 @@ def table(fields: Mapping[int, int | NDArray[Any]], parts: Sequence[Table] = ())
     Arrays are flat, begin on a multiple of ``ALIGNMENT`` bytes and stay where they are as long as the table lives, and
     so do ``parts``, other tables whose addresses it holds.
     """
-    arrays = {place: aligned(value) for place, value in fields.items() if isinstance(value, np.ndarray)}
-    header = [arrays[place].ctypes.data if place in arrays else fields[place] for place in range(len(fields))]
+    placed = {place: _placed(value) for place, value in fields.items() if isinstance(value, np.ndarray)}
+    header = [placed[place][1] if place in placed else fields[place] for place in range(len(fields))]
+    arrays = {place: array for place, (array, _) in placed.items()}
     return Table(aligned(np.array(header, dtype=np.int64)), arrays, tuple(parts))
 
 
