@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -43,6 +43,15 @@ class JointLimits:
     velocity: float | None = None
     acceleration: float | None = None
     jerk: float | None = None
+
+
+def merge_limits(base: Mapping[str, JointLimits], over: Mapping[str, JointLimits]) -> dict[str, JointLimits]:
+    """Limits by joint in which every number of ``over`` replaces that of ``base``."""
+    merged = dict(base)
+    for joint, limits in over.items():
+        given = {key: value for key in JointLimits.__slots__ if (value := getattr(limits, key)) is not None}
+        merged[joint] = replace(merged.get(joint, JointLimits()), **given)
+    return merged
 
 
 def build_robot(

@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rrtik_ompl.description.moveit.joint_limits import merge_limits, read_joint_limits
 from rrtik_ompl.description.moveit.srdf import Srdf, read_srdf
 from rrtik_ompl.description.moveit.srdf_gripper import srdf_gripper
-from rrtik_ompl.description.robot_build import JointLimits, build_robot
+from rrtik_ompl.description.robot_build import JointLimits, build_robot, merge_limits
 from rrtik_ompl.description.robot_source import source_entry
+from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.description.xacro_text import robot_text
 from rrtik_ompl.errors import InputError, UnknownNameError
@@ -106,7 +106,7 @@ def robot_from_urdf_text(
         raise InputError(f"{where}: group '{group}' needs an SRDF file; give srdf=FILE, or joints=[...] in its place")
     end = semantics.group_tip(group, tree) if group in semantics.groups and tip is None and group is not None else tip
     actuated = _actuated(description, semantics, group, joints, tip)
-    from_file = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in tree.joints])
+    from_file = {} if joint_limits is None else _limits_of_file(joint_limits, tree)
     with located(where):
         robot = build_robot(
             name or description.name or Path(where).stem,
@@ -149,3 +149,9 @@ def _actuated(
     if tip is not None and tip in {link.name for link in tree.links}:
         return tuple(joint.name for joint in tree.chain(tip) if joint.name in movable)
     return movable
+
+
+def _limits_of_file(file: FilePath, tree: Tree) -> dict[str, JointLimits]:
+    from rrtik_ompl.description.moveit.joint_limits import read_joint_limits  # most robots need no YAML
+
+    return read_joint_limits(file, [joint.name for joint in tree.joints])

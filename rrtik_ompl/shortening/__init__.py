@@ -26,7 +26,6 @@ from rrtik_ompl.shortening.acceptance import Acceptance, Form
 from rrtik_ompl.shortening.along_constraints import along_constraints
 from rrtik_ompl.shortening.best import best_in_time
 from rrtik_ompl.shortening.corners import snap_corners
-from rrtik_ompl.shortening.fewest_moves import fewest_moves
 from rrtik_ompl.shortening.random_cut import random_cut, shortcut
 from rrtik_ompl.shortening.retraction import retract
 from rrtik_ompl.shortening.sequential import sequential_cut
@@ -75,6 +74,8 @@ def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
 
 
 def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
+    from rrtik_ompl.shortening.fewest_moves import fewest_moves  # many paths are shortened without its search
+
     return fewest_moves(
         route, problem.world, seed=task.seed, stop=task.expired, rules=task.rules, clearance=task.clearance
     ).route

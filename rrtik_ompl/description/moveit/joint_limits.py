@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -49,15 +48,6 @@ def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> di
             raise document.error(location, f"expected keys such as max_velocity, found {describe(values)}")
         limits[joint] = _joint(document, location, values)
     return limits
-
-
-def merge_limits(base: Mapping[str, JointLimits], over: Mapping[str, JointLimits]) -> dict[str, JointLimits]:
-    """Limits by joint in which every number of ``over`` replaces that of ``base``."""
-    merged = dict(base)
-    for joint, limits in over.items():
-        given = {key: value for key in JointLimits.__slots__ if (value := getattr(limits, key)) is not None}
-        merged[joint] = replace(merged.get(joint, JointLimits()), **given)
-    return merged
 
 
 def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]) -> JointLimits:
