@@ -9,7 +9,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, whole_number
 from rrtik_ompl.description.joint_weights import given_weights
-from rrtik_ompl.errors import InputError, UnknownNameError, at_most, listed, name_of
+from rrtik_ompl.errors import InputError, UnknownNameError, at_most, listed, name_of, require
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.transitions import merge_moves
 
@@ -67,6 +67,7 @@ class MoveRules:
     @classmethod
     def of_robot(cls, robot: Robot, **options: Any) -> MoveRules:
         """Those of a robot; weights of its joints are their costs, unless others are given."""
+        require(robot, Robot, "robot")
         return cls(robot.joint_names, **weights_as_costs(robot) | options)
 
     def kept_by(self, route: Matrix) -> bool:

@@ -26,6 +26,7 @@ from rrtik_tests.covered_solids import (
     points_of,
     torus,
 )
+from rrtik_tests.sizes import how_many
 
 LETTER_L = [(0.0, 0.0), (0.3, 0.0), (0.3, 0.1), (0.1, 0.1), (0.1, 0.4), (0.0, 0.4)]
 FEW = settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
@@ -58,7 +59,10 @@ def assert_inside(spheres, geometry):
         assert (radii <= depth.min(axis=1) + TOLERANCE).all()
 
 
-def check_covers(geometry, count=6000):
+POINTS = how_many(6_000, 2_000)
+
+
+def check_covers(geometry, count=POINTS):
     cover = outer_cover(geometry)
     assert cover.dtype == np.float64
     assert cover.shape == (len(cover), 4)
@@ -99,7 +103,7 @@ def test_links_of_real_robots_are_covered_and_hold_their_inner_balls(robot):
 @pytest.mark.slow
 def test_links_with_many_triangles_are_covered_and_hold_their_inner_balls():
     for solid in robot_solids(load_robot("kinova"))[:7:3]:
-        check_covers(solid, count=20000)
+        check_covers(solid, count=how_many(20_000, 6_000))
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ def test_on_many_configurations_the_world_says_what_coal_says(name, dented_cube)
     rng, free = np.random.default_rng(11), []
     for _ in range(how_many(6, 3)):
         world = World(robot, surroundings(robot, rng, dented_cube))
-        Q = short_sweeps(world, rng, how_many(800, 300))
+        Q = short_sweeps(world, rng, how_many(800, 200))
         ours, coals = world.valid_batch(Q), free_by_coal(world, Q)
         for q in Q[ours != coals]:
             assert abs(world.clearance(q)) < CONTACT
@@ -114,7 +114,7 @@ def test_what_kernels_are_sure_of_is_true_and_they_leave_little_open(name, dente
 def test_the_certificate_says_the_same_in_whatever_order_rows_come(name, dented_cube):
     robot, rng = load_robot(name), np.random.default_rng(13)
     world = World(robot, surroundings(robot, rng, dented_cube))
-    Q = short_sweeps(world, rng, how_many(150, 50))  # neighbours stand for each other; strangers do not
+    Q = short_sweeps(world, rng, how_many(150, 25))  # neighbours stand for each other; strangers do not
     order = rng.permutation(len(Q))
     in_line = free_by_coal(world, Q)
     assert 0.05 < in_line.mean() < 0.995
