@@ -21,12 +21,6 @@ settings.load_profile("rrtik")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-
-def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """One more than cores: some tests wait for browsers, or for kernels that another process compiles."""
-    return (os.cpu_count() or 1) + 1
-
-
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 BOTTOM_AND_SIDES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6)]
 BOTTOM_AND_SIDES += [(0, 2, 6), (0, 6, 4)]
