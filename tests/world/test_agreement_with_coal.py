@@ -61,7 +61,7 @@ def test_on_many_configurations_the_world_says_what_coal_says(name, dented_cube)
     rng, free = np.random.default_rng(11), []
     for _ in range(how_many(6, 3)):
         world = World(robot, surroundings(robot, rng, dented_cube))
-        Q = short_sweeps(world, rng, how_many(800, 200))
+        Q = short_sweeps(world, rng, how_many(800, 300))
         ours, coals = world.valid_batch(Q), free_by_coal(world, Q)
         for q in Q[ours != coals]:
             assert abs(world.clearance(q)) < CONTACT
