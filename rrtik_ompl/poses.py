@@ -50,6 +50,12 @@ def quaternion_xyzw(placement: Any) -> Vector:
     return -quaternion if quaternion[3] < 0.0 else quaternion
 
 
+def apart(first: pin.SE3, second: pin.SE3) -> tuple[float, float]:
+    """How far two poses are apart [m], and by which angle they are turned to each other [rad]."""
+    off = first.actInv(second)
+    return float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
+
+
 def rigid(T: Any, what: str) -> Any:
     """A copy (``pinocchio.SE3``) of a pose in any form that a person may give: every pose from outside passes here.
 

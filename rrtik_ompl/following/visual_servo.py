@@ -19,7 +19,7 @@ from rrtik_ompl.arrays import Matrix, Vector, finite_array, positive
 from rrtik_ompl.choices import one_of
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.following.servo import Servo
-from rrtik_ompl.poses import rigid
+from rrtik_ompl.poses import apart, rigid
 from rrtik_ompl.robot import Robot
 
 ServoMethod: TypeAlias = Literal["position", "image"]
@@ -140,8 +140,7 @@ class VisualServo:
         tip, goal, still = self._robot.fk(here), self._goal, np.zeros(self._robot.dof)
         if goal is None:
             return ServoStep(still, "lost", np.inf, np.inf)
-        off = tip.actInv(goal)
-        away, turned = float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
+        away, turned = apart(tip, goal)
         if state != "moving":
             return ServoStep(still, state, away, turned)
         if away <= self.near and turned <= self.aligned:

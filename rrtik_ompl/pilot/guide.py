@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
@@ -21,6 +20,7 @@ from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.proposal import propose
 from rrtik_ompl.pilot.routes.route import MAX_END_OFFSET, MAX_END_TURN, Route
 from rrtik_ompl.pilot.surroundings import Surroundings
+from rrtik_ompl.poses import apart
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.scene_from_view import SeenObject
@@ -232,9 +232,3 @@ class Guide:
         self.route = self.follower = self.progress = self._aimed = None
         self.withdrawn = ""
         self._session.mode = CHOOSING if self._session.choice else MANOEUVRE
-
-
-def apart(first: pin.SE3, second: pin.SE3) -> tuple[float, float]:
-    """How far two poses are apart [m], and by which angle they are turned [rad]."""
-    off = first.actInv(second)
-    return float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))

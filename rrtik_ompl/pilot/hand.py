@@ -15,11 +15,12 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.pilot.devices.arm import Arm
-from rrtik_ompl.pilot.guide import Guide, apart
+from rrtik_ompl.pilot.guide import Guide
 from rrtik_ompl.pilot.interlock import MANOEUVRE, MOVING
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import route_to
 from rrtik_ompl.pilot.surroundings import Surroundings
+from rrtik_ompl.poses import apart
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 
@@ -75,12 +76,16 @@ class Hand:
             return "the gripper is closed already"
         self._grip(True)
         tip = session.robot.fk(session.q)
-        near = sorted((apart(tip, pose) for *_, pose in self._grasps()), key=lambda each: each[0])
-        there = [each for each in self._grasps() if _within(apart(tip, each[2]))]
-        if not there:
-            far = f"; the nearest grasp is {1e3 * near[0][0]:.0f} mm and {np.rad2deg(near[0][1]):.0f} deg away"
-            return NOTHING + (far if near else "")
-        seen, self._lift, _ = min(there, key=lambda each: apart(tip, each[2])[0])
+        near = sorted(
+            ((apart(tip, pose), seen, lift) for seen, lift, pose in self._grasps()), key=lambda each: each[0][0]
+        )
+        if not near:
+            return NOTHING
+        there = next((each for each in near if _within(each[0])), None)
+        if there is None:
+            away, turned = near[0][0]
+            return f"{NOTHING}; the nearest grasp is {1e3 * away:.0f} mm and {np.rad2deg(turned):.0f} deg away"
+        _, seen, self._lift = there
         name = seen.object.name
         if not seen.object.loose:
             self.fixed = name

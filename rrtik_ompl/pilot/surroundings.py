@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.poses import apart
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.sensing.problem_from_view import scene_with
@@ -154,9 +155,7 @@ class Surroundings:
         old = self._seen.get(new.object.name)
         if old is None:
             return True
-        change = old.T_base_object.inverse() * new.T_base_object
-        turned = float(np.linalg.norm(pin.log3(change.rotation)))
-        shifted = float(np.linalg.norm(change.translation))
+        shifted, turned = apart(old.T_base_object, new.T_base_object)
         wider = max(_margins(new), default=0.0) - max(_margins(old), default=0.0)
         return shifted > MIN_SHIFT or turned > MIN_ROTATION or abs(wider) > MIN_SHIFT
 

@@ -20,6 +20,7 @@ from rrtik_ompl.pilot.routes.clearance import closest_pair
 from rrtik_ompl.pilot.routes.moves import planned
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, RouteSearch, Tail
+from rrtik_ompl.poses import apart
 from rrtik_ompl.world import World
 
 CLEARANCE_SAMPLES = 100  # along a route
@@ -117,9 +118,8 @@ def _without_tiny_moves(world: World, goal: Vector, q: Vector) -> Vector:
     for joint in np.argsort(np.abs(goal - q)):
         tried = kept.copy()
         tried[joint] = q[joint]
-        off = wanted.actInv(robot.fk(tried))
-        turned = float(np.linalg.norm(pin.log3(off.rotation)))
-        if np.linalg.norm(off.translation) > END_OFFSET or turned > END_TURN or not world.valid(tried):
+        away, turned = apart(wanted, robot.fk(tried))
+        if away > END_OFFSET or turned > END_TURN or not world.valid(tried):
             break
         kept = tried
     return kept

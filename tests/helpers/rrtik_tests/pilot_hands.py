@@ -68,8 +68,9 @@ def faster(running, rate=3.0):
     session.rates[:] = session.arm._rates[:] = rate
 
 
-def follow(browser, hands, look):
-    """Accept the route that is proposed and make its moves."""
+def follow(browser, hands, verb, look):
+    """Have a route proposed, "plan" or "lift"; accept it and make its moves."""
+    hands.tap(verb, "state.mode === 'proposed'")
     browser.wait("state.mode === 'proposed' && document.querySelectorAll('#moves li').length > 0")
     look()
     hands.tap("accept", "state.mode === 'following'")
@@ -94,17 +95,14 @@ def pick_and_place(browser, running, kind, look=lambda: None):
         hands.tap("object", "state.target === 'tool'")
     hands.tap("type", "state.choice !== null && state.lamps.some(lamp => lamp.color === 'green')")
     look()
-    hands.tap("plan", "state.mode === 'proposed'")
-    follow(browser, hands, look)
+    follow(browser, hands, "plan", look)
     hands.tap("grip", "state.gripper.holds === 'tool'")
     look()
-    hands.tap("lift", "state.mode === 'proposed'")
-    follow(browser, hands, look)
+    follow(browser, hands, "lift", look)
     hands.tap("object", "state.target === 'rack'")
     hands.tap("type", "state.choice !== null")
     look()
-    hands.tap("plan", "state.mode === 'proposed'")
-    follow(browser, hands, look)
+    follow(browser, hands, "plan", look)
     hands.tap("grip", "!state.gripper.closed")
     time.sleep(0.5)
     look()
