@@ -10,6 +10,7 @@ from ompl import util as ou
 
 from rrtik_bench.crdt import published as crdt_published
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.fast import warm_up
 from rrtik_ompl.shapes import Mesh
 from rrtik_tests.bent_meshes import bent_meshes_of
 
@@ -20,6 +21,15 @@ settings.load_profile("rrtik")
 # A shell ignores SIGINT in what it starts in the background, and children inherit that; tests of Ctrl-C send it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+
+def pytest_sessionstart(session):
+    """Before a run of all tests every core makes kernels; else each worker waits for a library that another makes."""
+    config = session.config
+    if config.args_source is config.ArgsSource.TESTPATHS and not hasattr(config, "workerinput"):
+        warm_up(lambda _: None)
+
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 BOTTOM_AND_SIDES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6)]

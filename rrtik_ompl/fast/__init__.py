@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rrtik_ompl.fast.checks.clearance import Clearance as Clearance
     from rrtik_ompl.fast.checks.fast_world import FastWorld as FastWorld
-    from rrtik_ompl.fast.simd.library import warm_up as warm_up
+    from rrtik_ompl.fast.simd.warming import warm_up as warm_up
     from rrtik_ompl.fast.tables.layout import COLLIDING as COLLIDING
     from rrtik_ompl.fast.tables.layout import FREE as FREE
     from rrtik_ompl.fast.tables.layout import UNDECIDED as UNDECIDED
@@ -20,7 +20,7 @@ else:
         "Clearance": "checks.clearance",
         "FastWorld": "checks.fast_world",
         "needs_covers": "tables.scene_tables",
-        "warm_up": "simd.library",
+        "warm_up": "simd.warming",
     }
     __all__ = sorted(_HOME_OF)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, finite_array
+from rrtik_ompl.arrays import Matrix, finite_array, not_negative
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.robot import Robot
@@ -77,8 +77,8 @@ def time_parameterize(
 
     Raises:
         InputError: If the path has one waypoint, does not move, or has another number of joints than the limits; if the
-            blend is negative or comes without a world, an end of the path cannot keep the clearance, or the arm cannot
-            be held still within the torques.
+            blend is negative or comes without a world, the clearance is negative or more than an end of the path can
+            keep, or the arm cannot be held still within the torques.
 
     Example:
         >>> problem = rrtik.load_problem("planar3_boxes")
@@ -96,6 +96,8 @@ def time_parameterize(
     reach = float(finite_array(blend, (), "blend"))
     if reach < 0.0:
         raise InputError(f"blend must be 0 or greater, got {reach:g}")
+    if clearance is not None:
+        not_negative(clearance, "clearance")
     arm = limits if isinstance(limits, Robot) else None if world is None else world.robot
     wanted = (tip_speed, tip_acceleration, torque, payload or None)
     more = None

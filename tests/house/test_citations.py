@@ -4,6 +4,7 @@ import ast
 import io
 import re
 import tokenize
+from functools import cache
 
 import pytest
 
@@ -24,6 +25,7 @@ SHEETS = re.compile(r"(?:out of|on|does not fit) the paper")  # printed markers 
 PRIVATE = re.compile(r"\bsections? \d|(?:^|\()[Rr]ows? \d+(?:(?: and|,) \d+)?[:)]|\b[A-Z-]+ (?:paper|publication)\b")
 
 
+@cache
 def texts(file):
     """What a reader reads: comments and strings of Python, comments of YAML, prose of Markdown; breaks are spaces."""
     text = file.read_text(encoding="utf-8")

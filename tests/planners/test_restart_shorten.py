@@ -10,9 +10,10 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.ompl_bridge.contract import CONTRACT
+from rrtik_ompl.ompl_bridge.contract import CONTRACT, spaces
 from rrtik_ompl.ompl_bridge.contract.problems import Clause, outside_wall, small_problem, solution_rows
 from rrtik_planners import FastAORRTC, FastRRTConnect, RestartShorten
+from rrtik_tests.sizes import how_many
 
 pytestmark = pytest.mark.usefixtures("quiet_ompl")
 
@@ -21,7 +22,8 @@ PLANNERS = {"RestartShorten": RestartShorten, "FastAORRTC": FastAORRTC}
 
 @pytest.mark.parametrize("name", PLANNERS)
 @pytest.mark.parametrize("clause", CONTRACT, ids=lambda clause: clause.__name__)
-def test_planner_keeps_the_contract(name: str, clause: Clause) -> None:
+def test_planner_keeps_the_contract(name: str, clause: Clause, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spaces, "SEEDS", how_many(spaces.SEEDS, 40))  # these plan and shorten several times for each
     clause(lambda si, **options: PLANNERS[name](si, patience=1, **options))
 
 

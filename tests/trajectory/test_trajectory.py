@@ -289,6 +289,12 @@ def test_a_blend_that_is_none_is_refused(blend):
         time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 1.0), blend=blend)
 
 
+@pytest.mark.parametrize("clearance", [-1e-3, np.nan, np.inf, "wide"])
+def test_a_clearance_that_is_none_is_refused_also_where_nothing_is_blended(clearance):
+    with pytest.raises(InputError, match="clearance"):
+        time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 1.0), clearance=clearance)
+
+
 def test_a_blend_needs_a_world():
     with pytest.raises(InputError, match=r"world=problem\.world"):
         time_parameterize(JointPath([[0, 0], [1, 0], [1, 1]]), RateLimits(1.0, 1.0), blend=0.1)

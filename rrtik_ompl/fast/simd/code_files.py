@@ -63,11 +63,12 @@ def sources_digest(name: str) -> str:
     """
     names = [name] if _is_module(name) else kernel_modules()
     sources = sorted({module for own in names for module in kernel_sources(own)})
-    return sha256("\0".join(_text(module) for module in sources).encode()).hexdigest()
+    return sha256("\0".join(source_text(module) for module in sources).encode()).hexdigest()
 
 
 @cache
-def _text(module: str) -> str:
+def source_text(module: str) -> str:
+    """The source of a module of this package; empty if it has none."""
     file = FOLDER.joinpath(*module.split(".")).with_suffix(".py")
     return file.read_text(encoding="utf-8") if file.is_file() else ""
 
@@ -75,7 +76,7 @@ def _text(module: str) -> str:
 def _imported(module: str) -> list[str]:
     """Modules of this package that a module imports when it is loaded."""
     imported = []
-    for parent, names in _IMPORT.findall(_text(module)):
+    for parent, names in _IMPORT.findall(source_text(module)):
         if _is_module(parent):
             imported.append(parent)
         else:

@@ -21,7 +21,6 @@ from rrtik_ompl.fast.simd.code_files import (
     Code,
     file_name,
     kept_code,
-    kernel_modules,
     machine_key,
     write_code,
 )
@@ -64,22 +63,6 @@ def library(name: str) -> Library | None:
         return _libraries[name]
 
 
-def warm_up(report: Callable[[str], None]) -> bool:
-    """Make or load all kernels, so that nobody waits for them later.
-
-    Args:
-        report: Is told what is done, line by line.
-
-    Returns:
-        Whether there are compiled kernels now; if not, a warning has said why.
-    """
-    names = kernel_modules()
-    for name in names:
-        if library(name) is not None:
-            report(f"{name}: ready")
-    return all(library(name) is not None for name in names)
-
-
 _said: set[str] = set()  # reasons
 
 
@@ -102,14 +85,15 @@ def _reason(error: Exception) -> str:
     return " ".join(text.split())[:MAX_REASON]  # a compiler's is a page
 
 
-def _file(name: str) -> Path | None:
+def code_file(name: str) -> Path | None:
+    """Where the user's cache keeps a library; None without a cache."""
     folder = cache_folder("kernels")
     return None if folder is None else folder / file_name(name, machine_key(name))
 
 
 def _kept(name: str) -> Library | None:
     """The library from the user's cache, if it is there."""
-    file = _file(name)
+    file = code_file(name)
     code = kept_code(file, machine_key(name))
     if code is None:
         return None
@@ -126,7 +110,7 @@ def _made(name: str) -> Library:
     if code is None:
         raise RuntimeError("LLVM does not take the code that numba made")
     made = Library(name, code)
-    file = _file(name)
+    file = code_file(name)
     if file is not None:
         write_code(file, machine_key(name), code)
     return made

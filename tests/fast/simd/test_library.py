@@ -252,7 +252,7 @@ def test_a_compiler_that_fails_is_told_once_and_replaced_by_numpy(cached, monkey
     monkeypatch.setattr(bitcode, "compiled_module", fail)
     monkeypatch.setattr(library, "_said", set())
     with pytest.warns(RuntimeWarning, match="plain numpy, many times slower: ValueError: no [\\w.]*kernels"):
-        assert not warm_up(print)
+        assert not warm_up(print, jobs=1)
     assert library.library(KERNELS) is None
 
 
@@ -266,6 +266,21 @@ def test_warming_up_makes_all_kernels(kept, cached, capsys):
     assert capsys.readouterr().out.splitlines() == ready
     assert described(cached.read_bytes()) == described(before)
     assert library._kept(KERNELS) is not None
+
+
+@pytest.mark.slow
+def test_several_kernels_are_made_by_other_processes(kept, cached, monkeypatch):
+    shutil.copytree(kept, cached.parent, dirs_exist_ok=True)
+    names = ["checks.distance_kernels", "ik.ik_kernels"]
+    before = {name: library.code_file(name).read_bytes() for name in names}
+    for name in names:
+        library.code_file(name).unlink()
+    monkeypatch.setattr(library, "_made", None)  # this process makes none
+    said = []
+    assert warm_up(said.append, jobs=2)
+    assert said == [f"{name}: ready" for name in code_files.kernel_modules()]
+    for name in names:
+        assert described(library.code_file(name).read_bytes()) == described(before[name])
 
 
 def test_compiling_is_told_in_one_line(monkeypatch, capsys):
@@ -284,17 +299,24 @@ def test_the_sources_of_kernels_need_no_collision_library():
     assert done.returncode == 0, done.stderr
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A folder with bitcode as a package brings it."""
+    folder = tmp_path_factory.mktemp("package")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bitcode, "kernel_modules", lambda: [KERNELS])
+        bitcode.write_bitcode(folder)
+    return folder
+
+
 @pytest.fixture
-def packaged(cached, tmp_path, monkeypatch):
+def packaged(written, cached, tmp_path, monkeypatch):
     """The file of bitcode that the package brings, an empty cache and no compiler."""
 
     def fail(name):
         raise ValueError(f"{name} is compiled")
 
-    folder = tmp_path / "package"
-    folder.mkdir()
-    monkeypatch.setattr(bitcode, "kernel_modules", lambda: [KERNELS])
-    bitcode.write_bitcode(folder)
+    folder = shutil.copytree(written, tmp_path / "package")
     shutil.rmtree(cached.parent)
     monkeypatch.setattr(bitcode_store, "FOLDER", folder)
     monkeypatch.setattr(bitcode, "compiled_module", fail)

@@ -21,8 +21,8 @@ def edited(monkeypatch):
     """Reads a module of the package as if somebody had edited it."""
 
     def edit(name):
-        text = code_files._text
-        monkeypatch.setattr(code_files, "_text", lambda module: text(module) + "# changed\n" * (module == name))
+        text = code_files.source_text
+        monkeypatch.setattr(code_files, "source_text", lambda module: text(module) + "# changed\n" * (module == name))
         monkeypatch.setattr(code_files, "sources_digest", code_files.sources_digest.__wrapped__)
 
     return edit

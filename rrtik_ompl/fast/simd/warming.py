@@ -1,0 +1,82 @@
+"""All kernels made at once: processes make a library each, so that every core takes part."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+from rrtik_ompl.fast.simd.bitcode_store import packaged_bitcode
+from rrtik_ompl.fast.simd.code_files import kept_code, kernel_modules, kernel_sources, machine_key, source_text
+from rrtik_ompl.fast.simd.library import code_file, library
+from rrtik_ompl.files.notice import COMPILING, tell_once
+
+ROOT = Path(__file__).parents[3]  # where this package stands: another process shall take no other
+MAKE = "import sys; sys.path.insert(0, sys.argv[1]); from rrtik_ompl.fast.simd.library import library; "
+MAKE += "sys.exit(library(sys.argv[2]) is None)"
+
+
+def warm_up(report: Callable[[str], None], *, jobs: int | None = None) -> bool:
+    """Make or load all kernels, so that nobody waits for them later.
+
+    Args:
+        report: Is told what is done, line by line.
+        jobs: Processes that make libraries side by side; as many as there are cores if None.
+
+    Returns:
+        Whether there are compiled kernels now; if not, a warning has said why.
+    """
+    names = kernel_modules()
+    with _made_by_others([name for name in names if _missing(name)], jobs or cores()) as wait_for:
+        for name in names:
+            wait_for(name)
+            if library(name) is not None:
+                report(f"{name}: ready")
+    return all(library(name) is not None for name in names)
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _missing(name: str) -> bool:
+    """Whether another process can make a library and keep it for this one."""
+    file = code_file(name)
+    return file is not None and kept_code(file, machine_key(name)) is None
+
+
+@contextmanager
+def _made_by_others(names: list[str], jobs: int) -> Iterator[Callable[[str], None]]:
+    """Have libraries made by other processes, which end with the block; what waits for one of them.
+
+    The smallest come first: numba keeps what they compile of the larger ones. What fails is made, and told, here.
+    """
+    if min(jobs, len(names)) < 2:
+        yield lambda name: None
+        return
+    if any(packaged_bitcode(name) is None for name in names):
+        tell_once(COMPILING)
+    others: list[subprocess.Popen[bytes]] = []
+
+    def make(name: str) -> None:
+        command = [sys.executable, "-W", "ignore", "-c", MAKE, str(ROOT), name]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            others.append(process)
+
+    pool = ThreadPoolExecutor(jobs)
+    made = {name: pool.submit(make, name) for name in sorted(names, key=_size)}
+    try:
+        yield lambda name: made[name].result() if name in made else None
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in others:
+            process.terminate()
+
+
+def _size(name: str) -> int:
+    return sum(len(source_text(module)) for module in kernel_sources(name))
