@@ -23,7 +23,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-
 def pytest_sessionstart(session):
     """Before a run of all tests every core makes kernels; else each worker waits for a library that another makes."""
     config = session.config
