@@ -80,6 +80,12 @@ class Method:
     run: Callable[[IkRequest], IkResponse]
 
 
+def fits_all(robot: Robot, target: Target) -> str:
+    """The misfit of a method that fits every robot and target."""
+    del robot, target
+    return ""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class IkResult:
     """What inverse kinematics found.

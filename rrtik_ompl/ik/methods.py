@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -17,20 +16,10 @@ from rrtik_ompl.goal import PositionGoal, tolerances
 from rrtik_ompl.ik.analytic.closed_form import branches_of, family, form_of, has_closed_form
 from rrtik_ompl.ik.analytic.kernel_branches import valid_branches
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
-from rrtik_ompl.ik.baselines.ccd import ccd
-from rrtik_ompl.ik.baselines.damped import damped_least_squares, pinocchio_iteration
-from rrtik_ompl.ik.baselines.fabrik import fabrik, fabrik_misfit
-from rrtik_ompl.ik.baselines.joint_axes import coupled_fault
-from rrtik_ompl.ik.baselines.pso import PARTICLES, pso, resampled_pso
-from rrtik_ompl.ik.genetic.method import genetic
-from rrtik_ompl.ik.mb_rrt.method import mb_rrt, mb_rrt_misfit
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, Target
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, Target, fits_all
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric
 from rrtik_ompl.ik.numeric.projection import projection
-from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, Walk, restarted
 from rrtik_ompl.robot import Robot
-
-SUFFICIENT_STARTS = 4  # starts that arrive before the others of a round are given up
 
 
 def load_kernels(robot: Robot) -> None:
@@ -97,32 +86,52 @@ def _matrix(target: Target) -> Matrix:
     return matrix
 
 
-def _walks(walk: Walk, starts: int = STARTS, rounds: int = MAX_ROUNDS) -> Callable[[IkRequest], IkResponse]:
-    return partial(restarted, walk, starts=starts, rounds=rounds)
+def _genetic(request: IkRequest) -> IkResponse:
+    from rrtik_ompl.ik.genetic.method import genetic  # what `plan()` does not need is loaded when it is asked for
+
+    return genetic(request)
 
 
-def _fits_all(robot: Robot, target: Target) -> str:
-    del robot, target
-    return ""
+def _mb_rrt_misfit(robot: Robot, target: Target) -> str:
+    from rrtik_ompl.ik.mb_rrt.method import mb_rrt_misfit
+
+    return mb_rrt_misfit(robot, target)
 
 
-def _uncoupled(robot: Robot, target: Target) -> str:
-    del target
-    return coupled_fault(robot)
+def _mb_rrt(request: IkRequest) -> IkResponse:
+    from rrtik_ompl.ik.mb_rrt.method import mb_rrt
+
+    return mb_rrt(request)
+
+
+def _baseline(name: IkMethod) -> Method:
+    """One of the methods that others use."""
+
+    def misfit(robot: Robot, target: Target) -> str:
+        from rrtik_ompl.ik.numeric.baseline_methods import BASELINES
+
+        return BASELINES[name].misfit(robot, target)
+
+    def run(request: IkRequest) -> IkResponse:
+        from rrtik_ompl.ik.numeric.baseline_methods import BASELINES
+
+        return BASELINES[name].run(request)
+
+    return Method(misfit, run)
 
 
 METHODS: Mapping[IkMethod, Method] = MappingProxyType(
     {
         "closed-form": Method(_closed_form_misfit, _closed_form),
-        "numeric": Method(_fits_all, numeric),
-        "genetic": Method(_fits_all, genetic),
-        "mb-rrt": Method(mb_rrt_misfit, mb_rrt),
-        "projection": Method(_fits_all, projection),
-        "damped": Method(_fits_all, _walks(partial(damped_least_squares, enough=SUFFICIENT_STARTS))),
-        "pinocchio": Method(_fits_all, _walks(pinocchio_iteration, starts=1, rounds=64)),
-        "ccd": Method(_uncoupled, _walks(partial(ccd, enough=SUFFICIENT_STARTS))),
-        "fabrik": Method(fabrik_misfit, _walks(partial(fabrik, enough=SUFFICIENT_STARTS))),
-        "pso": Method(_fits_all, _walks(pso, starts=4 * PARTICLES)),
-        "pso-resampled": Method(_fits_all, _walks(resampled_pso, starts=4 * PARTICLES)),
+        "numeric": Method(fits_all, numeric),
+        "genetic": Method(fits_all, _genetic),
+        "mb-rrt": Method(_mb_rrt_misfit, _mb_rrt),
+        "projection": Method(fits_all, projection),
+        "damped": _baseline("damped"),
+        "pinocchio": _baseline("pinocchio"),
+        "ccd": _baseline("ccd"),
+        "fabrik": _baseline("fabrik"),
+        "pso": _baseline("pso"),
+        "pso-resampled": _baseline("pso-resampled"),
     }
 )

@@ -26,7 +26,6 @@ from rrtik_ompl.goal import (
     tip_errors,
     tolerances,
 )
-from rrtik_ompl.ik.mb_rrt.search import out_of_reach
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, different_rows
 from rrtik_ompl.ik.method_interface import IkResult as IkResult
 from rrtik_ompl.ik.methods import METHODS, load_kernels
@@ -244,9 +243,15 @@ def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[
     if reached:
         return "limits", f"the arm could reach the goal, but {fault}"
     away = f"the nearest posture is {_away(robot, goal, answer.nearest)}"
-    if answer.timed_out and not all(out_of_reach(robot, target) for target in request.targets):
+    if answer.timed_out and not all(_out_of_reach(robot, target) for target in request.targets):
         return "time", f"no solution in time; {away}"
     return "unreachable", f"{away} from the goal"
+
+
+def _out_of_reach(robot: Robot, target: Target) -> bool:
+    from rrtik_ompl.ik.mb_rrt.search import out_of_reach  # whoever finds a solution needs no tree
+
+    return out_of_reach(robot, target)
 
 
 def _walker(goal: TipGoal) -> IkMethod:
