@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 FORMATS = (".png", ".svg")
+LETTERS_AN_INCH, LETTERS_BESIDE_A_NAME = 11.0, 9  # in the legend: as wide as the line and the gaps of an entry
 SAMPLES = 2000  # times at which a motion is drawn, beside its knots
 # Colour-blind people can distinguish them too [55]; black and grey for the rest.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#1d2733", "#8494a5")
@@ -71,7 +72,8 @@ def plot_joints(
     lines = {line.get_label(): line for panel in panels for line in panel.get_lines()}
     names = [_plain(name) for name in motion.joint_names]
     handles = [lines[name] for name in names]
-    figure.legend(handles, names, loc="outside upper center", ncols=min(len(handles), 6), frameon=False)
+    columns = int(figure.get_figwidth() * LETTERS_AN_INCH) // (max(map(len, names)) + LETTERS_BESIDE_A_NAME)
+    figure.legend(handles, names, loc="outside upper center", ncols=max(1, min(len(names), 6, columns)), frameon=False)
     save_figure(figure, file)
 
 

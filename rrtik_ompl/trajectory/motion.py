@@ -18,7 +18,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory.chords import proof_by_chords
 from rrtik_ompl.trajectory.cubics import ends_of, even_parts, hermite_accelerations, jerks_of
 from rrtik_ompl.trajectory.messages import write_mcap
-from rrtik_ompl.trajectory.text import FORMATS, dumps
+from rrtik_ompl.trajectory.text import FORMATS, ROS_JSON, dumps
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import Proof, World
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
@@ -250,8 +250,8 @@ class Trajectory:
     def save(self, file: str | os.PathLike[str], *, rate: float | None = None, accelerations: bool = True) -> None:
         """Write the motion to a file.
 
-        A .json or .csv file (``time,<joint>...``) gives back the same motion by :func:`load_trajectory`. A .yaml file
-        is the message JointTrajectory of ROS 2 and nothing else. A .mcap file has joint states for Foxglove (it needs
+        A .json or .csv file (``time,<joint>...``) gives back the same motion by :func:`load_trajectory`. A .yaml or
+        .ros.json file is the message JointTrajectory of ROS 2 and nothing else. A .mcap file has joint states for Foxglove (it needs
         the package mcap). Each is written whole or not at all.
 
         Args:
@@ -264,6 +264,8 @@ class Trajectory:
             InputError: If the ending is another one or the file cannot be written.
         """
         ending = known_ending(file, (*FORMATS, ".mcap"), "trajectory")
+        if os.fspath(file).lower().endswith(ROS_JSON):
+            ending = ROS_JSON
         state = State(self.positions, self.velocities, self.accelerations)
         clock, state = (self.times, state) if rate is None else self.sampled(rate)
         columns = [(column + 0.0).tolist() for column in (clock, *state)]

@@ -1,4 +1,4 @@
-"""The text of a trajectory file: JSON in the shape of ROS's JointTrajectory, that message as YAML, or CSV."""
+"""The text of a trajectory file: JSON in the shape of ROS's JointTrajectory, that message itself as YAML or JSON, or CSV."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from rrtik_ompl.files.tables import json_object, table_rows
 from rrtik_ompl.trajectory.messages import FIELDS, from_yaml, joint_trajectory, to_yaml
 
 FORMATS = (".json", ".csv", ".yaml")
+ROS_JSON = ".ros.json"  # the message alone: ROS refuses fields that it does not know
 KIND = "joint_trajectory"
 _DURATION = (("sec", "secs"), ("nanosec", "nsecs"))
 
@@ -21,6 +22,8 @@ def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Seque
     """Text of a trajectory; ``columns``: times (m), positions, velocities and, not always, accelerations (m, n)."""
     if ending == ".yaml":
         return to_yaml(joint_trajectory(names, columns))
+    if ending == ROS_JSON:
+        return json.dumps(joint_trajectory(names, columns), indent=1) + "\n"
     if ending == ".json":
         points = [
             dict(zip(FIELDS, values, strict=False)) | {"time_from_start": time}

@@ -38,9 +38,9 @@ def test_samples_come_at_the_control_rate_and_end_at_the_end(motion):
             motion.sampled(rate)
 
 
-@pytest.mark.parametrize("accelerations", [True, False])
-def test_yaml_is_the_message_of_ros_and_nothing_else(tmp_path, robot, motion, accelerations):
-    file = tmp_path / "motion.yaml"
+@pytest.mark.parametrize(("ending", "accelerations"), [("yaml", True), ("yaml", False), ("ros.json", True)])
+def test_yaml_and_ros_json_are_the_message_of_ros_and_nothing_else(tmp_path, robot, motion, ending, accelerations):
+    file = tmp_path / f"motion.{ending}"
     motion.save(file, rate=100.0, accelerations=accelerations)
     document = yaml.safe_load(file.read_text())
     assert list(document) == ["header", "joint_names", "points"]
