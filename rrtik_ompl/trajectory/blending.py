@@ -101,10 +101,18 @@ def fault_finder(path: JointPath, world: World, clearance: float | None) -> Faul
 
 def _narrower(radii: Vector, along: Vector, bad: Vector, least: float) -> Vector:
     """Half the radius of the corners near bad places; 0 where that is less than the least."""
-    gaps = np.abs(along[None, :] - bad[:, None])
-    blamed = (gaps <= radii).any(axis=0) & (radii > 0.0)
-    if not blamed.any():
-        blamed[np.where(radii > 0.0, gaps, np.inf).argmin(axis=1)] = True
+    bad = np.unique(bad)
+    blamed = (np.abs(along - bad[_nearest(bad, along)]) <= radii) & (radii > 0.0)
+    rounded = np.flatnonzero(radii > 0.0)
+    if not blamed.any() and len(rounded):
+        blamed[rounded[_nearest(along[rounded], bad)]] = True
     halved: Vector = np.where(blamed, 0.5 * radii, radii)
     halved[halved < least] = 0.0
     return halved
+
+
+def _nearest(rows: Vector, places: Vector) -> NDArray[np.int64]:
+    """Numbers of the rows, ascending, that are nearest to places: of two the first."""
+    after = np.minimum(np.searchsorted(rows, places), len(rows) - 1)
+    before = np.maximum(after - 1, 0)
+    return np.where(np.abs(places - rows[before]) <= np.abs(places - rows[after]), before, after)

@@ -1,5 +1,7 @@
 """Rounded corners and their timing: judged by toppra and ruckig, and by what a drive accepts."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from rrtik_ompl.poses import pose
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Sphere
 from rrtik_ompl.trajectory import RateLimits, Trajectory, time_parameterize
+from rrtik_ompl.trajectory.blending import blended, stopped
 from rrtik_ompl.trajectory.corners import COINCIDENCE, first_radii, vertices
 from rrtik_ompl.trajectory.curve import Curve
 from rrtik_ompl.trajectory.fastest import Bounds, fastest
@@ -201,3 +204,22 @@ def test_a_motion_that_is_nearer_to_something_than_its_chords_is_proven(gap):
     through = Trajectory([0.0, 1.0], q + np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]), np.zeros((2, 3)))
     touching = World(robot, Scene([Obstacle("ball", Sphere(0.1), pose((tip + np.array([-0.25, 0.0, 0.0])).tolist()))]))
     assert not through.prove(touching).proven
+
+
+def test_many_corners_at_many_faults_need_no_table_of_all_pairs():
+    rng = np.random.default_rng(1)
+    path = JointPath(np.cumsum(rng.uniform(0.05, 0.1, (200, 2)) * rng.choice([-1.0, 1.0], (200, 2)), axis=0))
+    limits, refused = RateLimits([1.0, 1.0], [4.0, 4.0]), []
+
+    def faults(motion, off_path):
+        refused.append(int(off_path.sum()))
+        return np.flatnonzero(off_path)
+
+    tracemalloc.start()
+    motion = blended(path, path.waypoints, limits, 0.1, np.inf, faults)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert motion is not None
+    assert (motion.duration, refused[-1]) == (pytest.approx(stopped(path, path.waypoints, limits, None).duration), 0)
+    assert peak < 30e6  # [bytes]; a table of the first faults and all corners would have at least as much
+    assert 8 * 200 * refused[0] > 30e6
