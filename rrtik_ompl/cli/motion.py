@@ -79,7 +79,7 @@ def time_path(
     payload: Annotated[float, typer.Option(help="Mass at the tip that the torques carry too [kg].")] = 0.0,
     rate: Annotated[float | None, typer.Option(help="Save points at a control rate [1/s], not the knots.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Save the trajectory: .json, .yaml or .ros.json (JointTrajectory of ROS 2), .csv or .mcap.")
+        Path | None, typer.Option(help="Save the trajectory: .json, .csv, .mcap; .yaml, .ros.json for ROS 2.")
     ] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the joints over time: .png or .svg.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,

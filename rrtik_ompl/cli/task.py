@@ -85,7 +85,7 @@ def task(
     out: Annotated[Path | None, typer.Option(help="Save all motions with their worlds: .json.")] = None,
     trajectory: Annotated[
         Path | None,
-        typer.Option(help="Time the whole task, and save it: .json, .yaml or .ros.json (JointTrajectory of ROS 2), .csv or .mcap."),
+        typer.Option(help="Time the whole task, and save it: .json, .csv, .mcap; .yaml, .ros.json for ROS 2."),
     ] = None,
     share: Annotated[float, typer.Option(help="Of the limits of the joints, above 0 to 1: 0.5 is half as fast.")] = 1.0,
     pause: Annotated[

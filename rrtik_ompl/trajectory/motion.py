@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.copies import as_value, in_notebook
 from rrtik_ompl.errors import InputError, at_most, require
-from rrtik_ompl.files.text import known_ending, write_text
+from rrtik_ompl.files.text import write_text
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory.chords import proof_by_chords
 from rrtik_ompl.trajectory.cubics import ends_of, even_parts, hermite_accelerations, jerks_of
 from rrtik_ompl.trajectory.messages import write_mcap
-from rrtik_ompl.trajectory.text import FORMATS, ROS_JSON, dumps
+from rrtik_ompl.trajectory.text import dumps, written_ending
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import Proof, World
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
@@ -263,9 +263,7 @@ class Trajectory:
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        ending = known_ending(file, (*FORMATS, ".mcap"), "trajectory")
-        if os.fspath(file).lower().endswith(ROS_JSON):
-            ending = ROS_JSON
+        ending = written_ending(file)
         state = State(self.positions, self.velocities, self.accelerations)
         clock, state = (self.times, state) if rate is None else self.sampled(rate)
         columns = [(column + 0.0).tolist() for column in (clock, *state)]

@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import json_object, table_rows
+from rrtik_ompl.files.text import file_name, known_ending
 from rrtik_ompl.trajectory.messages import FIELDS, from_yaml, joint_trajectory, to_yaml
 
 FORMATS = (".json", ".csv", ".yaml")
@@ -37,6 +39,16 @@ def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Seque
     for time, *values in zip(*columns, strict=True):
         table.writerow([repr(number) for number in (time, *(x for value in values for x in value))])
     return text.getvalue()
+
+
+def written_ending(file: str | os.PathLike[str]) -> str:
+    """What is written to a file of this name: an ending of ``FORMATS``, ``ROS_JSON`` or ".mcap".
+
+    Raises:
+        InputError: If the ending is another one.
+    """
+    ending = known_ending(file, (*FORMATS, ".mcap"), "trajectory")
+    return ROS_JSON if file_name(file).name.lower().endswith(ROS_JSON) else ending
 
 
 def loads(text: str, ending: str) -> dict[str, Any]:
