@@ -251,8 +251,8 @@ class Trajectory:
         """Write the motion to a file.
 
         A .json or .csv file (``time,<joint>...``) gives back the same motion by :func:`load_trajectory`. A .yaml or
-        .ros.json file is the message JointTrajectory of ROS 2 and nothing else. A .mcap file has joint states for Foxglove (it needs
-        the package mcap). Each is written whole or not at all.
+        .ros.json file is the message JointTrajectory of ROS 2 and nothing else. A .mcap file has joint states for
+        Foxglove (it needs the package mcap). Each is written whole or not at all.
 
         Args:
             file: See above.

@@ -1,4 +1,4 @@
-"""The text of a trajectory file: JSON in the shape of ROS's JointTrajectory, that message itself as YAML or JSON, or CSV."""
+"""The text of a trajectory file: JSON in the shape of ROS's JointTrajectory, that message as YAML or JSON, or CSV."""
 
 from __future__ import annotations
 
