@@ -7,7 +7,6 @@ it, for one processor.
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -16,8 +15,8 @@ from numba import types
 from numba.core.registry import cpu_target
 
 from rrtik_ompl.fast.simd import compiled
-from rrtik_ompl.fast.simd.code_files import PREFIX, Code, bitcode_key, bitcode_name, kernel_modules, write_code
-from rrtik_ompl.fast.simd.targets import Target, targets_of_this_width
+from rrtik_ompl.fast.simd.code_files import PREFIX, Code
+from rrtik_ompl.fast.simd.targets import Target
 
 WHOLE = ir.IntType(64)
 RUNTIMES = ("Py", "_Py", "NRT_", "numba_", "__svml")  # beginnings of names that only Python or numba can provide
@@ -108,14 +107,3 @@ def target_generator(target: Target, effort: int = 3) -> Any:
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     return llvm.Target.from_triple(target.triple).create_target_machine(opt=effort, reloc="pic", codemodel="default")
-
-
-def write_bitcode(folder: Path) -> None:
-    """Compile all kernels into files that :mod:`rrtik_ompl.fast.simd.library` takes instead of compiling.
-
-    There is one file a kernel module and kind of machine that has this width.
-    """
-    for name in kernel_modules():
-        code = compiled_module(name)
-        for target in targets_of_this_width():
-            write_code(folder / bitcode_name(name, target), bitcode_key(name, target), retargeted(code, target))

@@ -40,6 +40,11 @@ def kernel_modules() -> list[str]:
     return sorted(_dotted(file) for file in FOLDER.rglob("*.py") if "\n@entry\n" in file.read_text(encoding="utf-8"))
 
 
+def kernels_by_size() -> list[str]:
+    """The same, the smallest first: numba keeps what they compile of the larger ones."""
+    return sorted(kernel_modules(), key=lambda name: sum(len(source_text(module)) for module in kernel_sources(name)))
+
+
 def kernel_sources(name: str) -> list[str]:
     """Names of all modules of this package whose source a kernel module's code depends on: what it imports, and so on.
 

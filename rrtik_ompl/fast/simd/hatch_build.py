@@ -1,10 +1,11 @@
 """What hatch does when it builds a wheel: kernels go along as LLVM bitcode, so that nobody who installs it compiles.
 
-One wheel has the bitcode of every kind of machine (:mod:`rrtik_ompl.fast.simd.targets`) and what pages run, wherever it
-is built. That takes a minute or two and numba, which the built package needs anyway; ``RRTIK_KERNELS=0`` in the
-environment goes without. Whatever goes wrong, there is a wheel: kernels are then compiled when they are first used. For
-a wheel that is to be published, ``RRTIK_KERNELS=1`` makes that an error. Editable installs compile at first use too,
-because their sources change.
+A wheel that is made to be installed at once has the bitcode of this machine's width. With ``RRTIK_KERNELS=1`` in the
+environment it has that of every kind of machine (:mod:`rrtik_ompl.fast.simd.targets`), wherever it is built, and it is
+an error if one is missing: so wheels are published. Both have what pages run. ``RRTIK_KERNELS=0`` goes without. That
+takes minutes of all cores and numba, which the built package needs anyway. Whatever goes wrong without the setting,
+there is a wheel: kernels are then compiled when they are first used. Editable installs compile at first use too, because
+their sources change.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 SETTING = os.environ.get("RRTIK_KERNELS", "")
 WITHOUT, REQUIRED = "0", "1"
 WIDTHS = ("8", "16")
+MOST_PARTS = 6  # processes of a width; each takes up to 2 GB of memory
 ENDINGS = (".bitcode", ".wasm")
 PATIENCE = None if SETTING == REQUIRED else 1800.0  # [s]; a wheel that must have all kernels waits for them
-# Nothing that only this processor can do, and nothing of the kind left in the cache of whoever builds.
-PORTABLE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "RRTIK_CACHE": ""}
+PORTABLE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}  # nothing that only this processor can do
 
 
 class KernelBitcode(BuildHookInterface):  # type: ignore[misc]
@@ -59,8 +60,11 @@ class KernelBitcode(BuildHookInterface):  # type: ignore[misc]
 
 
 def _compiled(root: Path, folder: Path) -> bool:
-    """Compile all kernels into files of a folder; whether all could be."""
-    return all([_ended_well(compiler) for compiler in [_compiler(width, root, folder) for width in WIDTHS]])
+    """Compile all kernels into files of a folder, with all cores; whether all could be."""
+    widths = WIDTHS if SETTING == REQUIRED else ("",)
+    parts = min(max((os.cpu_count() or 1) // len(widths), 1), MOST_PARTS)
+    shares = [(width, part) for width in widths for part in range(parts)]
+    return all([_ended_well(compiler) for compiler in [_compiler(*share, parts, root, folder) for share in shares]])
 
 
 def _ended_well(compiler: subprocess.Popen[bytes]) -> bool:
@@ -72,10 +76,10 @@ def _ended_well(compiler: subprocess.Popen[bytes]) -> bool:
         return False
 
 
-def _compiler(width: str, root: Path, folder: Path) -> subprocess.Popen[bytes]:
-    """A process that compiles all kernels of a width into a folder, for all kinds of machine that have it."""
-    places = {"PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(folder)}
-    environment = {**os.environ, **PORTABLE, **places, "RRTIK_LANES": width}
-    command = [sys.executable, "-m", "rrtik_ompl.fast.shipped", str(folder)]
+def _compiler(width: str, part: int, parts: int, root: Path, folder: Path) -> subprocess.Popen[bytes]:
+    """A process that compiles a part of the kernels of a width, this machine's if it is empty, into a folder."""
+    places = {"PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(folder), "RRTIK_CACHE": str(folder)}
+    environment = {**os.environ, **PORTABLE, **places, **({"RRTIK_LANES": width} if width else {})}
+    command = [sys.executable, "-m", "rrtik_ompl.fast.shipped", str(folder), str(part), str(parts)]
     errors = None if SETTING == REQUIRED else subprocess.DEVNULL
     return subprocess.Popen(command, env=environment, cwd=root, stderr=errors)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rrtik_ompl.fast.simd.bitcode_store import packaged_bitcode
-from rrtik_ompl.fast.simd.code_files import kept_code, kernel_modules, kernel_sources, machine_key, source_text
+from rrtik_ompl.fast.simd.code_files import kept_code, kernel_modules, kernels_by_size, machine_key
 from rrtik_ompl.fast.simd.library import code_file, library
 from rrtik_ompl.files.notice import COMPILING, tell_once
 
@@ -31,7 +31,8 @@ def warm_up(report: Callable[[str], None], *, jobs: int | None = None) -> bool:
         Whether there are compiled kernels now; if not, a warning has said why.
     """
     names = kernel_modules()
-    with _made_by_others([name for name in names if _missing(name)], jobs or cores()) as wait_for:
+    missing = [name for name in kernels_by_size() if _missing(name)]
+    with _made_by_others(missing, jobs or cores()) as wait_for:
         for name in names:
             wait_for(name)
             if library(name) is not None:
@@ -54,7 +55,7 @@ def _missing(name: str) -> bool:
 def _made_by_others(names: list[str], jobs: int) -> Iterator[Callable[[str], None]]:
     """Have libraries made by other processes, which end with the block; what waits for one of them.
 
-    The smallest come first: numba keeps what they compile of the larger ones. What fails is made, and told, here.
+    What fails is made, and told, here.
     """
     if min(jobs, len(names)) < 2:
         yield lambda name: None
@@ -69,14 +70,10 @@ def _made_by_others(names: list[str], jobs: int) -> Iterator[Callable[[str], Non
             others.append(process)
 
     pool = ThreadPoolExecutor(jobs)
-    made = {name: pool.submit(make, name) for name in sorted(names, key=_size)}
+    made = {name: pool.submit(make, name) for name in names}
     try:
         yield lambda name: made[name].result() if name in made else None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         for process in others:
             process.terminate()
-
-
-def _size(name: str) -> int:
-    return sum(len(source_text(module)) for module in kernel_sources(name))

@@ -15,7 +15,7 @@ import pytest
 from rrtik_ompl import load_problem
 from rrtik_ompl.cli import terminal
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.fast import warm_up
+from rrtik_ompl.fast import shipped, warm_up
 from rrtik_ompl.fast.simd import bitcode, bitcode_store, code_files, compiled, library
 from rrtik_ompl.fast.simd.targets import this_target
 from rrtik_ompl.files import notice
@@ -303,9 +303,7 @@ def test_the_sources_of_kernels_need_no_collision_library():
 def written(tmp_path_factory):
     """A folder with bitcode as a package brings it."""
     folder = tmp_path_factory.mktemp("package")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bitcode, "kernel_modules", lambda: [KERNELS])
-        bitcode.write_bitcode(folder)
+    shipped.write_bitcode(folder, [KERNELS])
     return folder
 
 
