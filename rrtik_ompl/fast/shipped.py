@@ -2,8 +2,8 @@
 
     python -m rrtik_ompl.fast.shipped FOLDER [PART PARTS]
 
-The bitcode of all kernels for all kinds of machine, and the WebAssembly module of pages that plan. Several processes may
-share the work, each with a part of the kernels; the first one makes the module.
+The bitcode of all kernels for all kinds of machine, and the WebAssembly module of pages that plan. Several processes
+may share the work, each with a part of the kernels; the first one makes the module.
 """
 
 from __future__ import annotations

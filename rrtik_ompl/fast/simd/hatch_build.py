@@ -4,8 +4,8 @@ A wheel that is made to be installed at once has the bitcode of this machine's w
 environment it has that of every kind of machine (:mod:`rrtik_ompl.fast.simd.targets`), wherever it is built, and it is
 an error if one is missing: so wheels are published. Both have what pages run. ``RRTIK_KERNELS=0`` goes without. That
 takes minutes of all cores and numba, which the built package needs anyway. Whatever goes wrong without the setting,
-there is a wheel: kernels are then compiled when they are first used. Editable installs compile at first use too, because
-their sources change.
+there is a wheel: kernels are then compiled when they are first used. Editable installs compile at first use too,
+because their sources change.
 """
 
 from __future__ import annotations
