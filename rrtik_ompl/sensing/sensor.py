@@ -23,6 +23,8 @@ from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject, checked_sigma
 from rrtik_ompl.sensing.sight import Sighting, as_gray, detect_objects
 from rrtik_ompl.sensing.tracker import PoseTracker
 
+WHOLE_EVERY = 4  # pictures: in between, markers are searched for where they were, unless one of them has gone
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
@@ -100,6 +102,8 @@ class Sensor:
         """
         self.camera, self.marker_map, self._sigmas = camera, marker_map, checked_sigmas(sigmas)
         self._trackers = {each.name: PoseTracker() for each in marker_map.objects} if smooth else {}
+        self._before: tuple[Sighting, ...] = ()
+        self._count = 0  # of pictures
         self._blank: NDArray[np.uint8] | None = None  # the last picture in which nothing was found
 
     def view(self, picture: Picture) -> View:
@@ -108,9 +112,10 @@ class Sensor:
         Raises:
             InputError: If the picture does not have the camera's size, or times go backwards.
         """
-        seen = tuple(
-            self._tracked(each, picture.time) for each in detect_objects(picture.pixels, self.camera, self.marker_map)
-        )
+        near = self._count % WHOLE_EVERY != 0
+        found = detect_objects(picture.pixels, self.camera, self.marker_map, before=self._before, near=near)
+        self._before, self._count = (found if self._trackers else ()), self._count + 1
+        seen = tuple(self._tracked(each, picture.time) for each in found)
         if not seen:
             self._blank = picture.pixels
         try:

@@ -74,7 +74,13 @@ def as_gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def detect_objects(
-    picture: NDArray[np.uint8], camera: Camera, marker_map: MarkerMap, *, align: bool = True
+    picture: NDArray[np.uint8],
+    camera: Camera,
+    marker_map: MarkerMap,
+    *,
+    align: bool = True,
+    before: Sequence[Sighting] = (),
+    near: bool = False,
 ) -> tuple[Sighting, ...]:
     """The objects of a map that a picture shows, in the order of the map.
 
@@ -82,14 +88,17 @@ def detect_objects(
         picture: Shape (height, width) or (height, width, 3), 8 bits.
         camera: Of the picture, with the same size.
         marker_map: The map of all objects.
-        align: Sharpen corners (`alignment`); costs about a millisecond a marker.
+        align: Sharpen corners (`alignment`).
+        before: What the picture before showed, of a film: its markers are aligned faster.
+        near: Search for markers only where those were, unless one of them is not there any more.
 
     Raises:
         InputError: If the picture does not have the camera's size, or is none.
     """
     gray = as_gray(picture)
     check_size(gray, camera)
-    seen = find_markers(gray, marker_map.dictionary, align=align, tone=camera.tone)
+    known = [marker for each in before for marker in each.markers]
+    seen = find_markers(gray, marker_map.dictionary, align=align, tone=camera.tone, before=known, near=near)
     sightings = (sighting(camera, each, seen) for each in marker_map.objects)
     return tuple(found for found in sightings if found is not None)
 

@@ -86,8 +86,8 @@ def test_a_marker_in_haze_is_found_at_the_second_try():
 
 def test_the_tone_of_a_picture_is_found():
     T = facing(*PLACES[0])
-    assert looked(T, 0, 0.0)[0].tone == 0.0
-    assert 0.7 < looked(T, 0, 1.0)[0].tone < 1.2
+    assert looked(T, 0, 0.0)[0].look.tone == 0.0
+    assert 0.7 < looked(T, 0, 1.0)[0].look.tone < 1.2
 
 
 def test_more_noise_is_more_uncertainty():

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.detection import charuco_corners, dictionary_of, find_markers
 from rrtik_ompl.sensing.sight import as_gray
@@ -101,5 +100,5 @@ def _tone(grays: Sequence[NDArray[np.uint8]], dictionary: str | None) -> float |
     if dictionary is None:
         return None
     seen = [marker for gray in grays for marker in find_markers(gray, dictionary)]
-    tones = [each.tone for each in seen if each.likeness >= MIN_LIKENESS and each.side >= MIN_TONE_SIDE]
+    tones = [each.look.tone for each in seen if each.look is not None and each.side >= MIN_TONE_SIDE]
     return round(float(np.median(tones)), 3) if len(tones) >= TONE_MARKERS else None

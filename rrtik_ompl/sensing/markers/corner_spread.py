@@ -8,6 +8,7 @@ to way, and a sheet that is bent are fitted along with the corners; bends are pa
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -36,7 +37,7 @@ def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) 
         corners: In the picture, shape (4, 2).
     """
     every = max(len(model) // _FEW, 1)
-    columns = _columns(model, square, corners)[::every, ::every]
+    columns = _columns(model, square, corners, every)
     light, shape = seen[::every, ::every].ravel().astype(np.float64), columns.shape[:2]
     columns = columns.reshape(len(light), -1)
     repeated = max(_area(square) / _area(corners) / every**2, 1.0)  # samples of one pixel err alike
@@ -52,18 +53,21 @@ def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) 
     return corners + found[:8].reshape(4, 2), frozen(spread)
 
 
-def _columns(model: Pixels, square: Matrix, corners: Matrix) -> Matrix:
-    """How the picture of the marker changes with what is fitted, eight numbers of corners first. Shape (h, w, k)."""
+def _columns(model: Pixels, square: Matrix, corners: Matrix, every: int) -> Matrix:
+    """How the picture of the marker changes with what is fitted, eight numbers of corners first. Shape (h, w, k).
+
+    Of one sample among ``every`` along each side.
+    """
     across, down = _slope(model, 1, 0), _slope(model, 0, 1)
-    moved = _slopes(model, across, down, square, corners)
+    blurs = [_slope(across, 1, 0), _slope(across, 0, 1), _slope(down, 0, 1)]
+    across, down, model, *blurs = (each[::every, ::every] for each in (across, down, model, *blurs))
+    x, y = _places(*model.shape, every)
     low, high = square[0], square[2]
-    u = (2.0 * np.arange(model.shape[1]) - low[0] - high[0]) / (high[0] - low[0])
-    v = ((2.0 * np.arange(model.shape[0]) - low[1] - high[1]) / (high[1] - low[1]))[:, None]
+    u, v = (2.0 * x - low[0] - high[0]) / (high[0] - low[0]), (2.0 * y - low[1] - high[1]) / (high[1] - low[1])
     # Motions of second order that no homography has: those of homographies are (u u, u v) and (u v, v v).
     bends = [across * v * v, down * u * u, across * u * u - down * u * v, across * u * v - down * v * v]
-    blurs = [_slope(across, 1, 0), _slope(across, 0, 1), _slope(down, 0, 1)]
     more = [np.ones(model.shape), model, np.hypot(across, down), *blurs, *bends]
-    return np.dstack([moved, *more])
+    return np.dstack([_slopes(across, down, (x, y), square, corners), *more])
 
 
 def _slope(picture: NDArray[np.floating[Any]], across: int, down: int) -> Matrix:
@@ -72,17 +76,21 @@ def _slope(picture: NDArray[np.floating[Any]], across: int, down: int) -> Matrix
 
 def _left_out(shape: tuple[int, ...], slopes: Matrix, rest: Vector, normal: Matrix) -> Matrix:
     """Covariance of the corners by how they move when one block after the other is left out. Shape (8, 8)."""
-    rows, columns = (np.arange(size) * _BLOCKS // size for size in shape[:2])
+    order, ends = _blocks(*shape[:2])
+    both = np.column_stack([slopes, rest])[order]
+    own = np.stack([part.T @ part for part in np.split(both, ends)])
+    away = np.linalg.solve(normal - own[:, :-1, :-1], own[:, :-1, -1:])[:, :8, 0]
+    count = len(away)
+    return np.asarray((count - 1) / count * away.T @ away)
+
+
+@lru_cache(maxsize=64)
+def _blocks(height: int, width: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """An order of the samples in which each block stands together, and where blocks end in it."""
+    rows, columns = (np.arange(size) * _BLOCKS // size for size in (height, width))
     block = (rows[:, None] * _BLOCKS + columns).ravel()
     order = np.argsort(block, kind="stable")
-    ends = np.searchsorted(block[order], np.arange(1, _BLOCKS**2))
-    moves = []
-    for part in np.split(order, ends):
-        own = slopes[part]
-        moves.append(np.linalg.solve(normal - own.T @ own, own.T @ rest[part])[:8])
-    away = np.array(moves)
-    count = len(moves)
-    return np.asarray((count - 1) / count * away.T @ away)
+    return order, np.searchsorted(block[order], np.arange(1, _BLOCKS**2))
 
 
 def _area(corners: Matrix) -> float:
@@ -90,26 +98,33 @@ def _area(corners: Matrix) -> float:
     return 0.5 * abs(float(a * d - b * c))
 
 
-def _slopes(model: Pixels, across: Matrix, down: Matrix, square: Matrix, corners: Matrix) -> Matrix:
+def _slopes(across: Matrix, down: Matrix, places: tuple[Matrix, Matrix], square: Matrix, corners: Matrix) -> Matrix:
     """How the model's grey values change with each number of the corners [1 / pixel]. Shape (h, w, 8)."""
-    height, width = model.shape
-    x, y = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
-    places = np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
-    found, back = np.empty((model.size, 8)), _perspective(corners, square)
-    for k in range(8):
-        moved = corners.copy()
-        moved[k // 2, k % 2] += _STEP
-        at = back @ _perspective(square, moved) @ places
-        shift = at[:2] / at[2] - places[:2]
-        found[:, k] = -(across.ravel() * shift[0] + down.ravel() * shift[1]) / _STEP
-    return found.reshape(height, width, 8)
+    x, y = (each.ravel() for each in places)
+    moved = corners.reshape(8) + _STEP * np.eye(8)
+    back = _perspectives(corners[None], square[None])[0]
+    turned = back @ _perspectives(np.broadcast_to(square, (8, 4, 2)), moved.reshape(8, 4, 2))
+    at = turned[..., 0, None] * x + (turned[..., 1, None] * y + turned[..., 2, None])
+    shift = (at[:, :2] / at[:, 2:] - [x, y]) * (-1.0 / _STEP)
+    found = across.ravel() * shift[:, 0] + down.ravel() * shift[:, 1]
+    return found.T.reshape(*across.shape, 8)
 
 
-def _perspective(before: Matrix, after: Matrix) -> Matrix:
-    """The homography that leads four points to four others, in float64. Shape (3, 3)."""
-    rows, right = np.zeros((8, 8)), np.zeros(8)
-    for k, ((x, y), (u, v)) in enumerate(zip(before, after, strict=True)):
-        rows[2 * k] = x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y
-        rows[2 * k + 1] = 0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y
-        right[2 * k : 2 * k + 2] = u, v
-    return np.append(np.linalg.solve(rows, right), 1.0).reshape(3, 3)
+def _perspectives(before: Matrix, after: Matrix) -> Matrix:
+    """The homographies that lead four points to four others, in float64. Each of shape (k, 4, 2); (k, 3, 3)."""
+    count = len(before)
+    (x, y), (u, v) = np.moveaxis(before, 2, 0), np.moveaxis(after, 2, 0)
+    one, none = np.ones((count, 4)), np.zeros((count, 4))
+    rows = np.concatenate([
+        np.stack([x, y, one, none, none, none, -u * x, -u * y], axis=2),
+        np.stack([none, none, none, x, y, one, -v * x, -v * y], axis=2),
+    ], axis=1)  # fmt: skip
+    found = np.linalg.solve(rows, np.concatenate([u, v], axis=1)[..., None])[..., 0]
+    return np.append(found, np.ones((count, 1)), axis=1).reshape(count, 3, 3)
+
+
+@lru_cache(maxsize=64)
+def _places(height: int, width: int, every: int) -> tuple[Matrix, Matrix]:
+    """Where the samples are, across and down. Each of shape (height, width)."""
+    y, x = np.mgrid[0.0:height, 0.0:width] * every
+    return x, y

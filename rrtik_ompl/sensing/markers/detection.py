@@ -5,6 +5,7 @@ OpenCV stores AprilTag families turned by half a turn; here top is where the Apr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.sensing.markers.alignment import aligned_corners
+from rrtik_ompl.sensing.markers.alignment import Look, aligned_corners
 
 DICTIONARIES = {
     **{f"{bits}x{bits}_{size}": f"DICT_{bits}X{bits}_{size}" for bits in (4, 5, 6, 7) for size in (50, 100, 250, 1000)},
@@ -28,6 +29,8 @@ _CALM = 1.0  # standard deviation of the blur against noise there [pixels of the
 _AROUND = 81  # side of the window in which light and contrast are made even there
 _FAINT = 1.5  # grey values: less contrast is noise
 _CONTRAST = 60.0  # grey values for a standard deviation of the window
+_NEAR_SIDES, _NEAR_PIXELS = 1.0, 16  # how far a marker may have moved since the picture before
+_NEAR_OUTLINE_SHARE = 0.5  # of the longer side of what is searched then; smaller outlines are noise
 MIN_OUTLINE_SHARE = 0.01  # of a marker's outline, of the picture's longer side; OpenCV's own 0.03 drops distant ones
 
 
@@ -42,7 +45,7 @@ class SeenMarker:
         likeness: Correlation of the ideal marker with the picture, 1 at best; below `MIN_LIKENESS` the corners
             are as they were detected; NaN without alignment.
         spread: Covariance of the corners, shape (8, 8) [pixels^2]; None where they are as they were detected.
-        tone: Of the picture, by this marker; NaN where it is not known.
+        look: Blur and tone of the picture, by this marker; None where they are not known.
     """
 
     dictionary: str
@@ -50,7 +53,7 @@ class SeenMarker:
     corners: Matrix
     likeness: float
     spread: Matrix | None = None
-    tone: float = float("nan")
+    look: Look | None = None
 
     @property
     def side(self) -> float:
@@ -73,7 +76,13 @@ def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
 
 
 def find_markers(
-    gray: NDArray[np.uint8], dictionary: str, *, align: bool = True, tone: float | None = None
+    gray: NDArray[np.uint8],
+    dictionary: str,
+    *,
+    align: bool = True,
+    tone: float | None = None,
+    before: Sequence[SeenMarker] = (),
+    near: bool = False,
 ) -> tuple[SeenMarker, ...]:
     """All markers of a dictionary in a grey picture, in the order of their numbers.
 
@@ -82,8 +91,13 @@ def find_markers(
         dictionary: One of `DICTIONARIES`.
         align: Align the ideal marker with the picture (`aligned_corners`); else corners are those of the detector.
         tone: Of the picture (`cameras.tone`); None: for each marker the one with which it fits best.
+        before: Those of the picture before, of a film: they are aligned faster.
+        near: Search only where those were, unless one of them is not there any more.
     """
-    corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
+    known = {marker.number: marker.look for marker in before}
+    corners, numbers = _again(gray, before) if near and before else ([], None)
+    if numbers is None:
+        corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
     if numbers is None:
         corners, numbers = _second_try(gray, dictionary)
     found: list[SeenMarker] = []
@@ -95,9 +109,26 @@ def find_markers(
         if not align:
             found.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
             continue
-        fit = aligned_corners(gray, rough, marker_cells(dictionary, number), tone)
-        found.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.tone))
+        fit = aligned_corners(gray, rough, marker_cells(dictionary, number), tone, known.get(number))
+        found.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.look))
     return tuple(found)
+
+
+def _again(gray: NDArray[np.uint8], before: Sequence[SeenMarker]) -> tuple[Any, Any]:
+    """Corners and numbers of what the picture before showed, searched for around its place; None where one is not."""
+    corners, numbers = [], []
+    for marker in before:
+        around = int(_NEAR_SIDES * marker.side) + _NEAR_PIXELS
+        low = np.maximum(np.floor(marker.corners.min(axis=0)).astype(int) - around, 0)
+        high = np.ceil(marker.corners.max(axis=0)).astype(int) + around
+        window = np.ascontiguousarray(gray[low[1] : high[1], low[0] : high[0]])
+        found, seen, _ = _detector(marker.dictionary, _NEAR_OUTLINE_SHARE).detectMarkers(window)
+        own = [] if seen is None else np.flatnonzero(np.ravel(seen) == marker.number)
+        if len(own) != 1:
+            return [], None
+        corners.append(found[own[0]] + low)
+        numbers.append(marker.number)
+    return corners, np.array(numbers)
 
 
 def _second_try(gray: NDArray[np.uint8], dictionary: str) -> tuple[Any, Any]:
@@ -157,9 +188,9 @@ def _table(dictionary: str) -> cv2.aruco.Dictionary:
 
 
 @lru_cache
-def _detector(dictionary: str) -> cv2.aruco.ArucoDetector:
+def _detector(dictionary: str, outline_share: float = MIN_OUTLINE_SHARE) -> cv2.aruco.ArucoDetector:
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    parameters.minMarkerPerimeterRate = MIN_OUTLINE_SHARE
+    parameters.minMarkerPerimeterRate = outline_share
     parameters.minDistanceToBorder = 0  # else markers that fill half of the picture are lost, though wholly in view
     return cv2.aruco.ArucoDetector(_table(dictionary), parameters)

@@ -1,4 +1,4 @@
-"""How a picture shows an ideal marker: light that changes over it, a tone curve, white that is cut off."""
+"""How a picture shows ideal markers: light that changes over them, a tone curve, white that is cut off."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rrtik_ompl.arrays import Vector
 from rrtik_ompl.sensing.cameras.tone import coded_values, light_of
 
 Pixels = NDArray[np.float32]
@@ -25,23 +26,54 @@ def shown(ideal: Pixels, seen: Pixels, tone: float) -> Pixels:
         seen: The picture in its frame, of the same shape.
         tone: Of the picture.
     """
-    height, width = ideal.shape
-    share = ideal.ravel() / np.float32(255.0)
-    even = _even(height, width)
-    columns = np.concatenate([even, share * even])
-    whole = seen.ravel() < CUT_OFF
-    light = light_of(tone)[np.clip(np.rint(seen.ravel()), 0, 255).astype(np.intp)]
-    inside = columns * whole
-    normal = (inside @ columns.T).astype(np.float64) + 1e-3 * np.eye(6)
-    weights = np.linalg.solve(normal, (inside @ light).astype(np.float64))
-    made = weights.astype(np.float32) @ columns
-    return coded_values(made, tone).reshape(ideal.shape)
+    return _shown([ideal], seen, [tone])[0].reshape(ideal.shape)
+
+
+def likenesses(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Vector:
+    """How like a picture is to some ideal markers that are shown by some tones: correlations. Shape (k,).
+
+    Args:
+        ideals: k of them, or one for all tones.
+        seen: The picture, as for `shown`.
+        tones: k of them, or one for all ideals.
+    """
+    models = _shown(ideals, seen, tones)
+    models -= models.mean(axis=1, keepdims=True)
+    middle = seen.ravel() - seen.mean()
+    found = models @ middle / np.sqrt(np.einsum("ij,ij->i", models, models) * (middle @ middle) + 1e-9)
+    return np.asarray(found, dtype=np.float64)
+
+
+def _shown(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Pixels:
+    """Of each ideal and its tone, as a row: all by one product of matrices, for markers are small. Shape (k, n)."""
+    even, pairs = _even(*seen.shape)
+    grey = seen.ravel()
+    whole = (grey < CUT_OFF).astype(np.float32)
+    shares = np.stack([ideal.ravel() for ideal in ideals]) / np.float32(255.0)
+    places = np.clip(np.rint(grey), 0, 255).astype(np.intp)
+    lights = np.stack([light_of(tone)[places] for tone in tones])
+    known = (pairs * whole).T
+    squares = [np.ones((1, len(grey)), dtype=np.float32) @ known, shares @ known, (shares * shares) @ known]
+    normal = np.empty((len(shares), 6, 6))
+    for (row, column), product in zip(((0, 0), (0, 3), (3, 3)), squares, strict=True):
+        normal[:, row : row + 3, column : column + 3] = product.reshape(-1, 3, 3)
+    normal[:, 3:, :3] = normal[:, :3, 3:]
+    inside = (even * whole).T
+    right = np.empty((max(len(shares), len(tones)), 6))
+    right[:, :3], right[:, 3:] = lights @ inside, (lights * shares) @ inside
+    weights = np.linalg.solve(normal + 1e-3 * np.eye(6), right[..., None])[..., 0].astype(np.float32)
+    made = weights[:, :3] @ even + shares * (weights[:, 3:] @ even)
+    if len(tones) == 1:
+        return coded_values(made, tones[0])
+    return np.stack([coded_values(row, tone) for row, tone in zip(made, tones, strict=True)])
 
 
 @lru_cache(maxsize=64)
-def _even(height: int, width: int) -> Pixels:
-    """One, and what changes evenly across and down. Shape (3, height * width)."""
+def _even(height: int, width: int) -> tuple[Pixels, Pixels]:
+    """One, and what changes evenly across and down, shape (3, height * width); the products of each two, (9, ...)."""
     down, across = np.mgrid[-1.0 : 1.0 : height * 1j, -1.0 : 1.0 : width * 1j].astype(np.float32)
     found = np.stack([np.ones(height * width, dtype=np.float32), across.ravel(), down.ravel()])
-    found.flags.writeable = False
-    return found
+    pairs = (found[:, None] * found).reshape(9, -1)
+    for each in (found, pairs):
+        each.flags.writeable = False
+    return found, pairs
