@@ -16,7 +16,7 @@ from rrtik_ompl.certificates.certificate import load_certificate
 from rrtik_ompl.cli.app import FOUND, NOT_FOUND, run
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.film import write_film
-from rrtik_ompl.pilot.record import read_record
+from rrtik_ompl.pilot.records.record import read_record
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer

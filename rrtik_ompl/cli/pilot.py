@@ -34,6 +34,10 @@ def pilot(
     record: Annotated[Path | None, typer.Option(help="Write the session to this file, line by line.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recorded session.")] = None,
     arm: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="An arm; a simulated one if left out.")] = None,
+    master: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="A master arm, whose joints the arm follows while K is held."),
+    ] = None,
     port: Annotated[int, typer.Option(help="Of the page; 0 takes a free one.", min=0, max=65535)] = 0,
     host: Annotated[str, typer.Option(help="Address for other machines; needs --token.")] = "127.0.0.1",
     token: Annotated[str, typer.Option(help="Secret word for --host, at least 16 letters.")] = "",
@@ -59,7 +63,9 @@ def pilot(
     from rrtik_ompl.pilot.web.server import PilotServer
 
     source = next((each for each in (camera, video, images) if each is not None), None)
-    options = SessionOptions(problem, source, scenario, camera_file, map_file, record, replay, arm, seed, sigmas)
+    options = SessionOptions(
+        problem, source, scenario, camera_file, map_file, record, replay, arm, master, seed, sigmas
+    )
     server = PilotServer(port, host, token, f"rrtik pilot · {problem}", certificate=certificate, key=key)
     with progress("preparing"):
         opened = open_session(options)

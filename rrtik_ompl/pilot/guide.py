@@ -19,6 +19,7 @@ from rrtik_ompl.pilot.routes.manoeuvre import escape_advice
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.proposal import propose
 from rrtik_ompl.pilot.routes.route import MAX_END_OFFSET, MAX_END_TURN, Route
+from rrtik_ompl.pilot.routes.track import Track, together
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.poses import apart
 from rrtik_ompl.problem import Problem
@@ -76,10 +77,11 @@ class Guide:
     def __init__(self, session: Guided) -> None:
         """Begin without a route."""
         self.route: Route | None = None
-        self.follower: Follower | None = None
+        self.follower: Follower | Track | None = None
         self.progress: Progress | None = None
         self.withdrawn = ""
         self._session = session
+        self._list: Route | None = None  # of single-joint moves: what `together` is made of, and goes back to
         self._aimed: SeenObject | None = None  # what the route leads to, as it was seen when it was planned
 
     def plan(self) -> str:
@@ -107,10 +109,24 @@ class Guide:
             aimed: What it leads to; it is withdrawn when that has moved.
         """
         session = self._session
-        self.route, self.follower, self.progress = route, Follower(route.path, session.rates), None
+        kind = Track if route.together else Follower
+        self.route, self.follower, self.progress = route, kind(route.path, session.rates), None
         self.withdrawn, self._aimed = "", aimed
+        self._list = self._list if route.together else route
         session.mode, session.desired = PROPOSED, frozen(route.path.end)
         return route.summary() + "; 'accept' or 'reject'"
+
+    def together(self) -> str:
+        """Propose the same route with all joints at once, or the list of moves again."""
+        session, list_of_moves = self._session, self._list
+        route = self.route
+        if route is None or list_of_moves is None:
+            raise InputError("there is no route; 'plan' proposes one")
+        if route.together:
+            return self.propose(list_of_moves, self._aimed)
+        world = session.surroundings.world_at(session.q, session.target)
+        made = together(route, world, session.rates, session.seed)
+        return f"no route {made}" if isinstance(made, NoRoute) else self.propose(made, self._aimed)
 
     def accept(self) -> str:
         """Follow the route that is proposed."""
@@ -139,8 +155,10 @@ class Guide:
             raise InputError("there is no route to go back on")
         session.arm.stop()
         back, self._aimed = self.follower.back(session.q), None
-        self.follower, session.mode, self.progress, self.withdrawn = Follower(back, session.rates), PROPOSED, None, ""
-        return f"the way back: {len(back.moves())} moves; 'accept' or 'reject'"
+        kind = type(self.follower)
+        self.follower, session.mode, self.progress, self.withdrawn = kind(back, session.rates), PROPOSED, None, ""
+        moves = len(self.follower.moves)
+        return f"the way back: {f'{moves} moves' if moves else 'all joints at once'}; 'accept' or 'reject'"
 
     def settle(self) -> str:
         """Take the current move for made where the arm does not come nearer to its end."""
@@ -151,6 +169,12 @@ class Guide:
         self.progress = follower.update(session.q)
         self.show_due(follower)
         return f"{joint} comes no nearer than {left} to its end; release, then hold 'next' again"
+
+    def over(self, verb: str) -> str:
+        """What there is to say to who wants to go on along a route that was made to its end; "" else."""
+        progress = self.progress
+        ended = verb == "next" and self._session.mode in (MANOEUVRE, CHOOSING)
+        return f"{MADE}; 'plan' proposes another route" if ended and progress and progress.advice == "done" else ""
 
     def watch(self) -> str:
         """Update the progress of an accepted route; what there is to say, "" if nothing."""
@@ -168,7 +192,7 @@ class Guide:
             return f"move {follower.current} of {len(follower.moves)} is done; 'next' makes the next"
         return ""
 
-    def show_due(self, follower: Follower) -> None:
+    def show_due(self, follower: Follower | Track) -> None:
         """Select the joint of the current move; its end is the desired value."""
         joint = follower.joint()
         if joint is not None:
@@ -217,7 +241,7 @@ class Guide:
         far = f"{1e3 * away:.0f} mm and {np.rad2deg(turned):.1f} deg"
         return f"{aimed.object.name} has moved by {far} since the route was planned"
 
-    def _ended(self, follower: Follower) -> str:
+    def _ended(self, follower: Follower | Track) -> str:
         """All moves are made: whether the tip is where the route ends."""
         session = self._session
         session.mode = MANOEUVRE

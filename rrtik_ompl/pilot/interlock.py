@@ -13,9 +13,9 @@ MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", 
 MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
 STALE_SECONDS = 0.5  # a picture older than that does not show the present
 
-MOVING: Final = ("jog", "go", "next")  # held: the arm moves only as long as they are renewed
+MOVING: Final = ("jog", "go", "next", "servo", "lead")  # held: the arm moves only as long as they are renewed
 # What needs the arm and a picture of now:
-PRESENT: Final = (*MOVING, "move", "plan", "replan", "accept", "back", "close", "open", "lift")
+PRESENT: Final = (*MOVING, "move", "plan", "replan", "accept", "back", "close", "open", "lift", "together")
 ALWAYS: Final = ("stop", "release", "halt", "select", "speed", "object", "grasp", "reject", "settle")
 
 _MANUAL = (MANOEUVRE, CHOOSING, PROPOSED), "a route is being followed: 'next' makes its next move, 'stop' leaves it"
@@ -26,6 +26,9 @@ _ONLY_IN: Final = {
     "close": _MANUAL,
     "open": _MANUAL,
     "lift": _MANUAL,
+    "servo": _MANUAL,
+    "lead": _MANUAL,
+    "together": ((PROPOSED,), "there is no route that is proposed; 'plan' proposes one"),
     "accept": ((PROPOSED,), "there is no route to accept; 'plan' proposes one"),
     "settle": ((FOLLOWING,), "no route is being followed"),
     "next": ((FOLLOWING,), "no route is being followed; 'plan' and 'accept' one first"),

@@ -17,11 +17,12 @@ from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.guide import Guide
-from rrtik_ompl.pilot.hand import Hand
-from rrtik_ompl.pilot.held import Held
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, MOVING, PROPOSED, Knowledge, refusal
 from rrtik_ompl.pilot.lamps import Lamp
-from rrtik_ompl.pilot.record import Record
+from rrtik_ompl.pilot.motion.hand import Hand
+from rrtik_ompl.pilot.motion.held import Held
+from rrtik_ompl.pilot.motion.leading import Leading
+from rrtik_ompl.pilot.records.record import Record
 from rrtik_ompl.pilot.routes.follower import Follower, Progress
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange
 from rrtik_ompl.pilot.routes.route import Route
@@ -44,6 +45,7 @@ class Session:
         seed: int = 0,
         past: bool = False,
         structure: Structure | None = None,
+        master: Arm | None = None,
     ) -> None:
         """Begin in manoeuvre.
 
@@ -55,6 +57,7 @@ class Session:
             seed: Of the random numbers: the same commands give the same routes.
             past: Pictures are not of now, and the arm is a simulated one. Else nothing moves without a picture of now.
             structure: To what the problem's obstacles are fixed; None if they move with the arm's base.
+            master: An arm whose joints `lead` follows.
         """
         self.problem, self.robot, self.arm, self.seed = problem, problem.robot, arm, seed
         self.rates: Vector = joint_rates(self.robot, rates)
@@ -70,6 +73,7 @@ class Session:
         self.feasibility = FeasibilityCache(self.surroundings)
         self.guide = Guide(self)
         self.held, self.hand = Held(self), Hand(self)
+        self.leading = Leading(self, master)
         self._past, self._trouble, self._seen_at = past, "", dict[str, float]()
         self._record = record or Record(None)
         self._commands: dict[str, Callable[..., str]] = {
@@ -78,7 +82,8 @@ class Session:
             "object": self._object, "grasp": self._grasp, "plan": self.guide.plan, "replan": self.guide.plan,
             "accept": self.guide.accept, "reject": self.guide.reject, "back": self.guide.back,
             "settle": self.guide.settle, "close": self.hand.close, "open": self.hand.open,
-            "lift": self.hand.lift, "halt": self._halt,
+            "lift": self.hand.lift, "halt": self._halt, "servo": self.leading.servo, "lead": self.leading.lead,
+            "together": self.guide.together,
         }  # fmt: skip
 
     # --- input -------------------------------------------------------------------------------------------
@@ -122,7 +127,7 @@ class Session:
             given = fitting(act, verb, arguments)
             if verb not in (*MOVING, "release"):
                 self.held.end()
-            refused = refusal(verb, self.mode, self.known) or self.hand.refusal(verb)
+            refused = self.guide.over(verb) or refusal(verb, self.mode, self.known) or self.hand.refusal(verb)
             if refused:
                 raise InputError(refused)
             if not goes_on:

@@ -19,8 +19,8 @@ from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
 from rrtik_ompl.pilot.devices.wrong_arm import WrongArm
 from rrtik_ompl.pilot.engine import Engine
-from rrtik_ompl.pilot.record import Record
-from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for, start_of
+from rrtik_ompl.pilot.records.record import Record
+from rrtik_ompl.pilot.records.replay import RecordedArm, RecordedPerception, entries_for, start_of
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import Structure
 from rrtik_ompl.problem import Problem
@@ -49,6 +49,7 @@ class SessionOptions:
     record: Path | None = None
     replay: Path | None = None
     arm: str | None = None
+    master: str | None = None
     seed: int = 0
     sigmas: float = SIGMAS
 
@@ -87,9 +88,14 @@ def open_session(options: SessionOptions) -> OpenSession:
     record = Record(options.record)
     record.write("begin", 0.0, problem=problem.name, seed=options.seed, q=arm.read().tolist())
     past = isinstance(options.source, Path)
-    session = Session(problem, arm, record=record, seed=options.seed, past=past, structure=_structure(vehicle))
+    master = None if options.master is None else _line_arm(problem, options.master, "--master")
+    session = Session(
+        problem, arm, record=record, seed=options.seed, past=past, structure=_structure(vehicle), master=master
+    )
     simulated = [each for each in (arm, source) if isinstance(each, SimulatedArm | SimulatedSource)]
     closing, reports = [perception.close, record.close], perception.reports()
+    if master is not None:
+        closing.append(master.close)
     if isinstance(arm, LineArm):
         closing.insert(0, arm.close)
         reports["the line to the arm"] = lambda: arm.reported
@@ -162,10 +168,10 @@ def _simulated(vehicle: SimulatedVehicle, problem: Problem) -> SimulatedCamera:
     )  # fmt: skip
 
 
-def _line_arm(problem: Problem, address: str) -> LineArm:
+def _line_arm(problem: Problem, address: str, option: str = "--arm") -> LineArm:
     host, colon, port = address.rpartition(":")
     if not colon or not host or not port.isdecimal() or not 0 < int(port) <= LAST_PORT:
-        raise InputError(f"--arm {address}: expected HOST:PORT, for example 127.0.0.1:5600")
+        raise InputError(f"{option} {address}: expected HOST:PORT, for example 127.0.0.1:5600")
     return LineArm(problem.robot, host.strip("[]"), int(port))
 
 

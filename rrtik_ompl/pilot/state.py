@@ -9,6 +9,8 @@ import pinocchio as pin
 
 from rrtik_ompl.moves.text import spoken_moves
 from rrtik_ompl.pilot.interlock import STALE_SECONDS
+from rrtik_ompl.pilot.routes.follower import Follower
+from rrtik_ompl.pilot.routes.track import Track
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.units import joint_unit, reading
@@ -98,18 +100,18 @@ def _route(session: Session) -> dict[str, Any] | None:
     route, follower = session.route, session.follower
     if route is None or follower is None:
         return None
-    words = spoken_moves(follower.path)
-    ends = np.cumsum([abs(move.change) for move in follower.moves])
-    moves: list[dict[str, Any]] = []
-    for number, (move, text) in enumerate(zip(follower.moves, words, strict=True)):
-        (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
-        status = "done" if number < follower.current else "current" if number == follower.current else "ahead"
-        moves.append({"joint": move.joint, "from": start, "to": end, "unit": unit, "text": text, "status": status,
-                      "at": float(ends[number] / ends[-1])})  # fmt: skip
+    if route.together:
+        share = 0.0 if session.progress is None else session.progress.share
+        done = "done" if follower.current else "current"
+        moves = [{"joint": "all joints", "from": 0.0, "to": share, "unit": "", "text": "all joints at once",
+                  "status": done, "at": 1.0}]  # fmt: skip
+    else:
+        moves = _moves(follower)
     progress = session.progress
     return {
         "moves": moves,
-        "grasp_from": route.grasp_from,
+        "together": route.together,
+        "grasp_from": 1 if route.together else route.grasp_from,
         "seconds": round(route.seconds, 1),
         "travel": round(reading(route.travel, "rad")[0], 1),
         "clearance_mm": None if not np.isfinite(route.clearance) else round(1e3 * route.clearance, 1),
@@ -119,3 +121,15 @@ def _route(session: Session) -> dict[str, Any] | None:
         "advice": "" if progress is None else progress.advice,
         "withdrawn": session.guide.withdrawn,
     }
+
+
+def _moves(follower: Follower | Track) -> list[dict[str, Any]]:
+    words = spoken_moves(follower.path)
+    ends = np.cumsum([abs(move.change) for move in follower.moves])
+    moves: list[dict[str, Any]] = []
+    for number, (move, text) in enumerate(zip(follower.moves, words, strict=True)):
+        (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
+        status = "done" if number < follower.current else "current" if number == follower.current else "ahead"
+        moves.append({"joint": move.joint, "from": start, "to": end, "unit": unit, "text": text, "status": status,
+                      "at": float(ends[number] / ends[-1])})  # fmt: skip
+    return moves

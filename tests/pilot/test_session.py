@@ -9,7 +9,7 @@ import pytest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED
-from rrtik_ompl.pilot.record import Record, read_record
+from rrtik_ompl.pilot.records.record import Record, read_record
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.poses import pose
 from rrtik_ompl.scene import Obstacle

@@ -30,6 +30,9 @@ class Arm(Protocol):
     def move(self, joint: int, target: float) -> None:
         """Send one joint to a value [rad or m]; all others stand still. A new move takes the place of the last."""
 
+    def follow(self, q: ArrayLike) -> None:
+        """Send all joints to a set point, shape (dof,) [rad or m], each as fast as it goes."""
+
     def stop(self) -> None:
         """Stop at once."""
 

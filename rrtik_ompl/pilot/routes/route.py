@@ -42,6 +42,7 @@ class Route:
         joints: Names of the joints that move.
         robustness: Share of executions that touch nothing although every move ends with an error of up to a degree.
         proven: Whether every move is proven free for its whole length; else some are checked in steps.
+        together: Whether all joints move at once, for an arm under position control (`routes.track`).
     """
 
     path: JointPath
@@ -52,13 +53,15 @@ class Route:
     joints: tuple[str, ...]
     robustness: float
     proven: bool
+    together: bool = False
 
     def summary(self) -> str:
         """The head of the list in one line, with a warning where a small error may touch something."""
         clear = "nothing near" if np.isinf(self.clearance) else f"at least {1e3 * self.clearance:.0f} mm away"
-        line = f"{len(self.path.moves())} moves, {self.seconds:.0f} s, {clear}"
+        head = "all joints at once" if self.together else f"{len(self.path.moves())} moves"
+        line = f"{head}, {self.seconds:.0f} s, {clear}"
         line += "" if self.proven else ", not proven free: checked in steps"
-        if self.robustness >= MIN_ROBUSTNESS:
+        if self.robustness >= MIN_ROBUSTNESS or self.together:
             return line
         return (
             f"{line}; narrow: with errors of 1 deg {100 * (1 - self.robustness):.0f} of 100 executions touch something"

@@ -272,10 +272,12 @@ function showRoute() {
   byId("advice").className = route.advice;
   set(byId("advice"), words[route.advice] ?? "");
   set(byId("due"), due ? inShort(due) : "");
+  byId("together").setAttribute("aria-pressed", String(Boolean(route.together)));
   byId("progress").value = route.share;
 }
 
 function inShort(move) {
+  if (!move.unit) return move.text;
   const digits = move.unit === "m" ? 3 : 1, sign = move.unit === "m" ? " m" : "°";
   return `${move.joint.replaceAll("_", " ")} ${move.to > move.from ? "▲" : "▼"} ${fixed(Math.abs(move.to - move.from), digits)}${sign} to ${fixed(move.to, digits)}${sign}`;
 }
@@ -303,7 +305,7 @@ function showButtons() {
   set(byId("pause").firstChild, state.paused ? "Go on" : "Pause");
   const mine = role.role === "pilot" && !state.replay && !state.trouble, at = (...modes) => mine && modes.includes(state.mode);
   for (const [id, good] of [["accept", at("proposed") && !state.route?.withdrawn], ["reject", role.role === "pilot" && state.mode === "proposed"], ["next", at("following")], ["plan", mine],
-    ["replan", mine && Boolean(state.route)], ["back", mine && Boolean(state.route)], ["stop", !state.replay],
+    ["together", at("proposed")], ["servo", at("manoeuvre", "choosing", "proposed") && Boolean(state.choice)], ["replan", mine && Boolean(state.route)], ["back", mine && Boolean(state.route)], ["stop", !state.replay],
     ...["minus", "plus", "go"].map((id) => [id, at("manoeuvre", "choosing", "proposed")])]) byId(id).disabled = !good;
   for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || state.mode !== "proposed";
 }
@@ -333,6 +335,8 @@ byId("lift").onclick = () => send("lift");
 byId("stop").onpointerdown = stopNow;
 byId("stop").onclick = stopNow;
 holdButton(byId("next"), () => ["next", {}]);
+holdButton(byId("servo"), () => ["servo", {}]);
+byId("together").onclick = () => send("together");
 holdButton(byId("go"), () => ["go", {}]);
 holdButton(byId("minus"), () => ["jog", { direction: -1 }]);
 holdButton(byId("plus"), () => ["jog", { direction: 1 }]);

@@ -17,11 +17,12 @@ FIRST_SECONDS = 0.04  # of motion that the first command of a press asks for: a 
 
 
 class Drive:
-    """Drives one joint at a time.
+    """Drives one joint at a time, or all together.
 
     Attributes:
         joint: Number of the joint that is driven; None if none is.
         goal: Where the drive ends [rad or m].
+        leading: Whether all joints are led to set points.
     """
 
     def __init__(self, arm: Arm, rates: Vector) -> None:
@@ -33,13 +34,14 @@ class Drive:
         """
         self.joint: int | None = None
         self.goal = 0.0
+        self.leading = False
         self._arm, self._rates = arm, rates
         self._point, self._renewed = 0.0, -np.inf
 
     @property
     def active(self) -> bool:
-        """Whether a joint is driven."""
-        return self.joint is not None
+        """Whether the arm is driven."""
+        return self.leading or self.joint is not None
 
     def renew(self, joint: int, goal: float, speed: float, q: Vector, time: float) -> float:
         """Drive a joint on towards a goal; returns the set point [rad or m].
@@ -53,7 +55,7 @@ class Drive:
         """
         here, rate = float(q[joint]), speed * float(self._rates[joint])
         turned = self.active and (goal - self._point) * (self.goal - self._point) < 0.0
-        if joint != self.joint or turned:
+        if joint != self.joint or turned or self.leading:
             self.end()
             self._point, self._renewed = here, time - FIRST_SECONDS
         self.joint, self.goal = joint, goal
@@ -65,6 +67,13 @@ class Drive:
         self._arm.move(joint, self._point)
         return self._point
 
+    def lead(self, point: Vector, time: float) -> None:
+        """Send all joints to a set point, shape (dof,), which is ahead of the arm by `LEASH_SECONDS` at most."""
+        if self.joint is not None:
+            self.end()
+        self.leading, self._renewed = True, max(time, self._renewed)
+        self._arm.follow(point)
+
     def expire(self, time: float) -> bool:
         """End the drive if it was not renewed in time; whether that was so."""
         over = self.active and time - self._renewed > HOLD_SECONDS
@@ -75,5 +84,5 @@ class Drive:
     def end(self) -> None:
         """Stop the arm, if it is driven."""
         if self.active:
-            self.joint = None
+            self.joint, self.leading = None, False
             self._arm.stop()

@@ -65,7 +65,7 @@ class Hand:
 
     def refusal(self, verb: str) -> str:
         """Why a command must not move the arm; "" if it may."""
-        if self.fixed and verb in (*MOVING, "move", "plan", "replan", "accept", "lift"):
+        if self.fixed and verb in (*MOVING, "move", "plan", "replan", "accept", "lift", "together"):
             return f"refused: the gripper is closed on '{self.fixed}', which is fixed; open it first"
         return ""
 

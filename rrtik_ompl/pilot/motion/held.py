@@ -9,11 +9,12 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.arm import Arm
-from rrtik_ompl.pilot.drive import Drive
 from rrtik_ompl.pilot.guide import Guide
 from rrtik_ompl.pilot.interlock import FOLLOWING, MOVING
+from rrtik_ompl.pilot.motion.drive import LEASH_SECONDS, Drive
 from rrtik_ompl.pilot.routes.follower import MADE, Follower
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange, check_move, move_refusal, way_out
+from rrtik_ompl.pilot.routes.track import Track
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.units import joint_unit, reading
 from rrtik_ompl.world import World
@@ -97,6 +98,8 @@ class Held:
         self.end()
         if not driven or session.mode != FOLLOWING:
             return "released" if driven else session.message
+        if session.guide.follower is None or session.guide.follower.joint() is None:
+            return "released: hold 'next' to go on"
         joint, end = self._due
         left, unit = reading(abs(end - float(session.q[joint])), joint_unit(session.robot.prismatic[joint]))
         return f"{session.robot.joint_names[joint]}: {left:.3g} {unit} are left of the move; hold 'next' to go on"
@@ -104,7 +107,7 @@ class Held:
     def jog(self, direction: float, press: float) -> str:
         """Drive the selected joint, at a share of the speed from -1 to 1."""
         session, sign = self._session, float(np.sign(direction))
-        self._begins("jog", press)
+        self.begins("jog", press)
         if sign == 0.0:
             self.drive.end()
             return "released"
@@ -127,18 +130,20 @@ class Held:
         """Drive the selected joint to where it is to go."""
         session, joint = self._session, self._session.selected
         target = float(session.desired[joint])
-        if self._begins("go", press):
+        if self.begins("go", press):
             check = check_move(session.world, session.q, joint, target)
             if not check.allowed:
                 raise InputError(move_refusal(session.world, session.q, joint, target, check))
         return self._run(joint, target, 1.0, self._place(joint, target))
 
     def next(self, press: float) -> str:
-        """Make the current move of the route; each press makes one move at most."""
+        """Make the current move of the route; each press makes one move at most, but for a route of all joints."""
         session, follower = self._session, self._session.guide.follower
         if follower is None:
             raise InputError("there is no route to follow; 'plan' proposes one")
-        if self._begins("next", press):
+        if isinstance(follower, Track):
+            return self._along(follower, press)
+        if self.begins("next", press):
             self._due, self._nearest = self._due_move(follower), (np.inf, session.time)
         joint, end = self._due
         if self._stuck(abs(end - float(session.q[joint])), float(follower.slack[joint])):
@@ -146,6 +151,18 @@ class Held:
         return self._run(
             joint, end, 1.0, f"{session.robot.joint_names[joint]} is there: release, then hold 'next' again"
         )
+
+    def _along(self, track: Track, press: float) -> str:
+        """Go on along a route of all joints."""
+        session = self._session
+        if self.begins("next", press):
+            session.guide.progress = track.update(session.q)
+            session.guide.refuse_if_blocked()
+        if track.done:
+            self.end()
+            return "all joints are there"
+        self.drive.lead(track.ahead(self.speed * LEASH_SECONDS), session.time)
+        return "driving all joints"
 
     def _stuck(self, away: float, slack: float) -> bool:
         """Whether the arm has stopped coming nearer to the end of its move, within the tolerance of the route."""
@@ -155,7 +172,7 @@ class Held:
             return False
         return MADE < away <= slack and self._session.time - since > STUCK_SECONDS
 
-    def _begins(self, verb: str, press: float) -> bool:
+    def begins(self, verb: str, press: float) -> bool:
         """Whether a press is a new one."""
         if (verb, press) == self._press:
             return False

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
-from rrtik_ompl.pilot.record import read_record
+from rrtik_ompl.pilot.records.record import read_record
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import Structure
 from rrtik_ompl.robot import Robot
@@ -35,6 +35,9 @@ class RecordedArm:
         return self.q.copy()
 
     def move(self, joint: int, target: float) -> None:
+        """Without effect: the record holds the result."""
+
+    def follow(self, q: ArrayLike) -> None:
         """Without effect: the record holds the result."""
 
     def stop(self) -> None:

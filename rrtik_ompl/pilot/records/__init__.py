@@ -1,0 +1,1 @@
+"""Records of sessions: written as they happen, and shown again."""

@@ -1,0 +1,142 @@
+"""Following a path of all joints at once, for an arm under position control: where it is on it, what is ahead.
+
+Source: [1, ch. 6] (comparison with lists of single-joint moves).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.path import JointPath, Move
+from rrtik_ompl.pilot.routes.follower import MADE, TOLERANCE, Progress, slack
+from rrtik_ompl.pilot.routes.no_route import NoRoute
+from rrtik_ompl.pilot.routes.route import Route
+from rrtik_ompl.planning import plan
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.shortening import shorten
+from rrtik_ompl.units import joint_unit, reading
+from rrtik_ompl.world import World
+
+PLANNER_SECONDS = 5.0
+STAGE = "with all joints at once"
+AHEAD_SECONDS, PLACES = 0.5, 51  # within which the arm is looked for on its path, and at how many places
+
+
+class Track:
+    """Tracks an arm along a path.
+
+    Attributes:
+        path: The path.
+        moves: None: it has no moves of single joints.
+        current: 0 until the end is reached, then 1.
+        slack: How far each joint may be off the path, shape (dof,) [rad or m].
+        seconds: That it takes if the slowest joint of each piece goes at its rate.
+    """
+
+    def __init__(self, path: JointPath, rates: Vector, tolerance: float = TOLERANCE) -> None:
+        """Begin at its start.
+
+        Args:
+            path: The path.
+            rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
+            tolerance: Largest error of a joint [rad].
+        """
+        self.path, self.slack = path, slack(path, tolerance)
+        self.moves: tuple[Move, ...] = ()
+        self.current = 0
+        times = (np.abs(np.diff(path.waypoints, axis=0)) / rates).max(axis=1)
+        self._times = np.concatenate([[0.0], np.cumsum(times)])
+        self.seconds = float(self._times[-1])
+        self._rates = rates
+        self._at = 0.0
+
+    @property
+    def done(self) -> bool:
+        """Whether the end is reached."""
+        return self.current == 1
+
+    @property
+    def target(self) -> Vector:
+        """Where it ends. Shape (dof,)."""
+        return self.path.end
+
+    def joint(self) -> int | None:
+        """None: no single joint is due."""
+        return None
+
+    def update(self, q: Vector) -> Progress:
+        """The progress of an arm at q."""
+        places = np.linspace(self._at, min(self._at + AHEAD_SECONDS, self.seconds), PLACES)
+        off = np.abs(np.array([self._place(each) for each in places]) - q) / self.slack
+        nearest = int(off.max(axis=1).argmin())
+        if off[nearest].max() > 1.0:
+            return Progress(0, self._share(), 0.0, "lost", self._fault(q, int(off[nearest].argmax())))
+        self._at = float(places[nearest])
+        if self.done or np.abs(q - self.path.end).max() <= MADE:
+            self.current, self._at = 1, self.seconds
+            return Progress(1, 1.0, 0.0, "done")
+        return Progress(0, self._share(), self.seconds - self._at, "move")
+
+    def ahead(self, seconds: float) -> Vector:
+        """The place on the path that is so much ahead of the arm. Shape (dof,)."""
+        return self._place(min(self._at + seconds, self.seconds))
+
+    def pass_on(self, q: Vector) -> tuple[str, str]:
+        """There is no move that could be passed over.
+
+        Raises:
+            InputError: Always.
+        """
+        raise InputError("no move is due")
+
+    def rest(self, q: Vector) -> JointPath:
+        """What remains, from q."""
+        left = self.path.waypoints[np.searchsorted(self._times, self._at, side="right") :]
+        return self.path.with_waypoints(np.vstack([q, left if len(left) else self.path.end[None]]))
+
+    def back(self, q: Vector) -> JointPath:
+        """The path back to the beginning."""
+        made = self.path.waypoints[: np.searchsorted(self._times, self._at, side="right")]
+        return self.path.with_waypoints(np.vstack([q, made[::-1]]))
+
+    def _place(self, seconds: float) -> Vector:
+        return np.array([np.interp(seconds, self._times, column) for column in self.path.waypoints.T])
+
+    def _share(self) -> float:
+        return self._at / self.seconds if self.seconds > 0.0 else 1.0
+
+    def _fault(self, q: Vector, joint: int) -> str:
+        unit = joint_unit(self.path.prismatic[joint])
+        (here, shown), (there, _) = (reading(float(row[joint]), unit) for row in (q, self._place(self._at)))
+        return f"{self.path.joint_names[joint]} is at {here:.2f} {shown} instead of {there:.2f}"
+
+
+def together(route: Route, world: World, rates: Vector, seed: int) -> Route | NoRoute:
+    """The same route with all joints at once, up to its last moves to the object, which stay as they are.
+
+    Args:
+        route: Of single-joint moves.
+        world: In which nothing may be touched.
+        rates: Of the joints, shape (dof,).
+        seed: Of the random numbers.
+    """
+    rows = route.path.waypoints
+    before, last = rows[route.grasp_from], rows[route.grasp_from + 1 :]
+    if route.grasp_from == 0:
+        return NoRoute("only moves of single joints are left", STAGE)
+    problem = Problem(world, rows[0], before)
+    found = plan(problem, "rrtconnect", seconds=PLANNER_SECONDS, seed=seed)
+    if found.path is None:
+        return NoRoute(found.reason, STAGE)
+    path = shorten(found.path, problem, seed=seed)
+    whole = path.with_waypoints(np.vstack([path.waypoints, last]))
+    used = tuple(name for name, way in zip(whole.joint_names, np.ptp(whole.waypoints, axis=0), strict=True) if way > 0)
+    return replace(
+        route, path=whole, grasp_from=len(path.waypoints) - 1, seconds=Track(whole, rates).seconds, joints=used,
+        travel=float(np.abs(np.diff(whole.waypoints, axis=0)).sum()),
+        proven=bool(world.prove(path.waypoints).proven) and route.proven, together=True,
+    )  # fmt: skip
