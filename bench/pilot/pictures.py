@@ -37,7 +37,7 @@ class Moving:
 
     def __init__(self, engine: Engine) -> None:
         """Take the pictures."""
-        camera, q = engine.perception._source._camera, engine.session.q  # type: ignore[attr-defined]
+        camera, q = engine.perception.source.camera, engine.session.q  # type: ignore[attr-defined]
         pictures = []
         for k in range(PICTURES):
             aside = SWAY * np.sin(2.0 * np.pi * k / PICTURES)
@@ -69,7 +69,7 @@ def state_rate() -> float:
 def stages(count: int = 60) -> list[tuple[str, float, float]]:
     """Stages of the loop while the object moves: name, processor time, clock time [s]."""
     engine = open_session(SessionOptions(NAME)).engine
-    engine.perception._source = Moving(engine)  # type: ignore[attr-defined]
+    engine.perception.source = Moving(engine)  # type: ignore[attr-defined]
     acts: list[tuple[str, Callable[[int], Any]]] = [
         ("detect, pose, world", lambda k: engine.update(10.0 + k / 30.0)),
         ("state with its lamps", lambda _: engine.state()),
@@ -100,7 +100,7 @@ def served(clicks: int) -> Served:
 
     def serve() -> None:
         opened = open_session(SessionOptions(NAME))
-        opened.engine.perception._source = Moving(opened.engine)  # type: ignore[attr-defined]
+        opened.engine.perception.source = Moving(opened.engine)  # type: ignore[attr-defined]
         with server:
             ready.set()
             Loop(opened.engine, server).run(ended.is_set)

@@ -32,6 +32,10 @@ def pilot(
         Path | None, typer.Option("--map", help="Marker map: which marker is on which object: .yaml.")
     ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the session to this file, line by line.")] = None,
+    record_pictures: Annotated[
+        bool, typer.Option("--record-pictures", help="Keep the pictures too, beside the record.")
+    ] = False,
+    second: Annotated[str | None, typer.Option(help="Camera number or film that is shown beside the first.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recorded session.")] = None,
     arm: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="An arm; a simulated one if left out.")] = None,
     master: Annotated[
@@ -57,15 +61,16 @@ def pilot(
     if sum(given) != 1 and not (sum(given) == 2 and given[3] and given[4]):
         named = [name for name, there in zip(SOURCES, given, strict=True) if there]
         raise InputError(f"one of {', '.join(SOURCES)} says where pictures come from; got {', '.join(named) or 'none'}")
-    if replay is not None and (record is not None or arm is not None):
-        raise InputError("--replay shows what has happened: leave out --record and --arm")
+    if replay is not None and (record is not None or arm is not None or master is not None):
+        raise InputError("--replay shows what has happened: leave out --record, --arm and --master")
     from rrtik_ompl.pilot.setup import SessionOptions, open_session
     from rrtik_ompl.pilot.web.server import PilotServer
 
     source = next((each for each in (camera, video, images) if each is not None), None)
     options = SessionOptions(
-        problem, source, scenario, camera_file, map_file, record, replay, arm, master, seed, sigmas
-    )
+        problem, source, scenario, camera_file, map_file, record, record_pictures, _second(second), replay, arm, master,
+        seed, sigmas,
+    )  # fmt: skip
     server = PilotServer(port, host, token, f"rrtik pilot · {problem}", certificate=certificate, key=key)
     with progress("preparing"):
         opened = open_session(options)
@@ -78,6 +83,13 @@ def pilot(
     if record is not None:
         say(f"wrote {record}")
     return 0
+
+
+def _second(given: str | None) -> int | Path | None:
+    """A number of a camera, or a file."""
+    if given is None or not given.isdecimal():
+        return None if given is None else Path(given)
+    return int(given)
 
 
 def _serve(server: PilotServer, opened: OpenSession, *, watch_only: bool, browser: bool) -> None:

@@ -38,12 +38,14 @@ class Ghost:
         color: Its colour.
         opacity: From 0 to 1.
         T_base_tip: Pose of the gripper without a configuration.
+        outline: Colour of a line around it, for colours alone are not seen by everybody; None for none.
     """
 
     q: Vector | None
     color: str = palette.GOAL
     opacity: float = 0.35
     T_base_tip: pin.SE3 | None = None
+    outline: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,10 +174,16 @@ class Augmenter:
     ) -> None:
         style = T_camera_base, hidden_by, ghost.opacity, ghost.color
         if ghost.q is not None:
-            self._draw_arm(drawn, self._ghost, ghost.q, *style)
+            mask = self._draw_arm(drawn, self._ghost, ghost.q, *style)
         elif ghost.T_base_tip is not None:
             joint = (ghost.T_base_tip * self._tip.placement.inverse()).homogeneous
-            self._draw_arm(drawn, self._gripper, joint, *style)
+            mask = self._draw_arm(drawn, self._gripper, joint, *style)
+        else:
+            return
+        if ghost.outline is not None:
+            edges, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+            cv2.drawContours(drawn, edges, -1, (0.0, 0.0, 0.0), 3, cv2.LINE_AA)
+            cv2.drawContours(drawn, edges, -1, _bgr(ghost.outline), 1, cv2.LINE_AA)
 
     def _draw_arm(
         self,
@@ -187,10 +195,12 @@ class Augmenter:
         opacity: float,
         color: str | None,
         solids: Figure | None = None,
-    ) -> None:
+    ) -> NDArray[np.bool_]:
+        """Draw an arm, or a gripper; where it was drawn."""
         self._last = layer = self._layer(arm, q, solids, T_camera_base, color)
         mask = layer.drawn if hidden_by is None else layer.drawn & (layer.depths < hidden_by)
         layer.blend(drawn, mask, opacity)
+        return mask
 
     def _layer(
         self, arm: Figure | None, q: Vector | None, solids: Figure | None, T: NDArray[np.float64], color: str | None
@@ -254,6 +264,7 @@ class Augmenter:
         for run in runs:
             if len(run) > 1 and before[run[0]]:
                 line = pixels[run].astype(np.int32)[:, None]
+                cv2.polylines(drawn, [line], False, (0, 0, 0), 4, cv2.LINE_AA, 4)
                 cv2.polylines(drawn, [line], False, _bgr(color), 2, cv2.LINE_AA, 4)
 
     def _draw_axes(

@@ -5,7 +5,7 @@ A step is cut in stages, so that a command never waits for more than one of them
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
 import cv2
@@ -16,8 +16,10 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.pilot.arguments import number
 from rrtik_ompl.pilot.devices.camera_feed import ENDED
+from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera
 from rrtik_ompl.pilot.devices.perception import Perception
 from rrtik_ompl.pilot.interlock import PROPOSED
+from rrtik_ompl.pilot.records.pictures import PictureRecord
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document
 from rrtik_ompl.pilot.views import PRESETS, CameraView, OutsideView
@@ -36,17 +38,29 @@ class Simulated(Protocol):
 class Engine:
     """Connects session, perception and pictures. For one thread."""
 
-    def __init__(self, session: Session, perception: Perception, *, simulated: Sequence[Simulated] = ()) -> None:
+    def __init__(
+        self,
+        session: Session,
+        perception: Perception,
+        *,
+        simulated: Sequence[Simulated] = (),
+        further: Mapping[str, FurtherCamera] | None = None,
+        pictures: PictureRecord | None = None,
+    ) -> None:
         """Take the parts.
 
         Args:
             session: The session.
             perception: Camera and sensor.
             simulated: What has a simulated time that has to advance: an arm, a vehicle.
+            further: Cameras that may be looked through in place of the view from outside, by name.
+            pictures: Where the pictures are recorded.
         """
         self.session, self.perception, self._simulated = session, perception, simulated
         self._camera_view = CameraView(perception.camera, session)
         self.outside = OutsideView(session)
+        self._further, self._through = dict(further or {}), ""  # and the one that is looked through
+        self._pictures = pictures
         self._advanced = 0.0
         self._drawn: tuple[Hashable, ...] = ()
 
@@ -75,13 +89,22 @@ class Engine:
         """Advance to a time [s] and process one picture."""
         self._advance(time)
         self.perception.update(self.session, time)
+        if self._pictures is not None:
+            self._pictures.add(self.perception.picture, time)
+            self.session.message = self._pictures.news() or self.session.message
 
     def state(self) -> dict[str, Any]:
         """What the page shows beside the pictures."""
         lost = self.perception.lost
         shown = {"camera_lost": lost, "pictures_ended": lost == ENDED, "hint": self.perception.hint}
-        shown["playing"] = self.outside.share
+        shown |= {"playing": self.outside.share, "aids": self._camera_view.aids.document()}
+        shown |= {"views": [*PRESETS, *self._further], "view": self._through}
         return state_document(self.session) | shown
+
+    def close(self) -> None:
+        """Release further cameras, and end the record of pictures."""
+        for each in (*self._further.values(), *([self._pictures] if self._pictures else [])):
+            each.close()
 
     def camera_picture(self) -> bytes:
         """The picture of the camera with the arm, the route and the chosen grasp drawn over it; JPEG."""
@@ -95,6 +118,9 @@ class Engine:
 
     def outside_picture(self, anew: bool = False) -> bytes | None:
         """The view from outside, JPEG; None if it would be the same as last time and ``anew`` is false."""
+        if self._through:
+            picture = self._further[self._through].picture()
+            return None if picture is None else _jpeg(picture)
         key = self.outside.key()
         if key == self._drawn and not anew:
             return None
@@ -123,8 +149,9 @@ class Engine:
             self.outside.zoom(number(given["factor"], "factor"))
         elif name == "preset":
             view = quoted(given["view"])
-            if view not in PRESETS:
-                raise UnknownNameError("view", view, PRESETS)
+            if view not in (*PRESETS, *self._further):
+                raise UnknownNameError("view", view, (*PRESETS, *self._further))
+            self._through, self._drawn = (view if view in self._further else ""), ()
             self.outside.preset(view)
         else:
             self.outside.share = None if given["share"] is None else number(given["share"], "share")

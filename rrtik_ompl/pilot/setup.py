@@ -12,6 +12,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import Feed
+from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera, LiveCamera, SimulatedFurtherCamera
 from rrtik_ompl.pilot.devices.line_arm import LineArm
 from rrtik_ompl.pilot.devices.perception import LivePerception, SimulatedSource
 from rrtik_ompl.pilot.devices.simulated_vehicle import SimulatedVehicle, find_vehicle, load_vehicle
@@ -19,6 +20,7 @@ from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
 from rrtik_ompl.pilot.devices.wrong_arm import WrongArm
 from rrtik_ompl.pilot.engine import Engine
+from rrtik_ompl.pilot.records.pictures import PictureRecord, RecordedPictures, beside
 from rrtik_ompl.pilot.records.record import Record
 from rrtik_ompl.pilot.records.replay import RecordedArm, RecordedPerception, entries_for, start_of
 from rrtik_ompl.pilot.session import Session
@@ -47,6 +49,8 @@ class SessionOptions:
     camera_file: Path | None = None
     map_file: Path | None = None
     record: Path | None = None
+    record_pictures: bool = False
+    second: int | Path | None = None
     replay: Path | None = None
     arm: str | None = None
     master: str | None = None
@@ -99,7 +103,29 @@ def open_session(options: SessionOptions) -> OpenSession:
     if isinstance(arm, LineArm):
         closing.insert(0, arm.close)
         reports["the line to the arm"] = lambda: arm.reported
-    return OpenSession(Engine(session, perception, simulated=simulated), tuple(closing), reports, record)
+    pictures = None
+    if options.record_pictures:
+        if options.record is None:
+            raise InputError("--record-pictures: needs --record FILE, beside which the pictures are written")
+        pictures = PictureRecord(record, options.record)
+    further = _further(options, vehicle, problem, perception)
+    engine = Engine(session, perception, simulated=simulated, further=further, pictures=pictures)
+    return OpenSession(engine, (*closing, engine.close), reports, record)
+
+
+def _further(
+    options: SessionOptions, vehicle: SimulatedVehicle | None, problem: Problem, perception: LivePerception
+) -> dict[str, FurtherCamera]:
+    """Cameras beside the first one, by name."""
+    found: dict[str, FurtherCamera] = {}
+    source, second = perception.source, options.second
+    if vehicle is not None and isinstance(source, SimulatedSource):
+        for mount in vehicle.further:
+            found[mount.name] = SimulatedFurtherCamera(mount, _simulated(vehicle, problem), source.camera, source.arm)
+    if second is not None:
+        feed = Feed(lambda: pictures_from(second), paced=not isinstance(second, int))
+        found["second"] = LiveCamera(feed)
+    return found
 
 
 def _simulated_arm(vehicle: SimulatedVehicle | None, problem: Problem) -> SimulatedArm:
@@ -181,6 +207,7 @@ def _replay(options: SessionOptions, problem: Problem, file: Path) -> OpenSessio
     start, seed = start_of(entries, problem.start)
     arm = RecordedArm(problem.robot, start)
     structure = _structure(vehicle)
-    perception = RecordedPerception(entries, arm, _simulated(vehicle, problem), structure)
+    pictures = RecordedPictures(beside(file)) if beside(file).exists() else None
+    perception = RecordedPerception(entries, arm, _simulated(vehicle, problem), structure, pictures)
     session = Session(problem, arm, seed=seed, past=True, structure=structure)
     return OpenSession(Engine(session, perception), (perception.close,))

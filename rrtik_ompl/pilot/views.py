@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 
-import cv2
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -15,13 +14,14 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.overlay.augment import Augmenter, Ghost
 from rrtik_ompl.overlay.virtual_camera import background, orbit_pose, pinhole_camera
+from rrtik_ompl.pilot.aids import Aids, draw_aids
 from rrtik_ompl.pilot.interlock import FOLLOWING, PROPOSED
 from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 LAMP_COLORS = {GREEN: "#1b9e3a", AMBER: "#e6a100", RED: "#c62828"}
-NEXT_MOVE = "#56b4e9"
+NEXT_MOVE, OUTLINE = "#56b4e9", "#ffffff"
 VIRTUAL_ARM, VIRTUAL_OPACITY = "#e4ebf5", 0.6  # of the arm drawn over a picture: not to be taken for the real one
 SKY = 0.22  # brightness of the outside view's background, which lies beside a dark page
 TRAIL_POINTS = 60  # points of a trail
@@ -30,12 +30,16 @@ PRESETS = {"side": (90.0, 10.0), "top": (-90.0, 89.0), "behind": (180.0, 25.0), 
 
 
 class CameraView:
-    """The camera's picture with the virtual arm in it."""
+    """The camera's picture with the virtual arm in it.
+
+    Attributes:
+        aids: The distances that are drawn.
+    """
 
     def __init__(self, camera: Camera, session: Session) -> None:
         """Prepare the arm's triangles once."""
         self._session, self._arm = session, Augmenter(session.robot, camera)
-        self._camera = camera
+        self._camera, self.aids = camera, Aids(session)
 
     def draw(
         self, picture: NDArray[np.uint8], T_base_camera: pin.SE3, arm_in_picture: bool = False
@@ -55,26 +59,8 @@ class CameraView:
             ghosts=ghosts(session), real=real, trail=trail(session),
             frames=[session.robot.fk(session.q), *_chosen(session)], opacity=VIRTUAL_OPACITY, color=VIRTUAL_ARM,
         )  # fmt: skip
-        self._depth_aids(drawn, T_base_camera)
+        draw_aids(drawn, self._camera, T_base_camera, session, self.aids.distances())
         return drawn
-
-    def _depth_aids(self, drawn: NDArray[np.uint8], T_base_camera: pin.SE3) -> None:
-        """A line from the tool to the chosen grasp or object with its length, and one straight down from the tool."""
-        session = self._session
-        tip = session.robot.fk(session.q).translation
-        seen = None if session.target is None else session.surroundings.named(session.target)
-        if seen is None:
-            return
-        goal = (*_chosen(session), seen.T_base_object)[0].translation
-        ends = np.stack([tip, goal, [tip[0], tip[1], goal[2]]])
-        points = ends @ T_base_camera.rotation - T_base_camera.rotation.T @ T_base_camera.translation
-        if (points[:, 2] < 0.05).any():
-            return
-        a, b, c = (tuple(int(v) for v in np.clip(pixel, -4000, 4000)) for pixel in self._camera.project(points))
-        cv2.line(drawn, a, b, (255, 255, 255), 1, cv2.LINE_AA)
-        cv2.line(drawn, a, c, (200, 200, 80), 1, cv2.LINE_AA)
-        beside = ((a[0] + b[0]) // 2 - 30, (a[1] + b[1]) // 2 + 26)
-        _write(drawn, f"{float(np.linalg.norm(goal - tip)):.3f} m", beside)
 
 
 class OutsideView:
@@ -128,13 +114,13 @@ class OutsideView:
 def ghosts(session: Session) -> list[Ghost]:
     """The chosen grasp in the colour of its lamp, or the next move of a route."""
     if session.follower is not None and session.mode in (PROPOSED, FOLLOWING):
-        return [Ghost(session.follower.target, NEXT_MOVE, 0.4)]
+        return [Ghost(session.follower.target, NEXT_MOVE, 0.4, outline=OUTLINE)]
     lamp = session.lamp()
     if lamp is None:
         return []
     if np.isnan(lamp.q[1]).any():  # no configuration holds the object: the gripper alone at the grasp
-        return [Ghost(None, LAMP_COLORS[lamp.color], 0.55, at) for at in _chosen(session)]
-    return [Ghost(lamp.q[1], LAMP_COLORS[lamp.color], 0.45)]
+        return [Ghost(None, LAMP_COLORS[lamp.color], 0.55, at, OUTLINE) for at in _chosen(session)]
+    return [Ghost(lamp.q[1], LAMP_COLORS[lamp.color], 0.45, outline=OUTLINE)]
 
 
 def trail(session: Session) -> Matrix | None:
@@ -154,14 +140,6 @@ def along(session: Session, share: float) -> Vector:
     lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).sum(axis=1))])
     at = float(np.clip(share, 0.0, 1.0)) * lengths[-1]
     return np.array([np.interp(at, lengths, column) for column in rows.T])
-
-
-def _write(drawn: NDArray[np.uint8], text: str, left_foot: tuple[int, int]) -> None:
-    """Light text on a dark plate: legible on any background."""
-    font, (x, y) = (cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1), left_foot
-    (width, height), below = cv2.getTextSize(text, *font)
-    cv2.rectangle(drawn, (x - 4, y - height - 4), (x + width + 4, y + below), (28, 21, 15), cv2.FILLED)
-    cv2.putText(drawn, text, left_foot, font[0], font[1], (255, 255, 255), font[2], cv2.LINE_AA)
 
 
 def _chosen(session: Session) -> list[pin.SE3]:

@@ -61,7 +61,7 @@ class Driver:
         assert self.session.message == "all moves are done"
 
     def place(self, name):
-        return self.engine.perception._source._camera.places[name]
+        return self.engine.perception.source.camera.places[name]
 
 
 def test_a_tool_is_picked_lifted_carried_and_placed(tmp_path):

@@ -86,6 +86,6 @@ def test_a_route_is_withdrawn_when_the_vehicle_has_drifted_and_the_arm_stands_st
     passes(0.5, name="next", press=2)
     assert np.array_equal(session.arm.read(), there)
     assert engine.state()["route"]["withdrawn"] == session.guide.withdrawn
-    truth = engine.perception._source._motion.at(time).actInv(load_vehicle(file).places["valve"])
+    truth = engine.perception.source._motion.at(time).actInv(load_vehicle(file).places["valve"])
     assert np.linalg.norm(session.surroundings.named("valve").T_base_object.translation - truth.translation) < 3e-3
     opened.close()

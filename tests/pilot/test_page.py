@@ -121,7 +121,7 @@ def test_a_second_page_watches_and_a_lost_camera_and_a_lost_server_are_said(brow
         browser.wait("document.getElementById('plan').disabled")
         browser.press("t")
         browser.wait("role.role === 'pilot'")
-        source = running.opened.engine.perception._source
+        source = running.opened.engine.perception.source
         latest, source.latest = source.latest, gone
         browser.wait("document.getElementById('camera_banner').textContent.includes('Camera lost: unplugged')")
         browser.wait("document.getElementById('alerts').textContent.includes('Camera lost')")

@@ -65,19 +65,19 @@ def test_a_camera_that_is_lost_is_said_and_the_last_state_stays_until_it_is_back
     engine = opened.engine
     for count in range(3):
         engine.update(count / 30)
-    before, latest = engine.state(), engine.perception._source.latest
+    before, latest = engine.state(), engine.perception.source.latest
 
     def gone():
         raise CameraLostError("camera 0 gives no more pictures")
 
-    engine.perception._source.latest = gone
+    engine.perception.source.latest = gone
     engine.update(1.0)
     state = engine.state()
     assert "no more pictures" in state["camera_lost"]
     assert state["stale"]
     assert (state["objects"], state["lamps"]) == (before["objects"], before["lamps"])
     assert engine.camera_picture()[:2] == b"\xff\xd8"
-    engine.perception._source.latest = latest
+    engine.perception.source.latest = latest
     engine.update(1.1)
     assert engine.state()["camera_lost"] == ""
     assert not engine.state()["stale"]
@@ -124,7 +124,7 @@ def test_pictures_of_the_past_come_as_far_apart_as_they_were_taken():
 
 def test_a_simulated_picture_follows_the_arm_and_the_objects_and_is_never_without_noise():
     engine = open_session(SessionOptions("titan4_sdu")).engine
-    camera, start = engine.perception._source._camera, np.array(load_problem("titan4_sdu").start)
+    camera, start = engine.perception.source.camera, np.array(load_problem("titan4_sdu").start)
     still = camera.picture(start, 0.0).pixels.astype(int)
     assert 1.0 < np.abs(camera.picture(start, 1.0 / 30.0).pixels - still).mean() < 3.0
     moved = start.copy()
@@ -163,7 +163,7 @@ def test_an_object_that_is_out_of_view_is_said_and_costs_no_search_for_other_mar
     searched = []
     monkeypatch.setattr("rrtik_ompl.sensing.sensor.dictionaries_seen", lambda gray: searched.append(gray) or ())
     engine = open_session(SessionOptions("titan4_sdu")).engine
-    camera = engine.perception._source._camera
+    camera = engine.perception.source.camera
     there, camera.places = camera.places, {}
     for k in range(10):
         engine.update(0.1 * k)

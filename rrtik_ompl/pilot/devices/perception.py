@@ -51,7 +51,11 @@ class Perception(Protocol):
 
 
 class LivePerception:
-    """A camera and the sensor behind it."""
+    """A camera and the sensor behind it.
+
+    Attributes:
+        source: Of the pictures.
+    """
 
     def __init__(self, sensor: Sensor, source: PictureSource, *, arm_in_picture: bool = False) -> None:
         """Take the parts; see `Perception`."""
@@ -60,12 +64,12 @@ class LivePerception:
         self.T_base_camera: pin.SE3 | None = sensor.marker_map.T_base_camera
         self.lost = self.hint = ""
         self._explain_again = -np.inf
-        self._sensor, self._source = sensor, source
+        self._sensor, self.source = sensor, source
 
     def update(self, session: Session, time: float) -> None:
         """Process the newest picture, and give the objects in it to the session."""
         try:
-            taken = self._source.latest()
+            taken = self.source.latest()
             if taken is None:
                 return
             view = self._sensor.view(Picture(taken.pixels, taken.name, time))
@@ -80,11 +84,11 @@ class LivePerception:
 
     def close(self) -> None:
         """Release the camera."""
-        self._source.close()
+        self.source.close()
 
     def reports(self) -> dict[str, Report]:
         """When the thread of the camera reported last, by name; nothing if it has none."""
-        source = self._source
+        source = self.source
         return {"the camera": lambda: source.reported} if isinstance(source, Feed) else {}
 
     def _why_nothing(self, view: View, time: float, known: bool) -> str:
@@ -103,11 +107,16 @@ class LivePerception:
 
 
 class SimulatedSource:
-    """Pictures of a simulated camera, made on demand."""
+    """Pictures of a simulated camera, made on demand.
+
+    Attributes:
+        camera: Makes them.
+        arm: That they show.
+    """
 
     def __init__(self, camera: SimulatedCamera, arm: Arm, motion: BaseMotion | None = None) -> None:
         """Take camera and arm, and how their base moves."""
-        self._camera, self._arm, self._motion = camera, arm, motion
+        self.camera, self.arm, self._motion = camera, arm, motion
         self._count, self._time = 0, 0.0
         self._was_closed = False
         self._carried: tuple[str, pin.SE3] | None = None  # an object that the gripper has taken, and T_tip_object
@@ -116,20 +125,20 @@ class SimulatedSource:
         """Advance the simulated time: the base moves."""
         self._time += seconds
         if self._motion is not None:
-            self._camera.T_start_base = self._motion.at(self._time)
+            self.camera.T_start_base = self._motion.at(self._time)
 
     def latest(self) -> Picture:
         """A picture with the arm at its present configuration."""
         self._count += 1
-        arm = self._arm
+        arm = self.arm
         q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
         if isinstance(arm, SimulatedArm):
             self._carry(arm, arm.robot.fk(q))
-        return self._camera.picture(q, float(self._count))
+        return self.camera.picture(q, float(self._count))
 
     def _carry(self, arm: SimulatedArm, T_base_tip: pin.SE3) -> None:
         """Objects that can be carried move with a closed gripper, if it was closed where they can be grasped."""
-        tip, camera = self._camera.T_start_base * T_base_tip, self._camera
+        tip, camera = self.camera.T_start_base * T_base_tip, self.camera
         if arm.closed and not self._was_closed:
             near = [
                 (float(np.linalg.norm(tip.actInv(camera.places[thing.name] * level).translation)), thing.name)

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -17,6 +17,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.pilot.devices.base_motion import BaseMotion
+from rrtik_ompl.pilot.devices.further_cameras import Mount
 from rrtik_ompl.pilot.devices.wrong_arm import Faults
 from rrtik_ompl.problem_files.scene import PoseEntry
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -38,6 +39,7 @@ class SimulatedVehicle:
         T_base_camera: Pose of the camera.
         faults: Of the arm; None if it has none.
         base_motion: How the vehicle moves; None if it stands still.
+        further: Cameras beside the first one.
         structure: Name of the object to which the problem's obstacles are fixed; None if they move with the vehicle.
     """
 
@@ -48,6 +50,19 @@ class SimulatedVehicle:
     faults: Faults | None = None
     base_motion: BaseMotion | None = None
     structure: str | None = None
+    further: tuple[Mount, ...] = ()
+
+
+class FurtherEntry(Section):
+    """A further camera, with the lens of the first one; its pictures are shown as they are."""
+
+    name: Name
+    carried_by: Literal["base", "tip"] = Field("base", description="what its pose is given in, and moves it")
+    pose: PoseEntry
+
+    def build(self) -> Mount:
+        """Where it is."""
+        return Mount(self.name, self.carried_by == "tip", self.pose.build())
 
 
 class BaseMotionEntry(Section):
@@ -95,6 +110,7 @@ class VehicleFile(Section):
     places: Annotated[list[PlaceEntry], Field(min_length=1)]
     base_motion: BaseMotionEntry | None = Field(None, description="drift [m/s] and sway [m] of the vehicle")
     structure: Name | None = Field(None, description="the object to which the problem's obstacles are fixed")
+    further_cameras: list[FurtherEntry] = Field([], description="a second camera, a camera at the wrist")
     arm: FaultsEntry | None = Field(None, description="by how much the simulated arm is wrong")
 
 
@@ -120,8 +136,12 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
         structure = None if entry.structure is None else marker_map.named(entry.structure).name
         if structure is not None and structure not in places:
             raise InputError(f"structure '{structure}' has no place; give one under places")
-    camera = load_camera(folder / entry.camera)
-    return SimulatedVehicle(camera, marker_map, places, entry.camera_pose.build(), faults, motion, structure)
+    with document.at(("further_cameras",)):
+        further = tuple(each.build() for each in entry.further_cameras)
+        if len({each.name for each in further}) < len(further):
+            raise InputError("two further cameras have the same name; give each its own")
+    camera, T = load_camera(folder / entry.camera), entry.camera_pose.build()
+    return SimulatedVehicle(camera, marker_map, places, T, faults, motion, structure, further)
 
 
 def find_vehicle(problem: str) -> Path:

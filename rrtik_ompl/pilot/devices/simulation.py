@@ -63,6 +63,7 @@ class SimulatedCamera:
         self.places = {name: rigid(T, f"pose of object '{name}'") for name, T in places.items()}
         self.T_start_base = pin.SE3.Identity()  # where the base is
         self._fixed = fixed
+        self.robot = robot
         self._scene, self._arm = scene, Augmenter(robot, camera, TRIANGLES)
         rng, size = np.random.default_rng(seed), (camera.height, camera.width, 1)
         grey = [np.rint(rng.normal(0.0, NOISE, size)).astype(np.int16) for _ in range(NOISE_PICTURES)]
@@ -89,7 +90,8 @@ class SimulatedCamera:
         """The picture without the arm, and the solids in it; made anew only when an object moved."""
         T_base_start = self.T_start_base.inverse()
         places = {name: T_base_start * T for name, T in sorted(self.places.items())}
-        key = tuple((name, T.homogeneous.tobytes()) for name, T in places.items())
+        key: Any = tuple((name, T.homogeneous.tobytes()) for name, T in places.items())
+        key = (self.T_base_camera.homogeneous.tobytes(), key)
         if key != self._kept[0]:
             around = self._scene.obstacles
             if self._fixed:

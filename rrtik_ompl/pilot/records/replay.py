@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
+from rrtik_ompl.pilot.records.pictures import RecordedPictures
 from rrtik_ompl.pilot.records.record import read_record
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import Structure
@@ -51,7 +52,12 @@ class RecordedPerception:
     """Gives the entries of a record to a session when their time has come."""
 
     def __init__(
-        self, entries: list[Entry], arm: RecordedArm, world: SimulatedCamera, structure: Structure | None = None
+        self,
+        entries: list[Entry],
+        arm: RecordedArm,
+        world: SimulatedCamera,
+        structure: Structure | None = None,
+        pictures: RecordedPictures | None = None,
     ) -> None:
         """Begin at the beginning.
 
@@ -60,12 +66,14 @@ class RecordedPerception:
             arm: What the session takes for its arm.
             world: Makes the pictures; its places follow the record.
             structure: To what its obstacles are fixed; None if they move with the base.
+            pictures: That were recorded too; else the scene is drawn.
         """
         self._structure = structure
         self._entries, self._arm, self._world, self._next = entries, arm, world, 0
         self.camera, self.T_base_camera, self.arm_in_picture = world.camera, world.T_base_camera, True
         self.picture: NDArray[np.uint8] = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
         self.lost = self.hint = ""
+        self._pictures = pictures
 
     def update(self, session: Session, time: float) -> None:
         """Apply the entries up to a time of the record [s]."""
@@ -73,11 +81,14 @@ class RecordedPerception:
             self._apply(self._entries[self._next], session)
             self._next += 1
         session.see((), time)
-        self.picture = self._world.picture(self._arm.q, time).pixels
+        if self._pictures is None:
+            self.picture = self._world.picture(self._arm.q, time).pixels
         self.lost = "the record ends here" if self._next == len(self._entries) else ""
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Close the pictures."""
+        if self._pictures is not None:
+            self._pictures.close()
 
     def _place(self, seen: list[SeenObject]) -> None:
         """Put objects, and what is fixed to one of them, where they were seen."""
@@ -98,6 +109,9 @@ class RecordedPerception:
             seen = [_seen(self._world.marker_map, each) for each in entry["objects"]]
             self._place(seen)
             session.see(seen, time)
+        elif entry["kind"] == "picture" and self._pictures is not None:
+            found = self._pictures.at(entry["at"], entry["size"], self.picture)
+            self.picture = self.picture if found is None else found
 
 
 def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker_map: MarkerMap) -> list[Entry]:
@@ -133,6 +147,9 @@ def _check(entry: Entry, robot: Robot, marker_map: MarkerMap) -> None:
         robot.configuration(entry["q"], "q")
     elif entry["kind"] == "command":
         str(entry["name"]) + "", dict(**entry["arguments"])
+    elif entry["kind"] == "picture":
+        if not all(type(entry[key]) is int and entry[key] >= 0 for key in ("at", "size")):
+            raise ValueError("'at' and 'size' must be whole numbers")
     elif entry["kind"] == "seen":
         for each in entry["objects"]:
             _seen(marker_map, each)

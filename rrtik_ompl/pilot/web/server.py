@@ -134,6 +134,8 @@ class PilotServer:
             return
         if "shown" in said:
             (client.frames if said["shown"] == "frame" else client.states).arrived()
+        elif said.get("name") == "ping":
+            client.send_json(kind="pong")
         elif said.get("name") == "take":
             refused = self.clients.take_over(client)
             if refused:

@@ -38,7 +38,18 @@ function onText(said) {
   } else if (said.kind === "role") { me = said.you; showRole(said); }
   else if (said.kind === "title") { document.title = said.title; byId("title").textContent = said.title; }
   else if (said.kind === "refused") say(said.text, true);
+  else if (said.kind === "pong") measureLink();
 }
+
+// How long the line to the server takes, there and back.
+let pinged = 0;
+function ping() {
+  if (!socket || socket.readyState !== WebSocket.OPEN) return;
+  pinged = performance.now();
+  socket.send(JSON.stringify({ name: "ping" }));
+}
+function measureLink() { window.measured.link = performance.now() - pinged; showLink(window.measured.link); }
+setInterval(ping, 1000);
 
 function measureAnswer(number) {
   if (!sent.has(number)) return;

@@ -2,9 +2,8 @@
 "use strict";
 
 const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1];  // shares of the joints' rates
-const PRESETS = ["corner", "side", "top", "behind"];
 const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
-const NEAR_LIMIT = 0.04, MARK = 0.006, UNSEEN_S = 1, HOLD_MS = 3000;
+const NEAR_LIMIT = 0.04, MARK = 0.006, UNSEEN_S = 1, HOLD_MS = 3000, SLOW_LINK_MS = 250;
 const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|no lift|nothing is|withdrawn|stopped:|but the tip|no nearer|left;|outside|collision|away from the goal/;
 const FIRST_WORDS = "Choose a grasp with G and L, then plan with P. Or choose a joint with 1 … 9 and hold ← or → to drive it.";
 let state = null, role = { role: "watching", free: false, pages: 1 }, preset = 0, receivedAt = 0, playing = null;
@@ -43,7 +42,7 @@ function chooseGrasp(byType, byLevel) {
   send("grasp", { type, level: level % levels });
 }
 function toggleGripper() { send(state?.gripper.closed ? "open" : "close"); }
-function nextPreset() { preset = (preset + 1) % PRESETS.length; send("preset", { view: PRESETS[preset] }); }
+function nextPreset() { preset = (preset + 1) % state.views.length; send("preset", { view: state.views[preset] }); }
 
 // --- preview of the route ---------------------------------------------------------------------------------------
 
@@ -101,7 +100,7 @@ function showState(said) {
   for (const item of byId("modes").children)
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
   if (newMessage || performance.now() > heldUntil) say(inWords(said.message) || FIRST_WORDS, WORRYING.test(said.message), 0);
-  showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showGripper(); showPreview(); showAge();
+  showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showGripper(); showViews(); showPreview(); showAge();
   if (said.mode !== "proposed" && playing) pausePlay();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
@@ -289,6 +288,9 @@ function showAim() {
   const rows = [["tip x, y, z [m]", aim.tip.map((value) => fixed(value, 2)).join("  ")]];
   if (aim.to) rows.push([`to ${aim.to}`, metres(aim.distance)], [aim.ahead < 0 ? "behind the tool" : "ahead of the tool", metres(aim.ahead)],
     ["aside of its axis", metres(aim.aside)], [aim.xyz[2] < 0 ? "lower" : "higher", metres(aim.xyz[2])], ["turned away by", `${fixed(aim.turn_deg)}°`]);
+  const { nearest, to_target: edges } = state.aids, gap = (pair) => inWords(`${pair.first} – ${pair.second}`);
+  if (nearest) rows.push([gap(nearest), `${fixed(nearest.mm, 0)} mm`]);
+  if (edges && aim.to) rows.push(["gripper to its edges", `${fixed(edges.mm, 0)} mm`]);
   for (const seen of state.objects) rows.push([`${seen.name} seen to within`, `± ${fixed(seen.sigma_mm, 2)} mm`]);
   for (const gone of state.objects.filter(isOutOfView)) rows.push([`${gone.name} not in view for`, `${fixed(gone.unseen, 0)} s`]);
   const list = byId("depth"), key = rows.map((row) => row[0]).join();
@@ -318,6 +320,21 @@ function showGripper() {
   const free = role.role === "pilot" && !state.replay && !state.trouble && state.mode !== "following";
   byId("grip").disabled = !free;
   byId("lift").disabled = !free || !holds;
+}
+
+function showViews() {
+  const row = byId("presets"), key = state.views.join();
+  if (row.dataset.key !== key) {
+    row.dataset.key = key;
+    row.replaceChildren(...state.views.map((name, k) => make("button", { onclick: () => { preset = k; send("preset", { view: name }); } }, name)));
+  }
+  set(byId("outside_tag"), state.view ? `Camera: ${state.view}` : "From outside");
+}
+
+function showLink(ms) {
+  byId("link").hidden = false;
+  byId("link").classList.toggle("bad", ms > SLOW_LINK_MS);
+  set(byId("link"), `link ${Math.round(ms)} ms`);
 }
 
 function showPreview() {
@@ -356,7 +373,6 @@ byId("step_back").onclick = () => stepPreview(-1);
 byId("step_on").onclick = () => stepPreview(1);
 byId("scrub").oninput = (event) => preview(Number(event.target.value));
 byId("scrub").onpointerup = (event) => event.target.blur();  // whoever drags goes on with the arrow keys as before
-byId("presets").replaceChildren(...PRESETS.map((name, k) => make("button", { onclick: () => { preset = k; send("preset", { view: name }); } }, name)));
 
 const dragged = { right: 0, up: 0 };
 byId("outside").onpointerdown = (event) => event.target.setPointerCapture(event.pointerId);
