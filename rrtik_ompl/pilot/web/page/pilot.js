@@ -339,8 +339,8 @@ function showLink(ms) {
 
 function showPreview() {
   const previewed = state.playing !== null && Boolean(state.route);
-  byId("preview_tag").hidden = !previewed;
-  byId("outside_panel").classList.toggle("previewed", previewed);
+  byId("preview_tag").hidden = !previewed || Boolean(state.view);
+  byId("outside_panel").classList.toggle("previewed", previewed && !state.view);
   if (document.activeElement !== byId("scrub")) byId("scrub").value = state.playing ?? 0;
 }
 
