@@ -1,0 +1,108 @@
+"""A camera on a head that pans and tilts, with a lens that zooms: where it is and how it shows, by its encoders.
+
+Source: [1, ch. 4.6.2] (two rotations before the camera, intrinsics that depend on the zoom).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Vector, finite_array, finite_number, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.poses import rigid
+from rrtik_ompl.sensing.cameras.camera import Camera
+
+
+class Encoder(NamedTuple):
+    """From the counts of an encoder to an angle.
+
+    Attributes:
+        zero: Its count at the angle 0.
+        per_count: Angle of a count [rad]; negative where it counts the other way.
+    """
+
+    zero: float = 0.0
+    per_count: float = 1.0
+
+    def angle(self, count: float) -> float:
+        """The angle of a count [rad]."""
+        return (finite_number(count, "count of an encoder") - self.zero) * self.per_count
+
+
+class PanTiltZoom:
+    """A head and its lens.
+
+    Args:
+        cameras: The lens at some zooms, each calibrated there, all of one size.
+        zooms: Counts of the zoom's encoder of each, increasing, shape (k,). One camera: a lens that does not zoom.
+        T_base_head: The head in the frame of the arm's base at pan 0: it pans about its z axis, and tilts about the y
+            axis that has been panned.
+        T_head_camera: The camera in the frame that is panned and tilted.
+        pan: Of the encoder of the pan; by itself it gives radians.
+        tilt: Of the encoder of the tilt.
+
+    Raises:
+        InputError: If there is no camera, sizes differ, or zooms do not increase.
+
+    Example:
+        >>> from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
+        >>> head = PanTiltZoom([published_camera()], [0.0], pin.SE3.Identity(), pin.SE3.Identity())
+        >>> head.pose(np.pi / 2, 0.0).rotation.round(6)[:, 0].tolist()
+        [0.0, 1.0, 0.0]
+    """
+
+    def __init__(
+        self,
+        cameras: Sequence[Camera],
+        zooms: ArrayLike,
+        T_base_head: ArrayLike | pin.SE3,
+        T_head_camera: ArrayLike | pin.SE3,
+        *,
+        pan: Encoder = Encoder(),  # noqa: B008 - frozen
+        tilt: Encoder = Encoder(),  # noqa: B008
+    ) -> None:
+        self.cameras = tuple(cameras)
+        self.zooms: Vector = frozen(finite_array(zooms, (len(self.cameras),), "zooms"))
+        if not self.cameras or (np.diff(self.zooms) <= 0.0).any():
+            raise InputError("a zoom lens needs a camera for each of its zooms, which increase")
+        if len({(each.width, each.height) for each in self.cameras}) > 1:
+            raise InputError("cameras of one zoom lens have one size of pictures")
+        self.T_base_head = rigid(T_base_head, "pose of the head")
+        self.T_head_camera = rigid(T_head_camera, "pose of the camera on its head")
+        self._pan, self._tilt = pan, tilt
+
+    def pose(self, pan: float, tilt: float) -> pin.SE3:
+        """``T_base_camera`` for counts of pan and tilt."""
+        turned = pin.utils.rotate("z", self._pan.angle(pan)) @ pin.utils.rotate("y", self._tilt.angle(tilt))
+        return self.T_base_head * pin.SE3(turned, np.zeros(3)) * self.T_head_camera
+
+    def camera(self, zoom: float) -> Camera:
+        """The lens at a count of the zoom, between those that were calibrated.
+
+        Focal lengths change by equal factors with equal counts, all else by equal amounts; what is not sure of the two
+        neighbours is not sure of what lies between them.
+
+        Raises:
+            InputError: If it lies outside of them.
+        """
+        at = finite_number(zoom, "zoom")
+        if not self.zooms[0] <= at <= self.zooms[-1]:
+            raise InputError(
+                f"zoom {at:g} lies outside of what was calibrated, {self.zooms[0]:g} to {self.zooms[-1]:g}"
+            )
+        low = int(np.clip(np.searchsorted(self.zooms, at, side="right") - 1, 0, max(len(self.zooms) - 2, 0)))
+        high = min(low + 1, len(self.zooms) - 1)
+        share = (at - self.zooms[low]) / (self.zooms[high] - self.zooms[low]) if high > low else 0.0
+        first, second = self.cameras[low], self.cameras[high]
+        matrix = (1.0 - share) * first.matrix + share * second.matrix
+        for k in range(2):
+            matrix[k, k] = first.matrix[k, k] ** (1.0 - share) * second.matrix[k, k] ** share
+        lens = (1.0 - share) * first.distortion + share * second.distortion
+        sigmas = np.maximum(first.sigmas, second.sigmas)
+        tone = first.tone if first.tone == second.tone else None
+        return Camera(matrix, first.width, first.height, lens, sigmas=sigmas, tone=tone)

@@ -1,0 +1,146 @@
+"""Two or more cameras that take pictures at the same time: what each sees of an object is joined to one pose.
+
+Each camera's pose of an object comes with a covariance that is small across its view and large along it. Joined by the
+inverses of these, cameras that stand apart make up for what the others cannot tell: distance, and which of two poses of
+a single square is the right one. Cameras that contradict each other by more than what is stated are not joined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector, frozen, not_negative
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.poses import rigid
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.markers.corner_pose import CornerPose
+from rrtik_ompl.sensing.markers.marker_map import MarkerMap
+from rrtik_ompl.sensing.sight import Sighting, detect_objects
+
+MAX_CONTRADICTION = 5.0  # squared deviations for each number that the cameras both give; 1 is usual
+ROUNDS = 4  # of Gauss-Newton: rotations are nearly vectors after one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """Cameras that are fixed to each other.
+
+    Attributes:
+        cameras: At least two.
+        poses: ``T_first_camera`` of each; the first one's is the identity.
+        position_sigma: Standard deviation of where the others are [m].
+        rotation_sigma: Of how they are turned [rad].
+
+    Raises:
+        InputError: If there are fewer than two cameras, as many poses as cameras are not given, or one is none.
+    """
+
+    cameras: tuple[Camera, ...]
+    poses: tuple[pin.SE3, ...]
+    position_sigma: float = 0.0
+    rotation_sigma: float = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.cameras) < 2 or len(self.poses) != len(self.cameras):
+            raise InputError(
+                f"a rig has two cameras or more, each with its pose; got {len(self.cameras)} and {len(self.poses)}"
+            )
+        poses = tuple(rigid(T, f"pose of camera {k}") for k, T in enumerate(self.poses, start=1))
+        if not poses[0].isIdentity(1e-9):
+            raise InputError("poses of a rig are in the frame of its first camera, whose own pose is the identity")
+        object.__setattr__(self, "cameras", tuple(self.cameras))
+        object.__setattr__(self, "poses", poses)
+        for name in ("position_sigma", "rotation_sigma"):
+            object.__setattr__(self, name, not_negative(getattr(self, name), f"{name} of a rig"))
+
+
+def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: MarkerMap) -> tuple[Sighting, ...]:
+    """The objects of a map that the cameras of a rig see, in the frame of the first one, in the order of the map.
+
+    Args:
+        pictures: One of each camera, taken at the same time.
+        rig: The cameras.
+        marker_map: The map of all objects.
+
+    Returns:
+        An object that only one camera sees has the pose that this one gives.
+
+    Raises:
+        InputError: If there are not as many pictures as cameras, or one does not have its camera's size.
+    """
+    if len(pictures) != len(rig.cameras):
+        raise InputError(f"a rig of {len(rig.cameras)} cameras needs as many pictures, got {len(pictures)}")
+    seen: dict[str, list[Sighting]] = {}
+    for number, (picture, camera) in enumerate(zip(pictures, rig.cameras, strict=True)):
+        for each in detect_objects(picture, camera, marker_map):
+            seen.setdefault(each.object.name, []).append(_in_first(each, rig, number))
+    return tuple(joined(seen[each.name]) for each in marker_map.objects if each.name in seen)
+
+
+def joined(sightings: Sequence[Sighting]) -> Sighting:
+    """One sighting of several of the same object, all in the same frame; what is refused counts only if all are."""
+    usable = [each for each in sightings if not each.refused]
+    if len(usable) < 2:
+        return (usable or list(sightings))[0]
+    tried = [_joined(usable, poses) for poses in product(*(_branches(each) for each in usable))]
+    pose = min(tried, key=lambda each: each.surprise)
+    others = [each for each in tried if each is not pose]
+    second = min(others, key=lambda each: each.surprise, default=None)
+    doubtful = second is not None and second.surprise < MAX_CONTRADICTION
+    if doubtful and second is not None:
+        pose = replace(pose, other=second.T_camera_object, other_error=pose.error)
+    markers = tuple(marker for each in usable for marker in each.markers)
+    refused = "" if pose.surprise <= MAX_CONTRADICTION else CONTRADICTION.format(pose.surprise**0.5)
+    return Sighting(usable[0].object, pose, markers, refused)
+
+
+CONTRADICTION = (
+    "the cameras contradict each other by {:.0f} times what is stated: check their focal lengths, the marker's side, "
+    "and how they stand to each other"
+)
+
+
+def _in_first(sight: Sighting, rig: Rig, number: int) -> Sighting:
+    """A sighting of one of the cameras in the frame of the first one."""
+    if number == 0:
+        return sight
+    T, pose = rig.poses[number], sight.pose
+    axes = np.kron(np.eye(2), T.rotation)
+    lever = np.eye(6)
+    lever[:3, 3:] = -pin.skew(T.rotation @ pose.T_camera_object.translation)
+    doubt = np.diag(np.repeat(np.square([rig.position_sigma, rig.rotation_sigma]), 3))
+    spread = axes @ pose.covariance @ axes.T + lever @ doubt @ lever.T
+    other = None if pose.other is None else T * pose.other
+    moved = replace(pose, T_camera_object=T * pose.T_camera_object, other=other, covariance=frozen(spread))
+    return replace(sight, pose=moved)
+
+
+def _branches(sight: Sighting) -> list[pin.SE3]:
+    pose = sight.pose
+    return [pose.T_camera_object, pose.other] if pose.ambiguous and pose.other is not None else [pose.T_camera_object]
+
+
+def _joined(sightings: Sequence[Sighting], poses: Sequence[pin.SE3]) -> CornerPose:
+    """The pose that is nearest to some poses by their covariances, and by how much they contradict each other."""
+    weights = [np.linalg.inv(each.pose.covariance) for each in sightings]
+    covariance, found = np.linalg.inv(sum(weights)), poses[0]
+    for _ in range(ROUNDS):
+        away = [_away(found, pose) for pose in poses]
+        step = covariance @ sum(w @ a for w, a in zip(weights, away, strict=True))
+        found = pin.SE3(pin.exp3(step[3:]) @ found.rotation, found.translation + step[:3])
+    squares = sum(float(a @ w @ a) for w, a in zip(weights, (_away(found, pose) for pose in poses), strict=True))
+    surprise = squares / (6.0 * (len(poses) - 1))
+    error = max(each.pose.error for each in sightings)
+    return CornerPose(found, None, error, np.inf, frozen(max(surprise, 1.0) * covariance), surprise)
+
+
+def _away(begin: pin.SE3, end: pin.SE3) -> Vector:
+    """From one pose to another: position, and a small rotation about the axes of the camera. Shape (6,)."""
+    turned: Matrix = end.rotation @ begin.rotation.T
+    return np.concatenate([end.translation - begin.translation, pin.log3(turned)])
