@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bench.robustness.spoilt_files import spoilt
-from rrtik_ompl.arrays import Vector
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 
 HUGE_BYTES = 300_000
@@ -37,7 +37,7 @@ class Witness(SimulatedArm):
         super().move(joint, target)
         self.stands, self.sent = False, self.sent + 1
 
-    def follow(self, q: Vector) -> None:  # type: ignore[override]
+    def follow(self, q: ArrayLike) -> None:
         """Send all joints to a set point."""
         super().follow(q)
         self.stands, self.sent = False, self.sent + 1

@@ -103,8 +103,10 @@ class Engine:
 
     def close(self) -> None:
         """Release further cameras, and end the record of pictures."""
-        for each in (*self._further.values(), *([self._pictures] if self._pictures else [])):
+        for each in self._further.values():
             each.close()
+        if self._pictures is not None:
+            self._pictures.close()
 
     def camera_picture(self) -> bytes:
         """The picture of the camera with the arm, the route and the chosen grasp drawn over it; JPEG."""

@@ -26,6 +26,7 @@ from rrtik_ompl.pilot.records.record import Record
 from rrtik_ompl.pilot.routes.follower import Follower, Progress
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange
 from rrtik_ompl.pilot.routes.route import Route
+from rrtik_ompl.pilot.routes.track import Track
 from rrtik_ompl.pilot.surroundings import Structure, Surroundings
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject
@@ -158,7 +159,7 @@ class Session:
         return self.guide.route
 
     @property
-    def follower(self) -> Follower | None:
+    def follower(self) -> Follower | Track | None:
         """Of the route, or of the way back."""
         return self.guide.follower
 

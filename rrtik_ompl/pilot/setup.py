@@ -164,7 +164,7 @@ def _perception(
 def _fitting(pictures: Iterator[Picture], camera: Camera) -> Iterator[Picture]:
     """The same pictures; the first that the camera cannot have taken ends them with an error."""
     for picture in pictures:
-        check_size(picture.pixels, camera)
+        check_size(picture.pixels, camera, picture.name)
         yield picture
 
 

@@ -20,7 +20,7 @@ from rrtik_ompl.sensing.markers.corner_pose import CornerPose
 from rrtik_ompl.sensing.markers.detection import dictionaries_seen
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject, checked_sigmas, objects_in_base
-from rrtik_ompl.sensing.sight import Sighting, as_gray, detect_objects
+from rrtik_ompl.sensing.sight import Sighting, as_gray, check_size, detect_objects
 from rrtik_ompl.sensing.tracker import PoseTracker
 
 WHOLE_EVERY = 4  # pictures: in between, markers are searched for where they were, unless one of them has gone
@@ -112,6 +112,7 @@ class Sensor:
         Raises:
             InputError: If the picture does not have the camera's size, or times go backwards.
         """
+        check_size(picture.pixels, self.camera, picture.name)
         near = self._count % WHOLE_EVERY != 0
         found = detect_objects(picture.pixels, self.camera, self.marker_map, before=self._before, near=near)
         self._before, self._count = (found if self._trackers else ()), self._count + 1

@@ -103,8 +103,8 @@ def detect_objects(
     return tuple(found for found in sightings if found is not None)
 
 
-def check_size(picture: NDArray[np.uint8], camera: Camera) -> None:
-    """Check that a picture has the size of a camera's.
+def check_size(picture: NDArray[np.uint8], camera: Camera, name: str = "the picture") -> None:
+    """Check that a picture, of which ``name`` is said, has the size of a camera's.
 
     Raises:
         InputError: If the picture does not have the camera's size.
@@ -112,7 +112,7 @@ def check_size(picture: NDArray[np.uint8], camera: Camera) -> None:
     height, width = picture.shape[:2]
     if (height, width) != (camera.height, camera.width):
         raise InputError(
-            f"the picture has {width} x {height} pixels, the camera {camera.width} x {camera.height}; "
+            f"{name}: {width} x {height} pixels, but the camera's file says {camera.width} x {camera.height}; "
             "take pictures of the size that it was calibrated for"
         )
 

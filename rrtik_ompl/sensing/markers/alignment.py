@@ -131,7 +131,7 @@ def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | Non
     if before is not None and 1.0 - best.likeness <= _AS_LIKE * (1.0 - before.likeness):
         return best
     for number in range(_ROUNDS):
-        spots = best.look.spot * _NEAR_SPOTS if known else _SPOTS
+        spots: Vector = np.asarray(best.look.spot * _NEAR_SPOTS if known else _SPOTS, dtype=np.float64)
         look = _spot_and_tone(ideal, best.seen, _spread(best.homography, ideal.shape), best.look, tones, spots)
         if tone is None and abs(look.tone) < _LINEAR_BELOW:
             look = look._replace(tone=LINEAR)

@@ -60,7 +60,8 @@ def _columns(model: Pixels, square: Matrix, corners: Matrix, every: int) -> Matr
     """
     across, down = _slope(model, 1, 0), _slope(model, 0, 1)
     blurs = [_slope(across, 1, 0), _slope(across, 0, 1), _slope(down, 0, 1)]
-    across, down, model, *blurs = (each[::every, ::every] for each in (across, down, model, *blurs))
+    across, down, model = across[::every, ::every], down[::every, ::every], model[::every, ::every]
+    blurs = [each[::every, ::every] for each in blurs]
     x, y = _places(*model.shape, every)
     low, high = square[0], square[2]
     u, v = (2.0 * x - low[0] - high[0]) / (high[0] - low[0]), (2.0 * y - low[1] - high[1]) / (high[1] - low[1])
@@ -107,7 +108,7 @@ def _slopes(across: Matrix, down: Matrix, places: tuple[Matrix, Matrix], square:
     at = turned[..., 0, None] * x + (turned[..., 1, None] * y + turned[..., 2, None])
     shift = (at[:, :2] / at[:, 2:] - [x, y]) * (-1.0 / _STEP)
     found = across.ravel() * shift[:, 0] + down.ravel() * shift[:, 1]
-    return found.T.reshape(*across.shape, 8)
+    return np.asarray(found.T.reshape(*across.shape, 8), dtype=np.float64)
 
 
 def _perspectives(before: Matrix, after: Matrix) -> Matrix:

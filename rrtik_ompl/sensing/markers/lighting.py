@@ -26,7 +26,7 @@ def shown(ideal: Pixels, seen: Pixels, tone: float) -> Pixels:
         seen: The picture in its frame, of the same shape.
         tone: Of the picture.
     """
-    return _shown([ideal], seen, [tone])[0].reshape(ideal.shape)
+    return np.asarray(_shown([ideal], seen, [tone])[0].reshape(ideal.shape), dtype=np.float32)
 
 
 def likenesses(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Vector:
