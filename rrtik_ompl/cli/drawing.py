@@ -84,6 +84,7 @@ def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
     from rrtik_ompl import Scene, World, list_problems, list_robots, load_problem, load_robot, load_scene
     from rrtik_ompl.problem_files.problem import load_unchecked
     from rrtik_ompl.viewer.subject import Shown
+    from rrtik_ompl.world.path_contacts import contacts_along
 
     if Path(name).suffix.lower() in ROBOT_FILES or (name in list_robots() and name not in list_problems()):
         robot = load_robot(name)
@@ -97,8 +98,7 @@ def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
         fault = str(error)
     world, start, goal = load_unchecked(name)
     note(fault)
-    names = frozenset(body for pair in world.contacts(start) for body in (pair.first, pair.second))
-    return Shown(world.robot, world.scene, goal, start, names), world.robot, fault
+    return Shown(world.robot, world.scene, goal, start, contacts_along(world, start[None])), world.robot, fault
 
 
 def play(

@@ -33,7 +33,7 @@ from rrtik_ompl.viewer.task_story import subject_of_task
 SCRIPT_POLICY = "script-src 'unsafe-inline' 'wasm-unsafe-eval'"
 POLICY = f"default-src 'none'; {SCRIPT_POLICY}; style-src 'unsafe-inline'; img-src data: blob:"
 ASKING_POLICY = f"{POLICY}; connect-src 'self'"  # of a page that asks this machine, and nobody else
-SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "clearance.js", "player.js")
+SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "clearance.js", "contacts.js", "player.js")
 BOX_SHARE = 0.1  # side of a box that is added, of the arm
 STARTING = ("unpack.js", "start.js")
 PLANNING = (

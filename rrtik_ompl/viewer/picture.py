@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.goal import Goal, JointGoal, MultiGoal, as_task_region, parts_of
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.constraint_picture import draw_constraints
 from rrtik_ompl.viewer.drawing.framing import Frame, frame_around
 from rrtik_ompl.viewer.drawing.marks import draw_marks
@@ -24,7 +23,6 @@ from rrtik_ompl.viewer.drawing.robot_picture import (
     draw_parts,
     joint_nodes,
     link_parts,
-    red_parts,
     swept_points,
 )
 from rrtik_ompl.viewer.drawing.scene_picture import draw_goal, draw_scene, draw_triad, goal_frames
@@ -54,7 +52,7 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
             draw_trail(vis, arms, subject.waypoints, 0.0035 * frame.arm, beads=beads, unproven=doubtful)
         if subject.before is not None:
             draw_before(vis, robot, subject.before, 0.0035 * frame.arm)
-    draw_scene(vis, scene, frame, subject.touching)
+    draw_scene(vis, scene, frame)
     draw_marks(vis, subject.marks)
     draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm)
     if robot is not None and robot.planar:
@@ -71,8 +69,7 @@ def _draw_robot(vis: Node, robot: Robot, subject: Subject) -> Frame:
         shown = np.vstack([shown, subject.ghosts])
     frames = robot.joint_frames(shown)
     held = attached_parts(robot, subject.scene.attached)
-    red = red_parts(robot, subject.touching)
-    parts = [replace(part, color=palette.TOUCHING) if part.name in red else part for part in link_parts(robot) + held]
+    parts = link_parts(robot) + held
     points = swept_points(parts, frames)
     places = _goal_points(subject.goal) + [mark.vertices for mark in subject.marks]
     if subject.before is not None:

@@ -17,12 +17,13 @@ from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin
-from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name
+from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name, nodes_of
 from rrtik_ompl.viewer.drawing.trail import pieces
 from rrtik_ompl.viewer.drawing.viewpoint import overview
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
 from rrtik_ompl.world.clearance_curve import FARTHEST, ClearanceCurve
+from rrtik_ompl.world.path_contacts import PathContact
 
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path
@@ -52,6 +53,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "times": [] if robot is None else _numbers(_times(subject, robot, frame)),
         "timed": subject.times is not None,
         "clearance": None if robot is None or subject.curve is None else _clearance(subject.curve),
+        "contacts": [] if robot is None else [_contact(contact, robot, subject.scene) for contact in subject.contacts],
         "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene, frame),
         "fingers": None if subject.fingers is None else subject.fingers.story(),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
@@ -72,6 +74,19 @@ def _clearance(curve: ClearanceCurve) -> dict[str, Any]:
         "pairs": [list(pair) for pair in curve.pairs],
         "least": curve.least,
         "unproven": list(curve.unproven),
+    }
+
+
+def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]:
+    """A stretch of the path in which bodies touch: what to draw red, what to say, where they touch if that is known."""
+    deepest = contact.deepest
+    point = 0.5 * (deepest.point_first + deepest.point_second)
+    return {
+        "begin": contact.begin,
+        "end": contact.end,
+        "nodes": nodes_of(robot, scene, contact.names),
+        "text": str(deepest),
+        "point": _numbers(point) if np.isfinite(point).all() else None,
     }
 
 
@@ -220,6 +235,7 @@ def _colors() -> dict[str, str]:
         "ATTACHED",
         "TRAIL",
         "UNPROVEN",
+        "TOUCHING",
         "BEFORE",
         "BACKGROUND_TOP",
         "BACKGROUND_BOTTOM",

@@ -22,6 +22,7 @@ from rrtik_ompl.viewer.fingers import Fingers
 from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import ClearanceCurve, clearance_along
 from rrtik_ompl.world.holding_world import HoldingWorld
+from rrtik_ompl.world.path_contacts import PathContact, contacts_along
 
 
 class HasWorld(Protocol):
@@ -51,7 +52,7 @@ class Subject:
         times: When the waypoints of a timed motion are reached [s], shape (k,), or None.
         held: Regions of path constraints, and the configurations, shape (dof,), in which they begin to be held.
         fingers: Of a task: where the gripper's fingers are in the ticks of the run, or None.
-        touching: Names of the bodies in collision, which are drawn red.
+        contacts: Where bodies touch along the waypoints; they are drawn red there.
     """
 
     name: str
@@ -68,7 +69,7 @@ class Subject:
     times: Vector | None = None
     held: tuple[tuple[HeldRegion, Vector], ...] = ()
     fingers: Fingers | None = None
-    touching: frozenset[str] = frozenset()
+    contacts: tuple[PathContact, ...] = ()
 
     @property
     def start(self) -> Vector | None:
@@ -97,14 +98,14 @@ class Shown:
         scene: Its surroundings.
         goal: A goal to draw, or None.
         start: The posture, shape (dof,).
-        touching: Names of bodies to draw red, such as those in collision.
+        contacts: Where its bodies touch; they are drawn red.
     """
 
     robot: Robot
     scene: Scene
     goal: Goal | None
     start: Vector
-    touching: frozenset[str] = frozenset()
+    contacts: tuple[PathContact, ...] = ()
 
 
 Showable: TypeAlias = HasWorld | Shown | World | Robot | Scene
@@ -157,16 +158,17 @@ def subject_of(
         times, path = _timed(robot, path)
         rows = _waypoints(robot, path)
         curve = _curve(getattr(shown, "world", shown), rows)
+        touching = _contacts(getattr(shown, "world", shown), rows, curve)
         held = tuple((region, rows[0]) for region in regions)
         return Subject(
-            name, robot, scene, goal, rows, True, earlier, tinted, marks, curve=curve, times=times, held=held
+            name, robot, scene, goal, rows, True, earlier, tinted, marks, None, curve, times, held, contacts=touching
         )
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
     held = tuple((region, posture) for region in regions)
-    red: frozenset[str] = getattr(shown, "touching", frozenset())
+    found = shown.contacts if isinstance(shown, Shown) else ()
     rows = frozen(posture[None])
-    return Subject(name, robot, scene, goal, rows, False, None, tinted, marks, held=held, touching=red)
+    return Subject(name, robot, scene, goal, rows, False, None, tinted, marks, held=held, contacts=found)
 
 
 def _held(world: object) -> tuple[HeldRegion, ...]:
@@ -191,7 +193,7 @@ def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
     still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
     for name in {name for tick in run.ticks for name in tick.poses}:
         scene.obstacle(name)  # or it is a run of another problem
-    return replace(shown, scene=replace(scene, obstacles=still), run=run)
+    return replace(shown, scene=replace(scene, obstacles=still), run=run, contacts=())
 
 
 def _curve(world: object, rows: Matrix) -> ClearanceCurve | None:
@@ -200,6 +202,13 @@ def _curve(world: object, rows: Matrix) -> ClearanceCurve | None:
         return None
     found = clearance_along(world, rows)
     return found if any(first for first, _ in found.pairs) else None
+
+
+def _contacts(world: object, rows: Matrix, curve: ClearanceCurve | None) -> tuple[PathContact, ...]:
+    """Where bodies touch along a path; nowhere if all its motions are proven free."""
+    if not isinstance(world, World) or (curve is not None and not curve.unproven):
+        return ()
+    return contacts_along(world, rows)
 
 
 def _timed(robot: Robot, path: ShownPath) -> tuple[Vector | None, ShownPath]:

@@ -53,15 +53,24 @@ def clearance_along(world: World, waypoints: Matrix) -> ClearanceCurve:
 
     Clearances between the places are not looked at; proofs of whole motions say what is kept there.
     """
+    motions, shares, places = places_along(world, waypoints)
+    distances, pairs = _distances(world, places)
+    unproven = tuple(gap.motion for gap in world.prove(waypoints).unproven)
+    return ClearanceCurve(motions, frozen(shares), frozen(distances), pairs, unproven)
+
+
+def places_along(world: World, waypoints: Matrix) -> tuple[NDArray[np.int64], Vector, Matrix]:
+    """Places on a path, waypoints of shape (k, dof), spread evenly over how far the arm moves; the last one its end.
+
+    Returns:
+        The motion that each is on, shape (m,); where on it, from 0 to 1, shape (m,); configurations, shape (m, dof).
+    """
     rows = np.vstack([waypoints, waypoints]) if len(waypoints) == 1 else waypoints
     travel = np.abs(np.diff(rows, axis=0)) @ world.weights
     counts = np.maximum(np.ceil(PLACES * travel / max(float(travel.sum()), 1e-300)), 1.0).astype(np.int64)
     motions = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
     shares = np.append(np.concatenate([np.arange(n) / n for n in counts]), 1.0)
-    places = (1.0 - shares)[:, None] * rows[motions] + shares[:, None] * rows[motions + 1]
-    distances, pairs = _distances(world, places)
-    unproven = tuple(gap.motion for gap in world.prove(waypoints).unproven)
-    return ClearanceCurve(motions, frozen(shares), frozen(distances), pairs, unproven)
+    return motions, shares, (1.0 - shares)[:, None] * rows[motions] + shares[:, None] * rows[motions + 1]
 
 
 def _distances(world: World, places: Matrix) -> tuple[Vector, tuple[tuple[str, str], ...]]:

@@ -12,10 +12,11 @@ from rrtik_ompl.catalog import find_problem
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.problem_files.problem import load_unchecked
 from rrtik_ompl.viewer import film as module
-from rrtik_ompl.viewer.drawing.robot_picture import red_parts
 from rrtik_ompl.viewer.film import BROWSERS, film
 from rrtik_ompl.viewer.picture import draw
+from rrtik_ompl.viewer.story import story_of
 from rrtik_ompl.viewer.subject import Shown, subject_of
+from rrtik_ompl.world.path_contacts import contacts_along
 
 WAYPOINTS = [[0.0, 0.0, 0.0], [1.0, 0.5, 0.5]]
 
@@ -59,12 +60,10 @@ def test_a_start_in_collision_is_shown_with_its_bodies_red(tmp_path, capsys):
     assert run(["show", str(tmp_path / "bad.yaml"), "--html", str(tmp_path / "bad.html")]) == 1
     assert "start is in collision" in capsys.readouterr().err
     world, start, _ = load_unchecked(tmp_path / "bad.yaml")
-    pair = world.contacts(start)[0]
-    shown = Shown(world.robot, world.scene, None, start, frozenset([pair.first, pair.second]))
-    assert "prism_10" in (pair.first, pair.second)
-    assert red_parts(world.robot, shown.touching) >= {f"attached {pair.second}"}
-    plain = Shown(world.robot, world.scene, None, start)
-    assert draw(subject_of(shown))[0].commands != draw(subject_of(plain))[0].commands
+    shown = Shown(world.robot, world.scene, None, start, contacts_along(world, start[None]))
+    (told,) = story_of(subject_of(shown), draw(subject_of(shown))[1], "")["contacts"]
+    assert "'prism_10'" in told["text"]
+    assert ["obstacles", "prism_10"] in told["nodes"]
 
 
 def test_a_robot_is_shown_alone_and_in_a_scene(tmp_path, capsys):

@@ -80,6 +80,7 @@ function drawTrail(rows) {
 /** Play other rows from now on; an empty list for none. */
 function replacePath(rows) {
   story.waypoints = rows.length ? rows : [state.start];
+  story.contacts = [];  // what the page plans is free
   story.moves = rows.slice(1).map((to, k) => ({ from: rows[k], to, piece: k, joints: to.flatMap((value, j) => (value === rows[k][j] ? [] : [j])) }));
   story.times = rows.length ? pathTimes(rows) : [];
   drawTrail(rows);

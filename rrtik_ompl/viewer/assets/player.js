@@ -16,11 +16,33 @@ function show(time) {
   highlightPiece(arrived ? null : story.moves[k].piece);
   scrub.value = now;
   showClearance(now);
+  const place = placeAt(now);
+  showContact(place);
   if (run) showRun(now, arrived ? k + 1 : k, arrived ? 0 : (now - story.times[k]) / (story.times[k + 1] - story.times[k]));
   document.getElementById("now").textContent = run ? nowText(k, arrived) : story.timed
     ? `${now.toFixed(2)} of ${total.toFixed(2)} s` : arrived
     ? `Goal reached after ${count(story.moves.length, "move")}`
     : `Move ${k + 1} of ${story.moves.length}: ${describe(k)}`;
+  sayContact();
+}
+
+/** A time as a number of a motion plus the share of it, and back. */
+function placeAt(time) {
+  const k = moveAt(time);
+  const seconds = story.times[k + 1] - story.times[k];
+  return k + (seconds > 0 ? Math.min((time - story.times[k]) / seconds, 1) : 1);
+}
+
+function timeOf(place) {
+  const k = Math.min(Math.floor(place), story.moves.length - 1);
+  return story.times[k] + (place - k) * (story.times[k + 1] - story.times[k]);
+}
+
+/** What touches now, after what happens now. */
+function sayContact() {
+  const line = document.getElementById("now");
+  line.classList.toggle("contact", contactShown !== null);
+  if (contactShown) line.textContent += `. In collision: ${contactShown.text}`;
 }
 
 function pause() {
@@ -82,6 +104,8 @@ function showStill() {
   setPosture(node("robot"), story.waypoints[0]);
   showJoints(story.waypoints[0], null, false);
   document.getElementById("now").textContent = "no path";
+  showContact(0);
+  sayContact();
 }
 
 function addTicks() {
@@ -92,7 +116,7 @@ function addTicks() {
     tick.style.left = `${(100 * time) / (total || 1)}%`;
     return tick;
   });
-  document.getElementById("ticks").replaceChildren(...ticks);
+  document.getElementById("ticks").replaceChildren(...ticks, ...contactTicks(timeOf));
 }
 
 function addPlayer() {
@@ -136,6 +160,7 @@ if (robot) {
     const pose = () => { setPosture(node("robot"), q); showJoints(q, null, false); };
     onJointMoved = (j, value) => { q[j] = value; pose(); };
     pose();
+    showContact(0);
   }
 }
 followAddress();

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import UnknownNameError
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject
+from rrtik_ompl.scene import AttachedObject, Scene
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import Look, look_of_coal, look_of_shape, triangle_count
 from rrtik_ompl.viewer.drawing.nodes import Node
@@ -77,7 +77,7 @@ def _link_color(body: pin.GeometryObject) -> str:
     return palette.ROBOT_ALTERNATE if body.parentJoint % 2 else palette.ROBOT
 
 
-def attached_parts(robot: Robot, attached: tuple[AttachedObject, ...]) -> list[Part]:
+def attached_parts(robot: Robot, attached: Sequence[AttachedObject]) -> list[Part]:
     """The objects that links hold.
 
     Raises:
@@ -96,12 +96,14 @@ def attached_parts(robot: Robot, attached: tuple[AttachedObject, ...]) -> list[P
     return parts
 
 
-def red_parts(robot: Robot, touching: frozenset[str]) -> set[str]:
-    """Names of the parts of links, and of attached objects, of these names."""
-    frames = robot.model.frames
-    bodies = (*robot.visual.geometryObjects, *robot.collision.geometryObjects)
-    links = {node_name(body.name) for body in bodies if touching and frames[body.parentFrame].name in touching}
-    return links | {node_name(f"attached {name}") for name in touching}
+def nodes_of(robot: Robot, scene: Scene, names: Collection[str]) -> list[list[str]]:
+    """Where links, attached objects and obstacles of these names are drawn: steps of paths in the scene tree."""
+    joints, frames = joint_nodes(robot), robot.model.frames
+    solids = (*robot.visual.geometryObjects, *robot.collision.geometryObjects)
+    links = {(joints[s.parentJoint], node_name(s.name)) for s in solids if frames[s.parentFrame].name in names}
+    held = {(joints[p.joint], p.name) for p in attached_parts(robot, [a for a in scene.attached if a.name in names])}
+    obstacles = [["obstacles", node_name(o.name)] for o in scene.obstacles if o.name in names]
+    return [["robot", *steps] for steps in sorted(links | held)] + obstacles
 
 
 def draw_parts(node: Node, robot: Robot, parts: list[Part], frames: NDArray[np.float64]) -> None:

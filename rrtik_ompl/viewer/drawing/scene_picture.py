@@ -24,14 +24,10 @@ FRAMES_PER_RANGE = 7
 LATER_SECONDS = (1.0, 2.0, 3.0)  # when an obstacle of constant velocity is drawn again, faintly
 
 
-def draw_scene(vis: Node, scene: Scene, frame: Frame, touching: frozenset[str] = frozenset()) -> None:
-    """Draw obstacles and their margins under ``obstacles``, the later poses of moving ones under ``later``.
-
-    Those whose names are in ``touching`` are red.
-    """
+def draw_scene(vis: Node, scene: Scene, frame: Frame) -> None:
+    """Draw obstacles and their margins under ``obstacles``, the later poses of moving ones under ``later``."""
     for obstacle in scene.at(0.0).obstacles:
-        color = palette.TOUCHING if obstacle.name in touching else palette.OBSTACLE
-        _draw_obstacle(vis["obstacles"][node_name(obstacle.name)], obstacle, frame, color)
+        _draw_obstacle(vis["obstacles"][node_name(obstacle.name)], obstacle, frame)
     for obstacle in scene.obstacles:
         if obstacle.motion is not None and obstacle.shape.bounded:
             _draw_motion(vis["later"][node_name(obstacle.name)], obstacle, obstacle.motion, frame)
@@ -46,10 +42,10 @@ def obstacle_look(obstacle: Obstacle, frame: Frame) -> tuple[Look, Matrix]:
     return look, look.placement
 
 
-def _draw_obstacle(node: Node, obstacle: Obstacle, frame: Frame, color: str) -> None:
+def _draw_obstacle(node: Node, obstacle: Obstacle, frame: Frame) -> None:
     look, placement = obstacle_look(obstacle, frame)
     opacity = 1.0 if obstacle.shape.bounded else 0.2
-    node.set_object(look.geometry, look_material(color, opacity))
+    node.set_object(look.geometry, look_material(palette.OBSTACLE, opacity))
     node.set_transform(obstacle.pose.homogeneous @ placement)
     _draw_margin(node["margin"], obstacle, placement)
 

@@ -1,0 +1,48 @@
+"""Where bodies touch along a path: which ones, from where to where, and how deep at the worst place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.collision.contacts import Contact
+from rrtik_ompl.world import World
+from rrtik_ompl.world.clearance_curve import places_along
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathContact:
+    """A stretch of a path in which the same bodies touch, or are nearer than their margins allow.
+
+    Attributes:
+        begin, end: Where it begins and ends: number of the motion plus the share of it.
+        deepest: The worst contact of it.
+        names: Of all bodies that touch.
+    """
+
+    begin: float
+    end: float
+    deepest: Contact
+    names: frozenset[str]
+
+
+def contacts_along(world: World, waypoints: Matrix) -> tuple[PathContact, ...]:
+    """The contacts of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves.
+
+    A contact that is shorter than the way between two places can be missed: this shows what is wrong with a path, and
+    is no check of it.
+    """
+    motions, shares, places = places_along(world, waypoints)
+    at = motions + shares
+    bad = np.flatnonzero(~world.valid_batch(places))
+    touching = {int(k): found for k in bad if (found := world.contacts(places[k]))}
+    names = {k: frozenset(name for c in found for name in (c.first, c.second)) for k, found in touching.items()}
+    stretches = []
+    for (_, together), run in groupby(enumerate(touching), lambda item: (item[1] - item[0], names[item[1]])):
+        numbers = [k for _, k in run]
+        deepest = min((touching[k][0] for k in numbers), key=lambda contact: contact.clearance)
+        stretches.append(PathContact(float(at[numbers[0]]), float(at[numbers[-1]]), deepest, together))
+    return tuple(stretches)
