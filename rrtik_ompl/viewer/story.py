@@ -20,10 +20,10 @@ from rrtik_ompl.viewer.drawing.meshes import look_of_margin
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name, nodes_of
 from rrtik_ompl.viewer.drawing.trail import pieces
 from rrtik_ompl.viewer.drawing.viewpoint import overview
+from rrtik_ompl.viewer.path_contacts import PathContact
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
 from rrtik_ompl.world.clearance_curve import FARTHEST, ClearanceCurve
-from rrtik_ompl.world.path_contacts import PathContact
 
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path

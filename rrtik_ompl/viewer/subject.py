@@ -19,10 +19,10 @@ from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory import Trajectory
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.fingers import Fingers
+from rrtik_ompl.viewer.path_contacts import PathContact, contacts_along
 from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import ClearanceCurve, clearance_along
 from rrtik_ompl.world.holding_world import HoldingWorld
-from rrtik_ompl.world.path_contacts import PathContact, contacts_along
 
 
 class HasWorld(Protocol):
@@ -158,7 +158,7 @@ def subject_of(
         times, path = _timed(robot, path)
         rows = _waypoints(robot, path)
         curve = _curve(getattr(shown, "world", shown), rows)
-        touching = _contacts(getattr(shown, "world", shown), rows, curve)
+        touching = _contacts(shown, rows, curve)
         held = tuple((region, rows[0]) for region in regions)
         return Subject(
             name, robot, scene, goal, rows, True, earlier, tinted, marks, None, curve, times, held, contacts=touching
@@ -166,9 +166,10 @@ def subject_of(
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
     held = tuple((region, posture) for region in regions)
-    found = shown.contacts if isinstance(shown, Shown) else ()
     rows = frozen(posture[None])
-    return Subject(name, robot, scene, goal, rows, False, None, tinted, marks, held=held, contacts=found)
+    return Subject(
+        name, robot, scene, goal, rows, False, None, tinted, marks, held=held, contacts=_contacts(shown, rows)
+    )
 
 
 def _held(world: object) -> tuple[HeldRegion, ...]:
@@ -204,11 +205,13 @@ def _curve(world: object, rows: Matrix) -> ClearanceCurve | None:
     return found if any(first for first, _ in found.pairs) else None
 
 
-def _contacts(world: object, rows: Matrix, curve: ClearanceCurve | None) -> tuple[PathContact, ...]:
-    """Where bodies touch along a path; nowhere if all its motions are proven free."""
-    if not isinstance(world, World) or (curve is not None and not curve.unproven):
-        return ()
-    return contacts_along(world, rows)
+def _contacts(shown: Showable, rows: Matrix, curve: ClearanceCurve | None = None) -> tuple[PathContact, ...]:
+    """Where bodies touch along a path, or in a posture that is known to be one in collision."""
+    if isinstance(shown, Shown):
+        return shown.contacts
+    world = getattr(shown, "world", shown)
+    proven = curve is not None and not curve.unproven
+    return contacts_along(world, rows) if isinstance(world, World) and len(rows) > 1 and not proven else ()
 
 
 def _timed(robot: Robot, path: ShownPath) -> tuple[Vector | None, ShownPath]:

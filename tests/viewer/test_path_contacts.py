@@ -3,8 +3,8 @@
 import numpy as np
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.viewer.path_contacts import contacts_along
 from rrtik_ompl.viewer.subject import subject_of
-from rrtik_ompl.world.path_contacts import contacts_along
 
 
 def test_the_stretches_of_a_path_in_which_bodies_touch_are_those_that_the_world_names():
