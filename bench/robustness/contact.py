@@ -27,8 +27,8 @@ from rrtik_ompl.arrays import Matrix
 PAGE = "contact.md"
 ALLOWED = 2e-6  # [m]
 WIDTH = 1e-8  # [m] between the free and the colliding side
-PER_WORLD = 500  # contacts, with a configuration on either side
-DRAWN = 4000
+PER_WORLD = 200  # contacts, with a configuration on either side
+DRAWN = 2000
 
 
 @dataclass
@@ -144,8 +144,12 @@ def write(report: Report, found: dict[str, Sequence[Found]]) -> None:
     kinds: Counter[str] = Counter()
     for each in every:
         kinds.update(each.kinds)
-    report.table("Contacts by the kinds of the pair", ["pair", "contacts"], [[k, f"{n:,}"] for k, n in kinds.most_common()])
-    lines = [f"- {robot}: `{line[:300]}`" for robot, worlds in found.items() for each in worlds for line in each.wrong][:40]
+    report.table(
+        "Contacts by the kinds of the pair", ["pair", "contacts"], [[k, f"{n:,}"] for k, n in kinds.most_common()]
+    )
+    lines = [f"- {robot}: `{line[:300]}`" for robot, worlds in found.items() for each in worlds for line in each.wrong][
+        :40
+    ]
     report.note("What was wrong", "\n".join(lines) or "Nothing.")
 
 

@@ -21,7 +21,7 @@ from rrtik_ompl import Obstacle, PointCloud, World
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.solids import bvh, is_mesh, mesh_arrays
 from rrtik_ompl.scene import AttachedObject
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
 
 STEPS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 100.0, 300.0, 1000.0]) * 1e-6  # [m] by which bodies are moved apart
 WAYS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
@@ -149,7 +149,9 @@ class Judge:
         self._planes = np.array([any(isinstance(self._parts[k].shape, HalfSpace) for k in pair) for pair in moving])
 
     def _margin(self, i: int, j: int, own: float) -> float:
-        obstacles = [self._parts[k].margin for k in (i, j) if self._parts[k].joint == 0 and self._parts[k].kind != "link"]
+        obstacles = [
+            self._parts[k].margin for k in (i, j) if self._parts[k].joint == 0 and self._parts[k].kind != "link"
+        ]
         return obstacles[0] if obstacles else own
 
     def nearest(self, q: Vector) -> Nearest:
@@ -184,7 +186,7 @@ class Judge:
 
 
 def _gap(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, kept: float) -> float:
-    """What is left of the distance of two bodies above what must be kept [m]; a lower bound of it, if it is less than 0."""
+    """What is left of the distance of two bodies above what must be kept [m]; less than 0 if that is not kept."""
     ends = (first, first_pose, second, second_pose)
     for a, a_pose, b, b_pose in sorted((ends, ends[2:] + ends[:2]), key=_order):
         between = b_pose.inverse() * a_pose  # a's frame in b's
@@ -238,11 +240,9 @@ def _by_coal(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE
 def _coal_distance(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, shift: Vector) -> Any:
     asked, found = coal.DistanceRequest(), coal.DistanceResult()
     asked.gjk_tolerance = asked.epa_tolerance = 1e-9
-    ends = coal.Transform3s(first_pose.rotation, first_pose.translation), coal.Transform3s(
-        second_pose.rotation, second_pose.translation + shift
+    ends = (
+        coal.Transform3s(first_pose.rotation, first_pose.translation),
+        coal.Transform3s(second_pose.rotation, second_pose.translation + shift),
     )
     coal.distance(first.geometry, ends[0], second.geometry, ends[1], asked, found)
     return found
-
-
-__all__ = ["Judge", "Nearest", "Part", "Prism", "parts_of"]

@@ -9,13 +9,13 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.files.text import known_ending, read_bytes, write_bytes, write_text
+from rrtik_ompl.files.named_arrays import NamedArrays
+from rrtik_ompl.files.text import known_ending, write_bytes, write_text
 
 FORMATS = (".npz", ".csv")
-LARGEST_FILE = 2**30  # bytes
 
 Grid = NDArray[np.float64]
 
@@ -163,16 +163,16 @@ def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
     """
     if known_ending(path, FORMATS, "map of reach") != ".npz":
         raise InputError(f"{path}: only .npz holds a whole map; a .csv cannot be read back")
+    data = NamedArrays(path)
     try:
-        with np.load(BytesIO(read_bytes(path, LARGEST_FILE)), allow_pickle=False) as data:
-            return ReachMap(
-                robot=str(data["robot"]),
-                measure=str(data["measure"]),
-                corner=frozen(finite_array(data["corner"], (3,), "corner")),
-                size=float(data["size"]),
-                values=frozen(finite_array(data["values"], (None, None, None), "values")),
-                samples=int(data["samples"]),
-                base=frozen(finite_array(data["base"], (3,), "base")),
-            )
-    except (KeyError, ValueError, OSError, EOFError) as error:
+        return ReachMap(
+            robot=str(data["robot"]),
+            measure=str(data["measure"]),
+            corner=frozen(finite_array(data["corner"], (3,), "corner")),
+            size=positive(data["size"], "size"),
+            values=frozen(finite_array(data["values"], (None, None, None), "values")),
+            samples=data.count("samples"),
+            base=frozen(finite_array(data["base"], (3,), "base")),
+        )
+    except InputError as error:
         raise InputError(f"{path}: is no map of reach: {error}; make one with `rrtik reach ... --out`") from error

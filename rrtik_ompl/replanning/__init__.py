@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import time
+from contextlib import ExitStack
+from functools import partial
 from typing import NoReturn
 
+from rrtik_ompl.arrays import positive
 from rrtik_ompl.choices import Replanner
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.text import check_target, file_name
@@ -13,8 +16,10 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
 from rrtik_ompl.replanning.loop import Clock, GoalFeed, Loop
+from rrtik_ompl.replanning.patient import PATIENCE_SECONDS, PatientFeed
 from rrtik_ompl.replanning.record import ReplanRun, Tick, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, ReplanSettings, refuse_renamed
+from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory.limits import RateLimits
 
 __all__ = ["PLANNERS", "ReplanRun", "ReplanSettings", "SpeedWarning", "Tick", "load_run", "replan", "replan_with"]
@@ -39,6 +44,7 @@ def replan(  # noqa: D417 - the settings are described in one place
     goal_feed: GoalFeed | None = None,
     record: str | os.PathLike[str] | None = None,
     clock: Clock = time.perf_counter,
+    feed_patience: float = PATIENCE_SECONDS,
     **renamed: NoReturn,
 ) -> ReplanRun:
     """Move a robot to its goal while obstacles move: DRRT-Con [1, ch. 5.2, algorithms 6 to 8].
@@ -68,11 +74,13 @@ def replan(  # noqa: D417 - the settings are described in one place
         record: A ``.json`` file for the record; it is written on Ctrl-C and errors too, once there is a tick.
         clock: Measures the times of the ticks and the ``repair_budget`` [s]; ``time.process_time`` counts the
             processor's, on a machine that does other things too.
+        feed_patience: How long a feed that is a function or gives pairs may take for an answer [s]; then the run ends
+            with an error, and the record has what was before.
         renamed: None; an old name is answered with the new one.
 
     Raises:
-        InputError: If a number is out of range, times go backwards, an obstacle begins in contact with the robot, or
-            no configuration reaches the goal.
+        InputError: If a number is out of range, times go backwards, an obstacle begins in contact with the robot, no
+            configuration reaches the goal, or a feed does not answer.
         UnknownNameError: If there is no planner of that name.
 
     Example:
@@ -87,7 +95,9 @@ def replan(  # noqa: D417 - the settings are described in one place
         speed_bound=speed_bound, limits=limits, lookahead_ticks=lookahead_ticks, seconds=seconds,
         repair_budget=repair_budget, seed=seed,
     )  # fmt: skip
-    return replan_with(settings, problem, scene_feed, goal_feed=goal_feed, record=record, clock=clock)
+    return replan_with(
+        settings, problem, scene_feed, goal_feed=goal_feed, record=record, clock=clock, feed_patience=feed_patience
+    )
 
 
 def replan_with(
@@ -98,6 +108,7 @@ def replan_with(
     goal_feed: GoalFeed | None = None,
     record: str | os.PathLike[str] | None = None,
     clock: Clock = time.perf_counter,
+    feed_patience: float = PATIENCE_SECONDS,
 ) -> ReplanRun:
     """As :func:`replan`, with settings that were made before.
 
@@ -112,8 +123,18 @@ def replan_with(
         raise InputError(f"clock: expected a function that gives a time [s], got {type(clock).__name__}")
     if record is not None:
         check_target(file_name(record), (".json",))
-    feed = feed_of(problem.world.scene if scene_feed is None else scene_feed)
-    loop = Loop(problem, feed, settings, goal_feed, clock)
+    source = problem.world.scene if scene_feed is None else scene_feed
+    patience = positive(feed_patience, "feed_patience")
+    with ExitStack() as open_feeds:
+        if not isinstance(source, Scene):
+            source = open_feeds.enter_context(PatientFeed(partial(feed_of, source), patience, "scene feed"))
+        if (given := goal_feed) is not None:
+            goal_feed = open_feeds.enter_context(PatientFeed(lambda: given, patience, "goal feed"))
+        return _run(Loop(problem, feed_of(source), settings, goal_feed, clock), settings, record)
+
+
+def _run(loop: Loop, settings: ReplanSettings, record: str | os.PathLike[str] | None) -> ReplanRun:
+    """Tick until the goal is reached or the time is up; the record is written whatever comes."""
     try:
         for number in range(int(settings.seconds * settings.rate) + 1):
             if not loop.tick(number):

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-import zlib
 from io import BytesIO
 from typing import Any, Protocol
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +15,8 @@ from rrtik_ompl.collision.digests import robot_digest, world_digest
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.fast.search.roadmap.graph import KernelGraph
 from rrtik_ompl.fast.search.roadmap.layout import BLOCKED, KERNELS, UNKNOWN
-from rrtik_ompl.files.text import known_ending, read_bytes, write_bytes
+from rrtik_ompl.files.named_arrays import NamedArrays
+from rrtik_ompl.files.text import known_ending, write_bytes
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import usable_configurations
 from rrtik_ompl.robot import Robot
@@ -29,7 +28,6 @@ VERTICES = 2000
 NEAR = 10
 SECONDS = 60.0  # that making one takes at most, where next to nothing is free
 MOST_VERTICES = 1_000_000
-LARGEST_FILE = 2**30  # bytes
 FORMAT = 1
 
 
@@ -251,20 +249,21 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
     """
     known_ending(path, (".npz",), "file of a roadmap")
     require(world, World, "world of a roadmap", "use World(robot, scene)")
-    stored = read_bytes(path, LARGEST_FILE)
+    data = NamedArrays(path)
     try:
-        with np.load(BytesIO(stored), allow_pickle=False) as data:
-            if int(data["format"]) != FORMAT:
-                raise ValueError(f"its format is {int(data['format'])}")
-            digest, seed, near, step = str(data["digest"]), int(data["seed"]), int(data["near"]), data["resolution"]
-            rows = finite_array(data["rows"], (None, world.robot.dof), "vertices")
-            edges, states = data["edges"].astype(np.int32), data["states"].astype(np.int32)
-            wrong = edges.ndim != 2 or edges.shape[1] != 2 or states.shape != (len(edges),) or not 1 <= near <= 100
-            if wrong or (len(states) and not 0 <= states.min() <= states.max() <= BLOCKED):
-                raise ValueError("its edges make no sense")
-            same_step = float(step) == world.motion_resolution
-    except (InputError, KeyError, ValueError, OSError, EOFError, TypeError, BadZipFile, zlib.error) as error:
+        if (version := data.count("format")) != FORMAT:
+            raise InputError(f"its format is {version}, not {FORMAT}")
+        digest, seed, near = str(data["digest"]), data.count("seed"), data.count("near")
+        rows = finite_array(data["rows"], (None, world.robot.dof), "vertices")
+        edges, states = data.whole("edges"), data.whole("states")
+        wrong = edges.ndim != 2 or edges.shape[1] != 2 or states.shape != (len(edges),) or not 1 <= near <= 100
+        ends = len(edges) and not 0 <= edges.min() <= edges.max() < len(rows)
+        if wrong or ends or (len(states) and not 0 <= states.min() <= states.max() <= BLOCKED):
+            raise InputError("its edges make no sense")
+        same_step = positive(data["resolution"], "resolution") == world.motion_resolution
+    except InputError as error:
         raise InputError(f"{path}: is no roadmap of robot '{world.robot.name}': {error}") from error
+    edges, states = edges.astype(np.int32), states.astype(np.int32)
     found = world_digest(world.robot, world.bodies, world.pairs)
     if digest == found and same_step:
         return _restored(world, rows, edges, states, seed=seed, near=near)

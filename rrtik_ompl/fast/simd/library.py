@@ -71,14 +71,15 @@ def _tried(name: str) -> Library | None:
         this_target()  # code is not even tried on a machine that it has never been made for
         return _kept(name) or _made(name)
     except Exception as error:  # another version of a compiler may fail in any way, and numpy has the same answers
-        if (why := _reason(error)) not in _said:  # without numba it is the same for all, an edit may break one
+        if (why := reason_of(error)) not in _said:  # without numba it is the same for all, an edit may break one
             _said.add(why)
             message = f"there are no kernels {name}: what they do is done in plain numpy, many times slower: {why}"
             warnings.warn(message, RuntimeWarning, stacklevel=4)
         return None
 
 
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
+    """Why there are no kernels, in a line."""
     if isinstance(error, ImportError):
         return f"{error}; install numba"
     text = str(error) if isinstance(error, UnknownMachineError) else f"{type(error).__name__}: {error}"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import cache
 from pathlib import Path
 
 from rrtik_ompl.fast.simd.code_files import FOLDER, Code, file_name, kept_or_made, read_code, sources_digest, write_code
+from rrtik_ompl.fast.simd.library import reason_of
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.files.cache import cache_folder
 from rrtik_ompl.files.notice import tell_once
@@ -54,7 +56,7 @@ def write_page_kernels(folder: Path) -> None:
 
 @cache
 def page_kernels() -> bytes | None:
-    """The module; None where it can be neither found nor made."""
+    """The module; None, and a warning that says why, where it can be neither found nor made."""
     key = page_kernels_key()
     packaged = read_code(FOLDER / page_kernels_name(), key)
     if packaged is not None:
@@ -63,7 +65,8 @@ def page_kernels() -> bytes | None:
     file = None if folder is None else folder / file_name("page", key)
     try:
         return kept_or_made(file, key, _code).code
-    except (ImportError, RuntimeError):
+    except Exception as error:  # as in `library`: a compiler may fail in any way, and pages are good without it
+        warnings.warn(f"pages do not plan by themselves: {reason_of(error)}", RuntimeWarning, stacklevel=2)
         return None
 
 

@@ -1,7 +1,10 @@
 """Kernels as a WebAssembly module."""
 
+from functools import cache
+
 import pytest
 
+from rrtik_ompl.fast.wasm import page_kernels as page_kernels_module
 from rrtik_ompl.fast.wasm.emit import leb128, sections
 from rrtik_ompl.fast.wasm.page_kernels import LIBRARIES, page_kernels
 
@@ -57,3 +60,18 @@ def test_it_has_no_sections_that_only_linkers_read():
     kinds = [kind for kind, _ in sections(page_kernels())]
     assert 0 not in kinds
     assert kinds == sorted(kinds)
+
+
+def test_why_pages_do_not_plan_is_said_once(monkeypatch):
+    def broken():
+        raise RuntimeError("no target\nwasm32")
+
+    monkeypatch.setattr(page_kernels_module, "read_code", lambda file, key: None)
+    monkeypatch.setattr(page_kernels_module, "cache_folder", lambda kind: None)
+    monkeypatch.setattr(page_kernels_module, "made_page_kernels", broken)
+    fresh = cache(page_kernels.__wrapped__)
+    with pytest.warns(
+        RuntimeWarning, match=r"^pages do not plan by themselves: RuntimeError: no target wasm32$"
+    ) as said:
+        assert (fresh(), fresh()) == (None, None)
+    assert len(said) == 1
