@@ -118,7 +118,7 @@ def _words(rng: np.random.Generator, command: str, parameters: list[Any]) -> Ite
 
 
 def _value(rng: np.random.Generator, parameter: Any, name: str) -> str:
-    kind = getattr(parameter, "bare_type", None)
+    kind = parameter.bare_type()
     choices = [str(each.value) for each in kind] if isinstance(kind, type) and issubclass(kind, Enum) else []
     if choices and rng.random() < 0.7:
         return choices[rng.integers(len(choices))]

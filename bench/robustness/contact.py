@@ -27,7 +27,6 @@ from rrtik_ompl.arrays import Matrix
 PAGE = "contact.md"
 ALLOWED = 2e-6  # [m]
 WIDTH = 1e-8  # [m] between the free and the colliding side
-PER_WORLD = 200  # contacts, with a configuration on either side
 DRAWN = 2000
 
 
@@ -55,8 +54,8 @@ class Found:
     wrong: list[str] = field(default_factory=list)
 
 
-def contacts(robot: str, seed: int) -> Found:
-    """Judge the contacts of a random world."""
+def contacts(robot: str, seed: int, count: int) -> Found:
+    """Judge some contacts of a random world."""
     rng = np.random.default_rng([ROBOTS.index(robot), seed])
     world = contact_world(rng, robot)
     rows = rng.uniform(*world.robot.finite_range(), (DRAWN, world.robot.dof))
@@ -64,7 +63,6 @@ def contacts(robot: str, seed: int) -> Found:
     found = Found(free=round(float(free.mean()), 4))
     if free.all() or not free.any():
         return found
-    count = PER_WORLD
     ends = (rows[mask][rng.integers(0, mask.sum(), count)] for mask in (free, ~free))
     judge = Judge(world)
     for q in met(world, *ends):
@@ -103,12 +101,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     add_options(parser, PAGE)
     parser.add_argument("--configurations", type=int, default=60_000, help="in all; 2,000,000 are wanted")
+    parser.add_argument("--contacts", type=int, default=200, help="of a world, with a configuration on either side")
     given = parser.parse_args()
-    worlds = max(1, round(given.configurations / (2 * PER_WORLD * len(ROBOTS))))
-    command = f"python bench/robustness/contact.py --configurations {given.configurations}"
+    worlds = max(1, round(given.configurations / (2 * given.contacts * len(ROBOTS))))
+    command = f"python bench/robustness/contact.py --configurations {given.configurations} --contacts {given.contacts}"
     report = Report("Verdicts at contact, judged by another instrument", command, processes(given.jobs))
     with Parts(given.out, given.jobs) as parts:
-        parts_of_all = [(robot, seed) for seed in range(worlds) for robot in ROBOTS]
+        parts_of_all = [(robot, seed, given.contacts) for seed in range(worlds) for robot in ROBOTS]
         found = parts(contacts, parts_of_all)
         write(report, {robot: found[k :: len(ROBOTS)] for k, robot in enumerate(ROBOTS)})
         return report.finish(given.out)

@@ -1,6 +1,7 @@
 """Attacks on the public face, the servers and long work: how many, and what broke; makes `bench/reports/robustness.md`.
 
-    python bench/robustness/report.py --calls 1000000 --messages 10000 --faults 25 --plans 20000 --pages 2000
+    python bench/robustness/report.py --calls 1000000 --messages 10000 --faults 25 --plans 20000 --pages 2000 \
+        --bad 2200
 
 The stored page says at which sizes it was made. What is done stands beside the page until that is written: an
 interrupted run goes on where it was.
@@ -16,6 +17,7 @@ from tempfile import TemporaryDirectory
 
 from bench import fuzz
 from bench.robustness import bad_clients, bad_pages, faults
+from bench.robustness.bad_inputs import bad
 from bench.robustness.long_work import WORK
 from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes
@@ -23,8 +25,9 @@ from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, plan, view
 
 PAGE = "robustness.md"
-CALLS, MESSAGES = fuzz.BATCH, 480  # of a part
+CALLS, MESSAGES, INPUTS = fuzz.BATCH, 480, 25  # of a part
 LOOKS = 4
+SIZES = {"calls": 2000, "messages": 960, "faults": 5, "plans": 400, "pages": 40, "bad": 100}
 FLAT_MB = 1.0
 PEERS: dict[str, tuple[str, Callable[[int, int], list[str]]]] = {
     "line server": ("a client of the arm's line: the arm stops, the next is served", bad_clients.line_server),
@@ -73,17 +76,20 @@ def main() -> int:
     """Attack, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     add_options(parser, PAGE)
-    for name, usual in (("calls", 2000), ("messages", 960), ("faults", 5), ("plans", 400), ("pages", 40)):
+    for name, usual in SIZES.items():
         parser.add_argument(f"--{name}", type=int, default=usual)
     given = parser.parse_args()
-    command = " ".join(f"--{name} {getattr(given, name)}" for name in ("calls", "messages", "faults", "plans", "pages"))
+    command = " ".join(
+        f"--{name} {getattr(given, name)}" for name in ("calls", "messages", "faults", "plans", "pages", "bad")
+    )
     report = Report("Nothing breaks it", f"python bench/robustness/report.py {command}", processes(given.jobs))
     report.intro = (
         "Wanted are 1,000,000 calls, 10,000 messages to each server, 2,000 kills and interrupts, 20,000 plans and "
-        "2,000 pages; the numbers below are those of this run."
+        "2,000 pages, 2,000 bad inputs; the numbers below are those of this run."
     )
     with Parts(given.out, given.jobs) as parts:
         _calls(report, parts(calls, _blocks(given.calls, CALLS)), given.calls)
+        _bad_inputs(report, parts(bad, _blocks(given.bad, INPUTS)), given.bad)
         _peers(report, parts, given.messages)
         _faults(report, parts, given.faults)
         for what, count in (("plans", given.plans), ("pages", given.pages)):
@@ -99,6 +105,15 @@ def _calls(report: Report, found: Sequence[list[str]], count: int) -> None:
     wrong = [each for part in found for each in part]
     report.bar("calls of the fuzz", "no crash, no hang, no raw exception", f"{len(wrong)} of {count:,}", not wrong)
     report.note("Finds of the fuzz", _listed(wrong))
+
+
+def _bad_inputs(report: Report, found: Sequence[list[str]], count: int) -> None:
+    wrong = [each for part in found for each in part]
+    wanted = "one line, exit code 2, within 2 s of the processor and 1 GB"
+    report.bar(
+        "bad inputs, of all commands and kinds of file", wanted, f"{len(wrong)} otherwise of {count:,}", not wrong
+    )
+    report.note("Bad inputs", _listed(wrong))
 
 
 def _peers(report: Report, parts: Parts, count: int) -> None:

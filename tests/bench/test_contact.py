@@ -61,15 +61,13 @@ def test_overlaps_are_seen(kind):
     assert Judge(world_beside(BESIDE[kind], -5e-5)).nearest(np.zeros(1)).gap < -2e-5
 
 
-def test_worlds_of_two_robots_are_right_at_contact(monkeypatch):
-    monkeypatch.setattr(contact, "PER_WORLD", 20)
+def test_worlds_of_two_robots_are_right_at_contact():
     for robot in ("titan4", "z1"):
-        found = contact.contacts(robot, 1)
+        found = contact.contacts(robot, 1, 20)
         assert (found.contacts, found.too_deep, found.too_far, found.wrong) == (20, 0, 0, [])
 
 
 def test_a_world_that_is_wrong_is_seen(monkeypatch):
-    monkeypatch.setattr(contact, "PER_WORLD", 20)
     made = contact.contact_world
     monkeypatch.setattr(contact, "contact_world", lambda rng, name: made(rng, name).with_clearance(1e-5))
-    assert contact.contacts("titan4", 1).too_far > 0
+    assert contact.contacts("titan4", 1, 20).too_far > 0

@@ -140,6 +140,24 @@ def there_and_back(value):
     return value
 
 
+def by_joblib(function, values):
+    joblib = pytest.importorskip("joblib")
+    with joblib.parallel_config(backend="loky", n_jobs=2):
+        return joblib.Parallel()(joblib.delayed(function)(value) for value in values)
+
+
+def by_dask(function, values):
+    dask = pytest.importorskip("dask")
+    return list(dask.compute(*map(dask.delayed(function), values), scheduler="processes", num_workers=1))
+
+
+@pytest.mark.parametrize("through", [by_joblib, by_dask], ids=lambda through: through.__name__)
+def test_workers_of_others_send_back_equal_values(through):
+    values = [make() for make in VALUES.values()]
+    back = through(there_and_back, values)
+    assert [kind for kind, a, b in zip(VALUES, values, back, strict=True) if not same(a, b)] == []
+
+
 @pytest.fixture(scope="module", params=["spawn", "fork"])
 def pool(request):
     with multiprocessing.get_context(request.param).Pool(1) as pool:
