@@ -106,9 +106,8 @@ def parts_of(world: World) -> list[Part]:
         Part(robot.link_of(item), "link", item.parentJoint, item.placement, _link_shape(item.geometry))
         for item in robot.collision.geometryObjects
     ]
-    for item in (*world.scene.obstacles, *world.scene.attached):
-        found.append(_scene_part(world, item))
-    return found
+    solids: list[Obstacle | AttachedObject] = [*world.scene.obstacles, *world.scene.attached]
+    return found + [_scene_part(world, item) for item in solids]
 
 
 def _scene_part(world: World, item: Obstacle | AttachedObject) -> Part:
@@ -225,7 +224,7 @@ def _by_coal(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE
     That is an upper bound of how deep they overlap, for some other way may be shorter.
     """
     found = _coal_distance(first, first_pose, second, second_pose, np.zeros(3))
-    left = found.min_distance - kept
+    left = float(found.min_distance) - kept
     if left >= 0.0:
         return left
     normal = np.array(found.normal)

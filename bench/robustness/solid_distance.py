@@ -31,11 +31,11 @@ def distance_to(shape: Shape, points: Matrix) -> Vector:
     """Signed distances of points, shape (m, 3), to a solid: less than 0 inside. Shape (m,)."""
     match shape:
         case Sphere(radius=radius):
-            return np.linalg.norm(points, axis=1) - radius
+            return np.asarray(np.linalg.norm(points, axis=1) - radius)
         case Capsule(radius=radius, length=length):
             half = 0.5 * length
             off = points - np.clip(points[:, 2], -half, half)[:, None] * [0.0, 0.0, 1.0]
-            return np.linalg.norm(off, axis=1) - radius
+            return np.asarray(np.linalg.norm(off, axis=1) - radius)
         case Box(size=size):
             return _outside(np.abs(points) - 0.5 * size)
         case Cylinder(radius=radius, length=length):

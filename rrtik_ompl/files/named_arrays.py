@@ -15,7 +15,7 @@ from rrtik_ompl.errors import InputError, at_most
 from rrtik_ompl.files.text import read_bytes
 
 LARGEST_FILE = 2**30  # bytes, of the file and of what it holds when unpacked
-_NOT_WHOLE = (BadZipFile, zlib.error, ValueError, KeyError, OSError, EOFError)
+_NOT_WHOLE: tuple[type[Exception], ...] = (BadZipFile, zlib.error, ValueError, KeyError, OSError, EOFError)
 _NOT_WHOLE += (NotImplementedError, RuntimeError, MemoryError, OverflowError)  # other kinds of zip; sizes that lie
 
 

@@ -263,13 +263,13 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
         same_step = positive(data["resolution"], "resolution") == world.motion_resolution
     except InputError as error:
         raise InputError(f"{path}: is no roadmap of robot '{world.robot.name}': {error}") from error
-    edges, states = edges.astype(np.int32), states.astype(np.int32)
+    known = edges.astype(np.int32), states.astype(np.int32)
     found = world_digest(world.robot, world.bodies, world.pairs)
     if digest == found and same_step:
-        return _restored(world, rows, edges, states, seed=seed, near=near)
+        return _restored(world, rows, *known, seed=seed, near=near)
     if not moved and digest != found:
         raise InputError(f"{path}: is the roadmap of another world; load it with moved=True, or make a new one")
-    return _restored(world, rows, edges, states, seed=seed, near=near).moved_to(world)
+    return _restored(world, rows, *known, seed=seed, near=near).moved_to(world)
 
 
 def _restored(
