@@ -104,12 +104,38 @@ def installed(report: Report, wheel: Path, home: Path) -> Path:
     """Install it in a fresh environment; its Python."""
     run([sys.executable, "-m", "venv", str(home)])
     python = home / "bin" / "python"
-    spent = run([str(python), "-m", "pip", "--disable-pip-version-check", "install", "--quiet", str(wheel)])
+    (place,) = home.glob("lib/python*/site-packages")
+    pip = [str(python), "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
+    before, spent = _held(place), run([*pip, str(wheel)])
     report.bar("installation, dependencies cached", "<= 20 s", f"{spent:.1f} s of processor time", spent <= 20.0)
-    (package,) = home.glob("lib/python*/site-packages/rrtik_ompl")
-    made = sum(file.suffix in COMPILED for file in package.rglob("*"))
+    made = sum(file.suffix in COMPILED for file in (place / "rrtik_ompl").rglob("*"))
     report.bar("files compiled by the installation", "none", str(made), made == 0)
+    after = _held(place)
+    run([str(python), "-m", "pip", "--disable-pip-version-check", "uninstall", "--quiet", "--yes", "rrtik-ompl"])
+    others, alone = _held(place), run([*pip, "--no-deps", str(wheel)])
+    rows = [
+        ["all together", f"{spent:.1f}", *_more(before, after)],
+        ["the dependencies", f"{spent - alone:.1f}", *_more(before, others)],
+        ["the wheel alone", f"{alone:.1f}", *_more(others, after)],
+    ]
+    report.table(
+        "Installation by pip",
+        ("", "processor time [s]", "files", "[MB]"),
+        rows,
+        text="Files without those of Python's own byte code, which pip writes for all modules of all packages.",
+    )
     return python
+
+
+def _held(place: Path) -> tuple[int, int]:
+    """How many files a folder has, and how many bytes, byte code aside."""
+    sizes = [file.stat().st_size for file in place.rglob("*") if file.is_file() and file.suffix != ".pyc"]
+    return len(sizes), sum(sizes)
+
+
+def _more(before: tuple[int, int], after: tuple[int, int]) -> tuple[str, str]:
+    """Cells of a table: files, and millions of bytes, that have come."""
+    return str(after[0] - before[0]), f"{(after[1] - before[1]) / 1e6:.0f}"
 
 
 def imports(report: Report, python: Path) -> None:

@@ -7,7 +7,7 @@ Usage: ``python bench/planning/ompl_environments.py FOLDER [--runs 3]``. FOLDER 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, process_time
@@ -17,6 +17,7 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
+from bench.planning.environments import Environment, environments
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
 from rrtik_ompl.arrays import Mask, Matrix, Vector
@@ -26,21 +27,6 @@ LIMIT = 3.0  # [s] of processor time
 OURS = (BiCRDT, CBiRRT, CRDT, DRRTCon, FastRRTConnect, FewestMoves, IKURT, MBRRT, RoadmapPlanner)
 SLOWER = 3.0  # times the median of RRTConnect are wanted at most
 CLOCK = 1e-3  # [s] below which medians are taken for equal: the processor's clock is no finer
-SPHERES, HYPERCUBE_EDGE = 30, 0.1
-WHITE = 127  # of 255, above which a pixel is free
-
-
-@dataclass(frozen=True)
-class Environment:
-    """A space, what is free in it, and queries; ``resolution`` is the share of the extent between two looks."""
-
-    name: str
-    lower: float
-    upper: float
-    free: Callable[[ob.State], bool]
-    queries: Matrix
-    resolution: float = 0.01
-    range: float | None = None
 
 
 @dataclass(frozen=True)
@@ -54,82 +40,6 @@ class Runs:
     exact: Mask
     refused: int
     asked: Vector
-
-
-def grid(folder: Path) -> Environment:
-    """A grid of cells, free where there is a 0; from the middle of one corner's cell to that of the other one."""
-    lines = (folder / "env1.txt").read_text().splitlines()
-    cells: Mask = np.array([[int(word) for word in line.split()] for line in lines[4:] if line.split()]) == 0
-    size = len(cells)
-
-    def free(state: ob.State) -> bool:
-        return bool(cells[min(int(state[0]), size - 1), min(int(state[1]), size - 1)])
-
-    return Environment("grid (env1)", 0.0, float(size), free, np.array([[[0.5, 0.5], [size - 0.5, size - 0.5]]]))
-
-
-def circles(folder: Path) -> Environment:
-    """Discs in a plane; the first ten queries of OMPL's file whose ends are free."""
-    rows = [line.split() for line in (folder / "circle_obstacles.txt").read_text().splitlines()]
-    discs = np.array([[float(word) for word in row[1:4]] for row in rows if len(row) == 4 and row[0].isdigit()])
-    lines = [line.split() for line in (folder / "circle_queries.txt").read_text().splitlines() if line.split()]
-    ends = np.array([[float(word) for word in row[-2:]] for row in lines])
-    square = discs[:, 2] ** 2
-
-    def free(state: ob.State) -> bool:
-        return bool((((discs[:, 0] - state[0]) ** 2 + (discs[:, 1] - state[1]) ** 2) > square).all())
-
-    upper = float(np.ceil(max(ends.max(), (discs[:, :2] + discs[:, 2:]).max())))
-    away = np.linalg.norm(ends[:, None] - discs[None, :, :2], axis=2)
-    usable = (away > discs[:, 2]).all(axis=1).reshape(-1, 2).all(axis=1)
-    return Environment("circles", 0.0, upper, free, ends.reshape(-1, 2, 2)[usable][:10])
-
-
-def maze(folder: Path) -> Environment:
-    """The picture of OMPL's Point2DPlanning: white is free."""
-    data = (folder / "normal.ppm").read_bytes()
-    head, rest = b"", data
-    while len([line for line in head.split(b"\n") if line and not line.startswith(b"#")]) < 3:
-        line, _, rest = rest.partition(b"\n")
-        head += line + b"\n"
-    width, height = (int(word) for word in [n for n in head.split(b"\n") if not n.startswith(b"#")][1].split())
-    picture = np.frombuffer(rest[: 3 * width * height], dtype=np.uint8).reshape(height, width, 3)
-    white: Mask = np.array((picture > WHITE).all(axis=2), dtype=bool)
-
-    def free(state: ob.State) -> bool:
-        return bool(white[min(int(state[1]), height - 1), min(int(state[0]), width - 1)])
-
-    ends = np.array([[[44.0, 44.0], [446.0, 404.0]]])
-    return Environment("maze picture", 0.0, float(width), free, ends, 1.0 / (np.sqrt(2.0) * width))
-
-
-def spheres(dof: int) -> Environment:
-    """Balls at random places of a box from -1 to 1, from one corner to the opposite one."""
-    rng = np.random.default_rng(dof)
-    middles, ends = rng.uniform(-1.0, 1.0, (SPHERES, dof)), np.stack([np.full(dof, -0.9), np.full(dof, 0.9)])
-    radii = np.minimum(0.4, 0.9 * np.linalg.norm(ends[:, None] - middles, axis=2).min(axis=0))
-    square = radii**2
-
-    def free(state: ob.State) -> bool:
-        return bool((((middles - state[0:dof]) ** 2).sum(axis=1) > square).all())
-
-    return Environment(f"{SPHERES} spheres, {dof} coordinates", -1.0, 1.0, free, ends[None], 0.005)
-
-
-def hypercube(dof: int) -> Environment:
-    """OMPL's HypercubeBenchmark: along edges of a cube, from one corner to the opposite one."""
-
-    def free(state: ob.State) -> bool:
-        beyond = False
-        for k in range(dof - 1, -1, -1):
-            if not beyond:
-                beyond = state[k] > HYPERCUBE_EDGE
-            elif state[k] < 1.0 - HYPERCUBE_EDGE:
-                return False
-        return True
-
-    ends = np.stack([np.zeros(dof), np.ones(dof)])
-    return Environment(f"hypercube, {dof} coordinates", 0.0, 1.0, free, ends[None], 0.001, 0.05)
 
 
 def setup_of(environment: Environment, query: Matrix) -> og.SimpleSetup:
@@ -206,13 +116,6 @@ def measured(environment: Environment, planner: type[ob.Planner], runs: int) -> 
             exact.append(status == "Exact solution")
             refused += exact[-1] and not setup.getSolutionPath().check()
     return Runs(np.array(seconds), np.array(exact), refused, np.array(asked))
-
-
-def environments(folder: Path) -> Iterator[Environment]:
-    """All of them."""
-    yield from (grid(folder), circles(folder), maze(folder))
-    yield from (spheres(dof) for dof in (3, 6, 20))
-    yield hypercube(3)
 
 
 def page(folder: Path, runs: int) -> Report:

@@ -8,9 +8,9 @@ from bench.planning.contract_cases import block
 
 
 @pytest.mark.usefixtures("quiet_ompl")
-@pytest.mark.parametrize("number", [1_000_001, 1_000_002])
-def test_no_planner_breaks_off_or_calls_exact_what_is_not(number: int) -> None:
-    statuses, wrong = block(number, 100)
+@pytest.mark.parametrize(("number", "turning"), [(1_000_001, False), (1_000_002, True)])
+def test_no_planner_breaks_off_or_calls_exact_what_is_not(number: int, turning: bool) -> None:
+    statuses, wrong = block(number, turning, 100)
     assert wrong == []
     assert statuses["Exact solution"] > 0
     assert statuses.total() == 100
