@@ -45,7 +45,7 @@ def database(folder: Path, problem: rrtik.Problem, runs: int, seconds: float) ->
 def _log(folder: Path, problem: rrtik.Problem, planners: Sequence[Any], runs: int, seconds: float) -> Path:
     setup = rrtik.simple_setup(problem)
     si = setup.getSpaceInformation()
-    benchmark = ot.Benchmark(setup, planners[0].__name__)
+    benchmark = ot.Benchmark(setup, problem.name)
     for planner in planners:
         made = planner(si, world=problem.world, seed=1) if planner in OURS else planner(si)
         if planner in (RestartShorten, FastAORRTC):

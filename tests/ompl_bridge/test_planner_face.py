@@ -155,4 +155,8 @@ def test_the_log_of_a_benchmark_has_options_graphs_and_progress(
         rows = base.execute("SELECT runid, time, best_cost FROM progress").fetchall()
     assert {run for run, _, _ in rows} == {1, 2, 5, 6}  # of OMPL's RRTConnect, runs 3 and 4, there is none
     assert all(0.0 <= at <= 2.0 for _, at, _ in rows), rows
+    for run in (1, 2, 5, 6):  # many moments, each once: of few, or of steps, Planner Arena can draw no curve
+        times = [at for of, at, _ in rows if of == run]
+        assert len(set(times)) == len(times) > 50
+        assert max(times) == 2.0
     assert all(cost >= np.sqrt(12.0) - 1e-6 for _, _, cost in rows), rows

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from itertools import pairwise
 
+import numpy as np
 from ompl import base as ob
 from ompl import tools as ot
 
@@ -12,6 +12,7 @@ from rrtik_ompl.errors import InputError, PlannerError
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 
 PROGRESS = ("best cost REAL", "time REAL")  # sorted, as OMPL writes the values of a row
+MOMENTS = 101  # even ones of a run
 
 
 class BenchmarkNotes:
@@ -84,9 +85,12 @@ def _write_planner(planner: ot.PlannerExperiment, runs: list[_Run], seconds: flo
 
 
 def _rows(run: _Run, seconds: float) -> list[dict[str, str]]:
-    """Rows of a run's progress: each cost from when it was found to when the next one was, the last one to the end."""
+    """The best cost of a run, when it fell and at even moments: Planner Arena fits curves to many points."""
     if not run.progress:
         return []
-    ends = (*run.progress, (max(seconds, run.progress[-1][0]), run.progress[-1][1]))
-    steps = [row for (begun, cost), (end, _) in pairwise(ends) for row in ((begun, cost), (end, cost))]
-    return [dict(zip(PROGRESS, (f"{cost:.9g}", f"{at:.6g}"), strict=True)) for at, cost in steps]
+    times, costs = np.array(run.progress).T
+    moments = np.union1d(times, np.linspace(0.0, max(seconds, times[-1]), MOMENTS))
+    moments = moments[moments >= times[0]]
+    best = costs[np.searchsorted(times, moments, side="right") - 1]
+    rows = {f"{at:.6g}": f"{cost:.9g}" for at, cost in zip(moments, best, strict=True)}  # a time stands once
+    return [dict(zip(PROGRESS, (cost, at), strict=True)) for at, cost in rows.items()]
