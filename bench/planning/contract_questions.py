@@ -99,7 +99,8 @@ class Case:
         """Difference of rows from a row, angles the short way round, in parts of ``half``."""
         turns = 2.0 * self.half * np.repeat([0.0, 1.0], [self.dof - self.angles, self.angles])
         away = rows - row
-        return (away - turns * np.round(away / (2.0 * self.half))) / self.half
+        shares: np.ndarray = (away - turns * np.round(away / (2.0 * self.half))) / self.half
+        return shares
 
 
 def cases(turning: bool) -> st.SearchStrategy[Case]:
