@@ -6,7 +6,7 @@ from itertools import groupby
 
 import numpy as np
 
-from rrtik_bench.report.rows import Row, verdict
+from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.replanning import ReplanRun
@@ -42,8 +42,8 @@ def static(quick: bool) -> list[Row]:
         once.append(route_length(planner.path))
     shorter = float(np.mean(np.array(walked) <= np.array(once)))
     measured = f"{np.mean(walked):.2f} beside {np.mean(once):.2f}; shorter in {shorter:.0%} of {count}"
-    return [Row("length walked, beside RRT-Connect and one pass of post-processing", "shorter", measured,
-                verdict(shorter >= 0.9), SCENE)]  # fmt: skip
+    return [judged("length walked, beside RRT-Connect and one pass of post-processing", "shorter", measured, shorter,
+                   Bar((0.0, 1.0), held=(0.9, 1.0)), SCENE)]  # fmt: skip
 
 
 def triangles(quick: bool) -> list[Row]:
@@ -57,20 +57,20 @@ def triangles(quick: bool) -> list[Row]:
     ticks = [tick for run in runs for tick in run.ticks]
     idle = np.mean([tick.event == "walk" and "look" in tick.seconds for tick in ticks])
     return [
-        Row("arrival", "by the eighth frame", f"{arrived} of {count}, after {np.mean(lengths):.0f} ticks",
-            verdict(arrived == count), f"the time between frames is not printed; {SCENE}"),
-        Row("new routes where triangles close the first one", "one is shown", f"{np.mean(repairs):.1f} a run",
-            verdict(min(repairs) > 0), f"repairs, small ones included; {SCENE}"),
-        Row("runs in which every step along the path is free when it is made", "implied", f"{clean} of {count}",
-            verdict(clean == count), "evasive steps left out"),
-        Row("runs without contact, in continuous time", "implied", f"{untouched} of {count}",
-            verdict(untouched == count, True), "no margin, as printed: what stands free when a tick begins can be run "
-            "over before it ends"),
-        Row("the same, told how fast triangles are", "not in the print", f"{bounded} of {count}",
-            verdict(bounded == count), f"speed_bound {FASTEST:g}: the robot keeps as far as they come in a tick"),
-        Row("ticks in which things move and the path is free: the robot", "has no branch in the print",
-            f"goes on, in {idle:.0%} of the ticks", verdict(False, bool(idle > 0.0)),
-            "to the letter it would stand still in all of them and not arrive; treated as if nothing had moved"),
+        judged("arrival", "by the eighth frame", f"{arrived} of {count}, after {np.mean(lengths):.0f} ticks",
+               arrived / count, all_of(), f"the time between frames is not printed; {SCENE}"),
+        judged("new routes where triangles close the first one", "one is shown", f"{np.mean(repairs):.1f} a run",
+               min(repairs), Bar((0.0, 1e4), held=(1.0, 1e4)), f"repairs, small ones included; {SCENE}"),
+        judged("runs in which every step along the path is free when it is made", "implied", f"{clean} of {count}",
+               clean / count, all_of(), "evasive steps left out"),
+        judged("runs without contact, in continuous time", "implied", f"{untouched} of {count}", untouched / count,
+               all_of(refutes=True), "no margin, as printed: what is free when a tick begins can be run over before "
+               f"it ends, in {count - untouched} of {count} runs"),
+        judged("the same, told how fast triangles are", "not in the print", f"{bounded} of {count}", bounded / count,
+               all_of(), f"speed_bound {FASTEST:g}: the robot keeps as far as they come in a tick"),
+        judged("ticks with a free path while things move, for which there is no branch", "none, by implication",
+               f"{idle:.0%} of the ticks", idle, Bar((0.0, 1.0), held=(0.0, 0.0), refuted=(0.0, 1.0)),
+               "to the letter the robot stands still in them; treated as if nothing had moved"),
     ]  # fmt: skip
 
 
@@ -102,9 +102,9 @@ def pockets(quick: bool) -> list[Row]:
     ]
     arrived, share = sum(run.arrived for run in runs), float(np.mean(shrinking))
     return [
-        Row("arrival", "in the sixth frame", f"{arrived} of {count}", verdict(arrived == count), SCENE),
-        Row("the path ahead becomes shorter", "at every step shown", f"in {share:.0%} of the steps",
-            verdict(share == 1.0, share > 0.9), "of ticks without a repair"),
+        judged("arrival", "in the sixth frame", f"{arrived} of {count}", arrived / count, all_of(), SCENE),
+        judged("the path ahead becomes shorter", "at every step shown", f"in {share:.0%} of the steps", share,
+               Bar((0.0, 1.0), held=(1.0, 1.0), differs=(0.9, 1.0)), f"{len(shrinking)} ticks without a repair"),
     ]  # fmt: skip
 
 
@@ -117,9 +117,9 @@ def planar_arm(quick: bool) -> list[Row]:
     steps = [step for _, step in orders[0][1:]]
     first = f"stops at step {steps[0]}, goes on at {steps[min(1, len(steps) - 1)]}, arrives at {steps[-1]}"
     return [
-        Row("follows, stops, holds, goes on, arrives", "steps 6, 14, 39, 68, 86",
-            f"in this order in {kept} of {count}; the first: {first}", verdict(kept == count),
-            f"the order, not the numbers; {SCENE}"),
+        judged("follows, stops, holds, goes on, arrives", "steps 6, 14, 39, 68, 86",
+               f"in this order in {kept} of {count}; the first: {first}", kept / count, all_of(),
+               f"the order, not the numbers; {SCENE}"),
     ]  # fmt: skip
 
 

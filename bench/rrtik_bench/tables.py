@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
+from rrtik_bench.report.figures import Figure
 from rrtik_bench.report.rows import Row
 
 
@@ -19,6 +20,8 @@ class Table:
         run: Measures it, quickly (fewer runs, the same rules) or in full.
         seconds: About how long the full measurement takes on two cores, on its own; tables of a page may share runs.
         quick_seconds: The same for the quick one.
+        fitted: What was chosen here so that figures come out as published, if anything was.
+        figures: Drawn from what is measured, see `rrtik reproduce --plot`.
     """
 
     name: str
@@ -27,6 +30,8 @@ class Table:
     run: Callable[[bool], Sequence[Row]]
     seconds: float
     quick_seconds: float
+    fitted: str = ""
+    figures: tuple[Figure, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +41,9 @@ class Collection:
     Attributes:
         tables: No two of the same name.
         not_here: What was published and is not among them, a line each.
+        also: Other words for the beginnings of names.
     """
 
     tables: tuple[Table, ...]
     not_here: tuple[str, ...] = ()
+    also: Mapping[str, str] = field(default_factory=dict)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_bench.report.rows import Row, verdict
+from rrtik_bench.report.rows import INFINITE, Bar, Row, about, all_of, exactly, judged, small
 from rrtik_bench.tables import Table
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
@@ -16,8 +16,18 @@ SOURCE = "[1, ch. 3, app. A to C]"
 A1, A2, A3, A4, D6 = 0.122, 0.851, 0.483, 0.127, 0.339  # [m]; no lengths are printed: drawings and the headline reach
 MOUNT = 0.194  # [m] of the shoulder axis above the mounting face
 RIGHT = np.pi / 2
-RANKS = {"elbow": 5, "wrist": 5, "shoulder": 5, "elbow and wrist": 4, "shoulder and wrist": 4}  # as claimed
+RANKS = {  # as claimed: each family that is active costs one degree of freedom
+    "elbow": 5,
+    "wrist": 5,
+    "shoulder": 5,
+    "elbow and wrist": 4,
+    "elbow and shoulder": 4,
+    "shoulder and wrist": 4,
+    "elbow, shoulder and wrist": 3,
+}
 RANK_TOLERANCE = 1e-9
+LOST = "families together cost one degree of freedom, as each alone does"
+FREE = "psi or theta1 is free: the nearest value that the arm can reach"
 LENGTHS = "no lengths are printed; a1 to a4 measured from the vendor's drawing, d6 fitted to the headline reach"
 
 
@@ -41,12 +51,13 @@ def sizes(quick: bool) -> list[Row]:
     )
     off = float(np.abs(tip[:3] - wanted).max())
     rows = [
-        Row("stretched arm: tip and its axes", "(1.922, 0, 0); z0, -y0, x0", f"off {off:.0e}", verdict(off < 1e-12),
-            LENGTHS)
+        judged("stretched arm: tip and its axes", "(1.922, 0, 0); z0, -y0, x0", f"off {off:.0e}", off, small(1e-12),
+               LENGTHS)
     ]  # fmt: skip
     for name, printed, ours in extremes:
-        close = abs(1e3 * ours - printed) <= 20.0
-        rows.append(Row(name, f"{printed:.0f} mm", f"{1e3 * ours:.0f} mm", verdict(close), "within 20 mm; envelope"))
+        bar = Bar((-3000.0, 3000.0), held=about(printed, 20.0))
+        text = f"{1e3 * ours:.0f} mm"
+        rows.append(judged(name, f"{printed:.0f} mm", text, 1e3 * ours, bar, "within 20 mm; limits of the envelope"))
     return rows
 
 
@@ -77,12 +88,12 @@ def branches(quick: bool) -> list[Row]:
     many = f"1 ({100 * np.mean(usable == 1):.0f} %) or 2 ({100 * np.mean(usable == 2):.0f} %), most {usable.max()}"
     number, real = len(form_of(robot).branches), float(found.real.sum(axis=1).mean())
     return [
-        Row("branches of a pose", "8", f"{number}, of which real {real:.1f} in the mean", verdict(number == 8),
-            "with atan2, and with the second solution of theta1: both are not printed"),
-        Row("every branch reaches the pose", "closed form", f"worst residual {residual:.0e}", verdict(residual < 1e-9)),
-        Row("the posture itself is among the branches", "implied", f"{original:.2f} %", verdict(original == 100.0)),
-        Row("solutions inside the limits", "up to 4", many, verdict(False, bool(usable.max() == 2)),
-            "an upper estimate for this arm; planning limits"),
+        judged("branches of a pose", "8", f"{number}, of which real {real:.1f} in the mean", number, exactly(8, 16),
+               "with atan2, and with the second solution of theta1: both are not printed"),
+        judged("every branch reaches the pose", "closed form", f"worst residual {residual:.0e}", residual, small(1e-9)),
+        judged("the posture itself is among the branches", "implied", f"{original:.2f} %", 0.01 * original, all_of()),
+        judged("solutions inside the limits", "up to 4", many, int(usable.max()),
+               Bar((0.0, 8.0), held=(4.0, 4.0), differs=(1.0, 3.0)), "an upper estimate for this arm; planning limits"),
     ]  # fmt: skip
 
 
@@ -96,9 +107,23 @@ def singular_families(quick: bool) -> list[Row]:
         found = solutions(robot, poses)
         worst = np.where(found.real, np.asarray(found.residuals).max(axis=2), np.inf).min(axis=1)
         share = 100.0 * float((worst < 1e-9).mean())
-        rows.append(Row(f"{case}: poses solved below 1e-9", printed, f"{share:.2f} %", verdict(share >= 99.9),
-                        "psi or theta1 is free: the nearest value that the arm can reach"))  # fmt: skip
+        rows.append(judged(f"{case}: poses solved below 1e-9", printed, f"{share:.2f} %", share,
+                           Bar((0.0, 100.0), held=(99.9, 100.0)), f"{FREE}, limits of joints left aside"))  # fmt: skip
+        rows.append(_inside_limits(robot, case, 20 if quick else 500))
     return rows
+
+
+def _inside_limits(robot: Robot, case: str, count: int) -> Row:
+    """Singular poses of postures inside the limits, by `solve_ik`."""
+    rng, kept = np.random.default_rng(4), np.empty((0, robot.dof))
+    while len(kept) < count:
+        Q = _singular(case, 2_000, rng)
+        Q[:, [0, 5]] = rng.uniform(robot.lower[[0, 5]], robot.upper[[0, 5]], (len(Q), 2))
+        kept = np.vstack([kept, Q[((robot.lower <= Q) & (robot.upper >= Q)).all(axis=1)]])
+    goals = [rrtik.PoseGoal(robot.fk(q)) for q in kept[:count]]
+    solved = sum(rrtik.solve_ik(robot, goal).found for goal in goals)
+    return judged(f"{case}: poses of postures inside the limits, by solve_ik", "not treated", f"{solved} of {count}",
+                  solved / count, all_of(), FREE)  # fmt: skip
 
 
 def _singular(case: str, count: int, rng: np.random.Generator) -> Matrix:
@@ -110,7 +135,9 @@ def _singular(case: str, count: int, rng: np.random.Generator) -> Matrix:
         Q[:, 2] = rng.choice([0.0, np.pi], count)
     todo = np.arange(count) if "shoulder" in case else np.arange(0)
     while len(todo):
-        Q[todo, 1:3] = rng.uniform(-np.pi, np.pi, (len(todo), 2))
+        Q[todo, 1] = rng.uniform(-np.pi, np.pi, len(todo))
+        if "elbow" not in case:
+            Q[todo, 2] = rng.uniform(-np.pi, np.pi, len(todo))
         cosine = -(A1 + A2 * np.cos(Q[todo, 1]) + A3 * np.cos(Q[todo, 1] + Q[todo, 2])) / A4
         psi = np.arccos(np.clip(cosine, -1.0, 1.0))
         Q[todo, 3] = wrapped(psi - Q[todo, 1] - Q[todo, 2])
@@ -132,16 +159,18 @@ def singularities(quick: bool) -> list[Row]:
         values = np.linalg.svd(robot.jacobian_batch(_singular(name, count, rng)), compute_uv=False)
         ranks[name] = claimed, sorted(set((values > RANK_TOLERANCE).sum(axis=1).tolist()))
     rows = [
-        Row("det J = -a2 a3 j51 sin(theta3) sin(theta5)", "formula", f"off {off:.0e}", verdict(off < 1e-12),
-            "theta5 printed as a DH angle: the cosine of the physical one; the sign depends on the order of rows"),
-        Row("wrist singularity: link 4 and gripper collinear", "stated", f"smallest singular value {straight:.2f} "
-            f"there, {bent:.0e} at theta5 = 90 deg", verdict(straight < 1e-9, bent < 1e-9),
-            "contradicts the printed formula: the straight wrist is regular"),
+        judged("det J = -a2 a3 j51 sin(theta3) sin(theta5)", "formula", f"off {off:.0e}", off, small(1e-12),
+               "theta5 printed as a DH angle: the cosine of the physical one; the sign depends on the order of rows"),
+        judged("wrist singularity: link 4 and gripper collinear", "stated", f"smallest singular value {straight:.2f} "
+               f"there, {bent:.0e} at theta5 = 90 deg", straight if bent < RANK_TOLERANCE else np.nan,
+               Bar((0.0, INFINITE), held=(0.0, RANK_TOLERANCE), refuted=(1e-3, 2.0)),
+               "contradicts the printed formula: the straight wrist is regular"),
     ]  # fmt: skip
     for name, (claimed, found) in ranks.items():
-        reading = "" if found == [claimed] else "one factor or two, one degree of freedom is lost: ranks by SVD"
-        rows.append(Row(f"rank, {name}", str(claimed), ", ".join(map(str, found)),
-                        verdict(found == [claimed], found == [5]), reading))  # fmt: skip
+        reading = "" if found == [claimed] else f"{len(Q)} postures, ranks by SVD: {LOST}"
+        bar = Bar((0.0, 6.0), held=(claimed, claimed), refuted=(5.0, 5.0) if claimed < 5 else None)
+        one = found[0] if len(found) == 1 else np.nan
+        rows.append(judged(f"rank, {name}", str(claimed), ", ".join(map(str, found)), one, bar, reading))
     return rows
 
 

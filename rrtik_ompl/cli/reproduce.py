@@ -4,50 +4,21 @@ from __future__ import annotations
 
 import json
 import time
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Protocol
+from types import MappingProxyType
+from typing import Annotated, Any
 
 import typer
 
+from rrtik_ompl.cli.published.kept import Kept
+from rrtik_ompl.cli.published.page import HEADS, Row, Table, cells, counted, page, plain
 from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.files.text import check_target
+from rrtik_ompl.files.text import check_target, write_text
 
-KEYS = ("name", "published", "measured", "verdict", "reading")
-HEADS = ("figure", *KEYS[1:])
+NONE: Mapping[str, str] = MappingProxyType({})
 WIDTH = 60  # of a reading in a table for a person
-
-
-class Verdict(Protocol):
-    """What to make of a figure: the word that is shown, and whether the comparison is a success."""
-
-    value: str
-    passes: bool
-
-
-class Row(Protocol):
-    """One figure, as printed and as measured, and how the text was read."""
-
-    name: str
-    published: str
-    measured: str
-    verdict: Verdict
-    reading: str
-
-
-class Table(Protocol):
-    """A published table as a package offers it; see `rrtik_bench.tables.Table`."""
-
-    name: str
-    title: str
-    source: str
-    seconds: float
-    quick_seconds: float
-
-    def run(self, quick: bool, /) -> Sequence[Row]:
-        """Measure it again."""
 
 
 def reproduce(
@@ -57,7 +28,13 @@ def reproduce(
     everything: Annotated[bool, typer.Option("--all", help="All tables.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, the same rules: minutes for all.")] = False,
     listed: Annotated[bool, typer.Option("--list", help="List the tables and how long they take.")] = False,
-    markdown: Annotated[Path | None, typer.Option(help="Write the comparison to this file: .md.")] = None,
+    markdown: Annotated[
+        Path | None,
+        typer.Option(help="Write the comparison to this file: .md; what is done is kept beside it, and continued."),
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the figures of the sources from our measurements into this folder.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
 ) -> int:
     """Measure published tables again.
@@ -76,49 +53,80 @@ def reproduce(
         return 0
     if everything == bool(tables):
         raise InputError("which tables? give their names, or --all; `rrtik reproduce --list` shows them")
-    wanted = list(known.values()) if everything else chosen(known, tables or ())
+    also = {name: stem for offer in offers for name, stem in offer.also.items()}
+    wanted = list(known.values()) if everything else chosen(known, tables or (), also)
     note(f"{_count(len(wanted), 'table')}, about {_time(sum(_seconds(each, quick) for each in wanted))} on two cores")
-    done = []
-    for table in wanted:
-        begin = time.perf_counter()
-        with progress(f"{table.name}: {table.title}, about {_time(_seconds(table, quick))}"):
-            rows = table.run(quick)
-        done.append((table, rows))
-        if not as_json:
-            say(f"{table.name}: {table.title} ({table.source}), {time.perf_counter() - begin:.1f} s", _table(rows))
+    if plot is not None:
+        return _draw(wanted, quick, plot)
+    kept = Kept(markdown, quick)
+    try:
+        done = [(table, _rows(table, quick, kept, shown=not as_json)) for table in wanted]
+    except KeyboardInterrupt:
+        if kept.file is not None:
+            note(f"what is done is kept in {kept.file}; the same command goes on from there")
+        raise
     if markdown is not None:
-        _write(markdown, done, quick)
-    verdicts = [row.verdict for _, rows in done for row in rows]
+        write_text(markdown, page(done, quick))
+    kept.forget()
     if as_json:
-        print(json.dumps({table.name: [_plain(row) for row in rows] for table, rows in done}))
+        print(json.dumps({table.name: [plain(row) for row in rows] for table, rows in done}))
     else:
-        counts = Counter(verdict.value for verdict in verdicts)
-        say(", ".join(f"{number} {word}" for word, number in counts.items()))
+        say(counted(done))
         say(*([] if markdown is None else [f"wrote {markdown}"]))
-    return 0 if all(verdict.passes for verdict in verdicts) else 1
+    return 1 if any(row.verdict is not None and not row.verdict.passes for _, rows in done for row in rows) else 0
 
 
-def chosen(known: Mapping[str, Table], names: Iterable[str]) -> list[Table]:
+def _rows(table: Table, quick: bool, kept: Kept, *, shown: bool) -> Sequence[Row]:
+    """Measured, or as an earlier round that was interrupted left them."""
+    begin, known = time.perf_counter(), kept.known(table)
+    with progress(f"{table.name}: {table.title}, about {_time(_seconds(table, quick))}"):
+        rows = table.run(quick) if known is None else known
+    kept.add(table, rows)
+    if shown:
+        took = "kept from before" if known is not None else f"{time.perf_counter() - begin:.1f} s"
+        say(f"{table.name}: {table.title} ({table.source}), {took}", *_fitted(table), _table(rows))
+    return rows
+
+
+def _fitted(table: Table) -> list[str]:
+    return [f"fitted to the published figures: {table.fitted}"] if table.fitted else []
+
+
+def _draw(tables: Iterable[Table], quick: bool, folder: Path) -> int:
+    from rrtik_ompl.files.text import make_folder
+
+    drawn = [(table, figure) for table in tables for figure in table.figures]
+    if not drawn:
+        raise InputError("--plot: none of these tables has a figure; `rrtik reproduce --list` marks those that have")
+    make_folder(folder)
+    for table, figure in drawn:
+        file = folder / f"{figure.name}.png"
+        with progress(f"{table.name}: {figure.title}"):
+            figure.save(file, quick)
+        say(f"wrote {file}: {figure.title} ({figure.source})")
+    return 0
+
+
+def chosen(known: Mapping[str, Table], names: Iterable[str], also: Mapping[str, str] = NONE) -> list[Table]:
     """The tables of these names, in the order of ``known``; ``mb-rrt`` stands for all whose name begins so.
+
+    Args:
+        known: All tables by name.
+        names: Of those that are wanted.
+        also: Other words for beginnings of names.
 
     Raises:
         UnknownNameError: If a name fits none.
     """
     wanted: set[str] = set()
     for name in names:
-        fits = [each for each in known if each == name or each.startswith(f"{name}-")]
+        stem = also.get(name, name)
+        fits = [each for each in known if each == stem or each.startswith(f"{stem}-")]
         if not fits:
-            raise UnknownNameError("table", name, known)
+            pages = {each.rsplit("-", 1)[0] for each in known}
+            raise UnknownNameError("table", name, {*known, *pages, *also})
         wanted.update(fits)
     return [table for name, table in known.items() if name in wanted]
-
-
-def _cells(row: Row) -> tuple[str, ...]:
-    return row.name, row.published, row.measured, row.verdict.value, row.reading
-
-
-def _plain(row: Row) -> dict[str, str]:
-    return dict(zip(KEYS, _cells(row), strict=True))
 
 
 def _seconds(table: Table, quick: bool) -> float:
@@ -129,9 +137,10 @@ def _list(tables: Iterable[Table]) -> Any:
     from rich import box
     from rich.table import Table
 
-    shown = Table("name", "what", "published in", "full", "quick", box=box.SIMPLE_HEAD, pad_edge=False)
+    shown = Table("name", "what", "published in", "full", "quick", "--plot", box=box.SIMPLE_HEAD, pad_edge=False)
     for each in tables:
-        shown.add_row(each.name, each.title, each.source, _time(each.seconds), _time(each.quick_seconds))
+        figures = ", ".join(figure.name for figure in each.figures)
+        shown.add_row(each.name, each.title, each.source, _time(each.seconds), _time(each.quick_seconds), figures)
     return shown
 
 
@@ -142,27 +151,8 @@ def _table(rows: Sequence[Row]) -> Any:
     shown = Table(*HEADS, box=box.SIMPLE_HEAD, pad_edge=False)
     shown.columns[-1].max_width = WIDTH
     for row in rows:
-        shown.add_row(*_cells(row))
+        shown.add_row(*cells(row))
     return shown
-
-
-def _write(file: Path, done: Sequence[tuple[Table, Sequence[Row]]], quick: bool) -> None:
-    import platform
-
-    from rrtik_ompl import __version__
-    from rrtik_ompl.benchmark.tables import markdown_table
-    from rrtik_ompl.files.text import write_text
-
-    command = f"rrtik reproduce {'--all' if len(done) > 1 else done[0][0].name}{' --quick' if quick else ''}"
-    lines = ["# Published and measured", "", f"Written by `{command}`, rrtik-ompl {__version__}, {platform.machine()}."]
-    lines += [
-        "",
-        "Held: as printed, within chance. Differs: not as printed, and the reading says why. Missed: neither.",
-    ]
-    for table, rows in done:
-        lines += ["", f"## {table.title}", "", f"`{table.name}`, {table.source}", ""]
-        lines += markdown_table(HEADS, map(_cells, rows))
-    write_text(file, "\n".join([*lines, ""]))
 
 
 def _time(seconds: float) -> str:

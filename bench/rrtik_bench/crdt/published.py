@@ -32,3 +32,11 @@ PRISM_LIST: list[list[float]] = [
     [-30, 0, 95.13, 0, 90, 0],
     [-30, 0, 0, 0, 90, 0],
 ]
+
+# RRT-Connect on the prisms, table 6.6, degrees as printed.
+CONNECT_LIST: list[list[float]] = [
+    [0, 0, 0, 0, 90, 0],
+    [-7.73, 24.42, 18.64, 0.64, 81.13, -69.05],
+    [-37.94, 15.77, 3.761, -0.70, 70.10, -43.18],
+    [-30, 0, 0, 0, 90, 0],
+]

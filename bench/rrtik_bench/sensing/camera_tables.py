@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_bench.report.rows import Row, verdict, within
+from rrtik_bench.report.rows import Bar, Row, about, judged, within
 from rrtik_bench.sensing.tables import ACCURACY, GRIPPER, SERIES, SOURCE
 from rrtik_bench.tables import Table
 from rrtik_ompl.sensing.precision import NORMAL_QUARTILES, series_of
@@ -64,27 +64,31 @@ def accuracy(quick: bool) -> list[Row]:
             seen = seen_poses(pair_at(1e-3 * distance, 0.3), count, distance, align=align, believed=believed, **PLAIN)
             error[align] = 100.0 * (float(pair_distances(seen).mean()) / 0.3 - 1.0)
         name = f"300 mm apart at {distance} mm: error"
-        rows.append(Row(f"{name}, {ROUGH}, lens not corrected", f"{printed:.2f} %", f"{error[False]:.2f} %",
-                        verdict(abs(error[False] - printed) < 0.2, abs(error[False] - printed) < 1.0),
-                        "their lens and light are not known; blur pulls corners inwards"))  # fmt: skip
-        rows.append(Row(f"{name}, {FINE}, lens calibrated", f"{printed:.2f} %", f"{error[True]:.3f} %",
-                        verdict(False, abs(error[True]) < max(0.3 * abs(printed), LEAST_ERROR)),
-                        "nearer to the truth"))  # fmt: skip
+        rows.append(judged(f"{name}, {ROUGH}, lens not corrected", f"{printed:.2f} %", f"{error[False]:.2f} %",
+                           error[False], Bar((-50.0, 50.0), held=about(printed, 0.2), differs=about(printed, 1.0)),
+                           "their lens and light are not known; blur pulls corners inwards"))  # fmt: skip
+        size = abs(printed)
+        rows.append(judged(f"{name}, {FINE}, lens calibrated", f"{printed:.2f} %", f"{error[True]:.3f} %",
+                           abs(error[True]), Bar((0.0, 50.0), held=(max(0.3 * size, LEAST_ERROR), size),
+                                                 better=(0.0, max(0.3 * size, LEAST_ERROR))),
+                           f"a {abs(printed / error[True]):.0f}th of the error"))  # fmt: skip
     return rows
 
 
 def _rows(name: str, printed: float, found: dict[bool, float], times: float) -> list[Row]:
     rough, fine = found[False], found[True]
     return [
-        Row(f"{name}, {ROUGH}", f"{printed:.3f} mm", f"{rough:.3f} mm", verdict(within(CHANCE, rough, printed)),
-            "noise of 1 %, chosen to fit"),
-        Row(f"{name}, {FINE}", f"{printed:.3f} mm", f"{fine:.3f} mm", verdict(False, fine <= printed / times),
-            f"{printed / fine:.1f} times steadier with the same noise"),
+        judged(f"{name}, {ROUGH}", f"{printed:.3f} mm", f"{rough:.3f} mm", rough,
+               Bar((0.0, 100.0), held=within(CHANCE, printed)), f"{rough / printed:.2f} times the print"),
+        judged(f"{name}, {FINE}", f"{printed:.3f} mm", f"{fine:.3f} mm", fine,
+               Bar((0.0, 100.0), held=(printed / times, printed), better=(0.0, printed / times)),
+               f"{printed / fine:.1f} times steadier with the same noise"),
     ]  # fmt: skip
 
 
+FITTED = "the noise of the camera, 1 % of full scale"
 TABLES = (
-    Table("sensing-precision", "Precision against distance, photographed", SOURCE, precision, 180, 15),
-    Table("sensing-gripper", "Precision of a gripper far from the marker", SOURCE, gripper, 60, 10),
-    Table("sensing-accuracy", "Two markers at a known distance", SOURCE, accuracy, 30, 8),
+    Table("sensing-precision", "Precision against distance, photographed", SOURCE, precision, 180, 15, fitted=FITTED),
+    Table("sensing-gripper", "Precision of a gripper far from the marker", SOURCE, gripper, 60, 10, fitted=FITTED),
+    Table("sensing-accuracy", "Two markers at a known distance", SOURCE, accuracy, 30, 8, fitted=FITTED),
 )

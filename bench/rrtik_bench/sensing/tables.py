@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_bench.report.rows import Row, verdict, within
+from rrtik_bench.report.rows import Bar, Row, about, judged, within
 from rrtik_bench.tables import Table
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.sensing.precision import NORMAL_QUARTILES
@@ -48,21 +48,23 @@ def arithmetic(quick: bool) -> list[Row]:
     rows = []
     for number, printed, spread in ((1, 0.0067, SERIES[0][3]), (6, 0.2114, SERIES[5][3])):
         ours = spread / np.sqrt(COUNT)
-        rows.append(Row(f"test 1, series {number}: precision of the mean", f"{printed} mm", f"{ours:.4f} mm",
-                        verdict(abs(ours - printed) < 1e-4)))  # fmt: skip
+        rows.append(judged(f"test 1, series {number}: precision of the mean", f"{printed} mm", f"{ours:.4f} mm", ours,
+                           Bar((0.0, 10.0), held=about(printed, 1e-4))))  # fmt: skip
     for distance, most, least, printed, first, third in GRIPPER:
         largest = 0.5 * (most - least) * np.sqrt(COUNT / (COUNT - 1))
         likely = (third - first) / NORMAL_QUARTILES
-        possible = printed <= largest
+        excess = printed / largest
         rows.append(
-            Row(f"test 2, {distance} mm: standard deviation", f"{printed} mm",
-                f"at most {largest:.3f} mm with that range; by the quartiles {likely:.2f} mm", verdict(possible, True),
-                "" if possible else "the printed figure is impossible for that range; use the quartiles")
+            judged(f"test 2, {distance} mm: standard deviation", f"{printed} mm",
+                   f"at most {largest:.3f} mm with that range; by the quartiles {likely:.2f} mm", excess,
+                   Bar((0.0, 10.0), held=(0.0, 1.0), refuted=(1.0, 10.0)),
+                   f"printed {100.0 * (excess - 1.0):.0f} % above what that range allows; use the quartiles"
+                   if excess > 1.0 else "")
         )  # fmt: skip
     for distance, mean, _, printed in ACCURACY:
         ours = (mean - 300.0) / 3.0
-        rows.append(Row(f"accuracy, x = 300 mm at {distance} mm: error", f"{printed} %", f"{ours:.4f} %",
-                        verdict(abs(ours - printed) < 2e-3)))  # fmt: skip
+        rows.append(judged(f"accuracy, x = 300 mm at {distance} mm: error", f"{printed} %", f"{ours:.4f} %", ours,
+                           Bar((-100.0, 100.0), held=about(printed, 2e-3))))  # fmt: skip
     return rows
 
 
@@ -73,9 +75,9 @@ def simulated(quick: bool) -> list[Row]:
     for number, (x, y, z, printed) in enumerate(SERIES, start=1):
         ours = _spread_of_z(np.array([x, y, z]))
         rows.append(
-            Row(f"series {number}, z = {z:.0f} mm: standard deviation of z", f"{printed} mm", f"{ours:.3f} mm",
-                verdict(within(1.5, ours, printed), z > FAR and within(2.0, ours, printed)),
-                f"corner noise {NOISE} px, chosen to fit; propagated to first order, marker parallel to the picture")
+            judged(f"series {number}, z = {z:.0f} mm: standard deviation of z", f"{printed} mm", f"{ours:.3f} mm", ours,
+                   Bar((0.0, 100.0), held=within(1.5, printed), differs=within(2.0, printed) if z > FAR else None),
+                   "propagated to first order, marker parallel to the picture")
         )  # fmt: skip
     return rows
 
@@ -100,5 +102,6 @@ def _corners(pose: Vector) -> Matrix:
 
 TABLES = (
     Table("sensing-arithmetic", "Precision and accuracy: what follows", SOURCE, arithmetic, 1, 1),
-    Table("sensing-noise", "Precision against distance, simulated", SOURCE, simulated, 1, 1),
-)
+    Table("sensing-noise", "Precision against distance, simulated", SOURCE, simulated, 1, 1,
+          fitted=f"the noise of a corner, {NOISE} px"),
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""Errors of the sources, each shown by a computation."""

@@ -1,0 +1,49 @@
+"""Figures drawn from what is measured, with the published numbers marked where there are any."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rrtik_ompl.plots.joints import save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+PICTURE = "published only as a picture: no number to mark"
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure of a publication.
+
+    Attributes:
+        name: Of the file, without its ending.
+        title: What it shows.
+        source: Where it was published.
+        draw: Measures, quickly or in full, and draws into an empty drawing.
+        marked: What of the print is marked in it; by default that nothing can be.
+        size: Width and height [in].
+    """
+
+    name: str
+    title: str
+    source: str
+    draw: Callable[[Drawing, bool], None]
+    marked: str = PICTURE
+    size: tuple[float, float] = (7.0, 4.5)
+
+    def save(self, file: Path, quick: bool) -> None:
+        """Measure what it shows, and write it.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
+        from matplotlib.figure import Figure as Drawing
+
+        drawing = Drawing(figsize=self.size, layout="constrained")
+        self.draw(drawing, quick)
+        drawing.suptitle(f"{self.title}\n{self.source}; {self.marked}", fontsize=9)
+        save_figure(drawing, file)
