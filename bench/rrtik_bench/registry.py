@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rrtik_bench import drrt_con, ikurt, titan4
 from rrtik_bench.crdt import tables as crdt
 from rrtik_bench.errata import tables as errata
+from rrtik_bench.figures import genetic as genetic_figures
+from rrtik_bench.figures import mb_rrt as mb_rrt_figures
+from rrtik_bench.figures import sensing as sensing_figures
 from rrtik_bench.genetic import tables as genetic
 from rrtik_bench.mb_rrt import tables as mb_rrt
-from rrtik_bench.sensing import camera_tables
+from rrtik_bench.sensing import camera_tables, sequences
 from rrtik_bench.sensing import tables as sensing
 from rrtik_bench.shortening import tables as shortening
 from rrtik_bench.tables import Collection
 
-PAGES = (titan4, mb_rrt, genetic, crdt, ikurt, drrt_con, shortening, sensing, camera_tables, errata)
+PAGES = (titan4, mb_rrt, genetic, crdt, ikurt, drrt_con, shortening, sensing, camera_tables, sequences, errata)
+FIGURES = {**mb_rrt_figures.FIGURES, **genetic_figures.FIGURES, **sensing_figures.FIGURES}
 COLLECTION = Collection(
-    tables=tuple(table for page in PAGES for table in page.TABLES),
+    tables=tuple(replace(table, figures=FIGURES.get(table.name, ())) for page in PAGES for table in page.TABLES),
     also={"genetic": "ga-reb", "mbrrt": "mb-rrt", "replanning": "drrt-con", "markers": "sensing"},
-    not_here=("[1, ch. 4]: the sequences with 125, 400 and 500 mm, of which only a plot was published",),
+    not_here=(
+        "[3]: goal-biased trees and Bertram's planner; [1, ch. 5.2]: ERRT and MP-RRT; they are named without a definition",
+        "[1, ch. 4]: the figures of the orientation tests, which are lost",
+    ),
 )

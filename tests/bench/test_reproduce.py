@@ -23,7 +23,7 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 
 HELD, BETTER, DIFFERS, REFUTED, MISSED = Verdict
 TABLES = {table.name: table for table in COLLECTION.tables}
-FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-accuracy", "crdt-routes", "mb-rrt-example",
+FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-sequences", "errata-kinematics", "errata-grim", "crdt-routes", "mb-rrt-example",
         "mb-rrt-10", "ikurt-solutions", "drrt-con-arm")  # fmt: skip
 
 
@@ -40,6 +40,7 @@ def test_the_beginning_of_names_chooses_all_tables_of_a_page():
         "sensing-precision",
         "sensing-gripper",
         "sensing-accuracy",
+        "sensing-sequences",
     ]
     genetic_tables = [name for name in TABLES if name.startswith("ga-reb-")]
     assert [table.name for table in chosen(TABLES, ["genetic"], COLLECTION.also)] == genetic_tables

@@ -51,6 +51,14 @@ def surface(links: Links, goal: Vector, index: int, count: int, rng: np.random.G
     return circle
 
 
+def projected(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
+    """As `square`, then moved straight to or from the goal onto the circle of `surface` [3, section 4.3]."""
+    away = square(links, goal, index, count, rng) - goal
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    on_circle: Matrix = goal + links.remaining[index] * away / np.maximum(length, np.finfo(float).tiny)
+    return on_circle
+
+
 def nearest(squared: Matrix, length: float) -> Matrix:
     """Rule A: the nearest node."""
     return squared
@@ -71,6 +79,8 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
             Variant("uniform-b", "RRT Uniforme B", square, one_link_away),
             Variant("uniform-a-star", "RRT Uniforme A*", square_then_goal, nearest),
             Variant("uniform-b-star", "RRT Uniforme B*", square_then_goal, one_link_away),
+            Variant("projected-a", "RRT, projected samples, A", projected, nearest),
+            Variant("projected-b", "RRT, projected samples, B", projected, one_link_away),
             Variant("surface-a", "RRT Superficie A", surface, nearest),
             Variant("surface-b", "RRT Superficie B (MB-RRT)", surface, one_link_away),
         )
