@@ -23,7 +23,7 @@ COLLECTION = Collection(
     tables=tuple(replace(table, figures=FIGURES.get(table.name, ())) for page in PAGES for table in page.TABLES),
     also={"genetic": "ga-reb", "mbrrt": "mb-rrt", "replanning": "drrt-con", "markers": "sensing"},
     not_here=(
-        "[3]: goal-biased trees and Bertram's planner; [1, ch. 5.2]: ERRT and MP-RRT; they are named without a definition",
+        "[3]: goal-biased trees and Bertram's planner; [1, ch. 5.2]: ERRT, MP-RRT; named without a definition",
         "[1, ch. 4]: the figures of the orientation tests, which are lost",
     ),
 )

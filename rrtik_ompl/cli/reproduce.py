@@ -55,9 +55,9 @@ def reproduce(
         raise InputError("which tables? give their names, or --all; `rrtik reproduce --list` shows them")
     also = {name: stem for offer in offers for name, stem in offer.also.items()}
     wanted = list(known.values()) if everything else chosen(known, tables or (), also)
-    note(f"{_count(len(wanted), 'table')}, about {_time(sum(_seconds(each, quick) for each in wanted))} on two cores")
     if plot is not None:
         return _draw(wanted, quick, plot)
+    note(f"{_count(len(wanted), 'table')}, about {_time(sum(_seconds(each, quick) for each in wanted))} on two cores")
     kept = Kept(markdown, quick)
     try:
         done = [(table, _rows(table, quick, kept, shown=not as_json)) for table in wanted]
@@ -124,7 +124,7 @@ def chosen(known: Mapping[str, Table], names: Iterable[str], also: Mapping[str, 
         fits = [each for each in known if each == stem or each.startswith(f"{stem}-")]
         if not fits:
             pages = {each.rsplit("-", 1)[0] for each in known}
-            raise UnknownNameError("table", name, {*known, *pages, *also})
+            raise UnknownNameError("table", name, [*known, *pages, *also])
         wanted.update(fits)
     return [table for name, table in known.items() if name in wanted]
 

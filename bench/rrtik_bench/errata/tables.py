@@ -52,14 +52,16 @@ def kinematics(quick: bool) -> list[Row]:
 def _chain(robot: Robot, Q: Matrix) -> list[Row]:
     """The table of appendix B beside the inverse kinematics, and the matrix that it expands to."""
     found = solutions(robot, printed_pose(Q))
-    away = np.abs(wrapped(found.branches - Q[:, None])).max(axis=2).min(axis=1)
+    away = np.where(found.real[..., None], np.abs(wrapped(found.branches - Q[:, None])), np.inf)
+    same = away[..., :5].max(axis=2).argmin(axis=1)  # the branch of the posture itself, by its first five joints
+    roll = float(np.median(away[np.arange(len(Q)), same, 5]))
     right = np.abs(printed_pose(Q, roll=np.pi / 2) - robot.fk_batch(Q)).max()
     slips = printed_pose(Q, roll=np.pi / 2, slip=True)[:, :3, :3]
     turned = np.abs(np.swapaxes(slips, 1, 2) @ slips - np.eye(3)).max(axis=(1, 2))
     return [
         judged("theta6 of the printed table, through the printed inverse kinematics", "the same",
-               f"{np.degrees(np.median(away)):.0f} deg off", float(np.median(away)) if right < RIGHT_TO else np.nan,
-               DEVIATION, f"with theta6 + 90 deg in row 6 they agree to {right:.0e}"),
+               f"{np.degrees(roll):.0f} deg off", roll if right < RIGHT_TO else np.nan, DEVIATION,
+               f"with theta6 + 90 deg in row 6 they agree to {right:.0e}"),
         judged('"c6 = cos(theta5)" of appendix B.2', "a rotation", f"columns off by {np.median(turned):.2f}",
                float(np.median(turned)) if right < RIGHT_TO else np.nan, DEVIATION,
                f"with cos(theta6) all twelve terms are right to {right:.0e}"),
@@ -70,10 +72,9 @@ def _arc_tangent(robot: Robot, Q: Matrix) -> Row:
     """Appendix C takes theta2 by an arc tangent of one argument."""
     poses = robot.fk_batch(Q)
     found = solutions(robot, poses)
-    taken = by_arc_tangent(found.branches)
-    reached = robot.fk_batch(taken.reshape(-1, 6)).reshape(*taken.shape[:2], 4, 4)
-    good = np.abs(reached - poses[:, None]).max(axis=(2, 3)) < RIGHT_TO
-    share = float(good[found.real].mean())
+    rows, columns = np.nonzero(found.real)
+    reached = robot.fk_batch(by_arc_tangent(found.branches[rows, columns]))
+    share = float((np.abs(reached - poses[rows]).max(axis=(1, 2)) < RIGHT_TO).mean())
     worst = float(np.asarray(found.residuals)[found.real].max())
     return judged("branches that reach the pose with theta2 = atan(...)", "all", f"{share:.0%}",
                   share if worst < RIGHT_TO else np.nan, SHARE, f"with atan2 all, to {worst:.0e}")  # fmt: skip

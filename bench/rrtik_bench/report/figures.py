@@ -41,9 +41,9 @@ class Figure:
         Raises:
             InputError: If the file cannot be written.
         """
-        from matplotlib.figure import Figure as Drawing
+        import matplotlib.figure
 
-        drawing = Drawing(figsize=self.size, layout="constrained")
+        drawing = matplotlib.figure.Figure(figsize=self.size, layout="constrained")
         self.draw(drawing, quick)
         drawing.suptitle(f"{self.title}\n{self.source}; {self.marked}", fontsize=9)
         save_figure(drawing, file)
