@@ -1,0 +1,80 @@
+"""Errors of the sources, the GRIM test, and figures drawn from what is measured."""
+
+import numpy as np
+import pytest
+
+from rrtik_bench.errata.grim import consistent, off
+from rrtik_bench.errata.prints import level_link_4, listed_routes, printed_routes, undefined
+from rrtik_bench.figures.mb_rrt import FIGURES, first_directions
+from rrtik_bench.report.figures import PICTURE, Figure
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.ik.mb_rrt.growth import grow
+from rrtik_ompl.ik.mb_rrt.links import Links
+
+
+def test_a_mean_over_whole_numbers_is_a_fraction_of_their_number():
+    rng = np.random.default_rng(0)
+    for count in rng.integers(1, 101, 50).tolist():
+        mean = round(float(np.mean(rng.integers(1, 10_000, count))), 4)
+        assert off(mean, 4, count) <= 1.0 + 1e-6
+    assert consistent(5074.6154, 4, 35) == [13, 26]
+    assert consistent(5.4286, 4, 35) == [7, 14, 21, 28, 35]
+    assert consistent(6.7844, 4, 35) == []
+    assert 71 in consistent(1333.0282, 4, 100)
+
+
+def test_gamma_of_the_print_is_right_where_the_first_joint_is_at_zero_and_only_there():
+    Q = np.zeros((40, 6))
+    Q[:, 1] = np.linspace(-0.5, 1.0, 40)
+    Q[:, 2] = np.linspace(-1.5, -0.3, 40)
+    for first, right in ((0.0, True), (0.7, False)):
+        Q[:, 0] = first
+        off_by = np.abs(level_link_4(Q, printed=True) - Q[:, None, 1:3]).max(axis=2).min(axis=1)
+        assert (off_by < 1e-9).all() == right
+        np.testing.assert_allclose(np.abs(level_link_4(Q, printed=False)[:, 1, :] - Q[:, 1:3]).max(), 0.0, atol=1e-9)
+
+
+def test_the_count_of_routes_is_a_power():
+    assert [listed_routes(3, 1, edges) for edges in (1, 2, 3)] == [6, 36, 216]
+    assert listed_routes(3, 2, 1) == printed_routes(3, 2, 1) == 90
+    assert printed_routes(3, 1, 2) == 12
+
+
+def test_a_change_of_at_most_1_has_no_value_in_the_print():
+    assert undefined(np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 2.0]])) == 1
+
+
+@pytest.mark.parametrize("draw", ["surface", "projected", "uniform"])
+def test_first_links_point_where_their_samples_lie(draw):
+    angles = np.abs(first_directions(draw, 20_000, np.random.default_rng(0)))
+    tangent = np.arcsin(30.0 / np.linalg.norm([20.0, 30.0]))
+    if draw == "uniform":
+        assert angles.max() > 3.0
+        return
+    assert angles.max() <= tangent + 1e-9
+    near_the_tangents = (angles > 0.9 * tangent).mean()
+    assert near_the_tangents > 0.2  # even directions would give 0.1
+
+
+@pytest.mark.parametrize("kind", ["projected-a", "projected-b"])
+def test_projected_samples_lead_to_the_goal(kind):
+    run = grow(Links([10.0] * 3), [12.0, 9.0], kind, tolerance=3.0, rng=np.random.default_rng(1), passes=200)
+    assert run.solved_in
+    np.testing.assert_allclose(np.linalg.norm(np.diff(run.chain, axis=0), axis=1), 10.0)
+
+
+def test_a_figure_says_where_it_is_from_and_what_of_the_print_is_marked(tmp_path):
+    drawn = []
+    figure = Figure("x", "a line", "[1, figure 9]", lambda drawing, quick: drawn.append((drawing, quick)))
+    figure.save(tmp_path / "x.png", True)
+    ((drawing, quick),) = drawn
+    assert quick
+    assert drawing.get_suptitle() == f"a line\n[1, figure 9]; {PICTURE}"
+    assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(InputError, match="does not exist"):
+        figure.save(tmp_path / "nowhere" / "x.png", True)
+
+
+def test_the_growth_of_a_tree_is_drawn(tmp_path):
+    FIGURES["mb-rrt-example"][0].save(tmp_path / "growth.png", True)
+    assert (tmp_path / "growth.png").stat().st_size > 5_000
