@@ -43,17 +43,19 @@ class Knowledge:
         arm_lost: Why the connection to the arm is lost; "" if it is not.
         picture_age: Of the last picture [s]; inf if there was none.
         past: Pictures are photographs or a film, and the arm is a simulated one: no picture is of now, none is stale.
+        arm_off: Why joints and pictures contradict each other; "" if they do not.
     """
 
     arm_lost: str
     picture_age: float
     past: bool = False
+    arm_off: str = ""
 
     @property
     def trouble(self) -> str:
         """Why the present is not known; "" if it is."""
-        if self.arm_lost:
-            return self.arm_lost
+        if self.arm_lost or self.arm_off:
+            return self.arm_lost or self.arm_off
         if self.past or self.picture_age <= STALE_SECONDS:
             return ""
         return "there is no picture yet" if self.picture_age == float("inf") else "the picture is stale"

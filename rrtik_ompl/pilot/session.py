@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
+from rrtik_ompl.pilot.arm_check import ArmCheck
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.guide import Guide
@@ -75,6 +77,7 @@ class Session:
         self.guide = Guide(self)
         self.held, self.hand = Held(self), Hand(self)
         self.leading = Leading(self, master)
+        self._check = ArmCheck()
         self._past, self._trouble, self._seen_at = past, "", dict[str, float]()
         self._record = record or Record(None)
         self._commands: dict[str, Callable[..., str]] = {
@@ -100,6 +103,11 @@ class Session:
                 self.target = targets[0] if targets else None
             self._check_motion()
 
+    def see_arm(self, T_base_tip: pin.SE3, covariance: Matrix, time: float) -> None:
+        """Where a picture shows the tip, with its covariance (6, 6); nothing moves where the joints say otherwise."""
+        if not self._past:
+            self._check.see(T_base_tip, covariance, self.robot.fk(self.q), time)
+
     def tick(self, time: float) -> None:
         """Read the arm and update its progress along the route; stop it where the present is not known any more."""
         self.time = max(self.time, time)
@@ -107,6 +115,7 @@ class Session:
         if not np.array_equal(before, self.q):
             self._record.write("joints", time, q=self.q.tolist())
             self.surroundings.settle(self.q)
+        self._check.read(self.q, time)
         self.held.expire(time)
         self._watch()
         self.message = self.guide.watch() or self._record.news() or self.message
@@ -146,7 +155,7 @@ class Session:
     @property
     def known(self) -> Knowledge:
         """What is known now of the arm and of the picture."""
-        return Knowledge(self.arm.lost, self.time - self.picture_time, self._past)
+        return Knowledge(self.arm.lost, self.time - self.picture_time, self._past, self._check.off)
 
     @property
     def driving(self) -> bool:

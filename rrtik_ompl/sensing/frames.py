@@ -36,6 +36,16 @@ def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> 
     raise NoBaseError(f"no marker of the base '{name}' is in view; turn the camera, or say camera_pose in the map")
 
 
+def tip_seen(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> tuple[pin.SE3, Matrix] | None:
+    """``T_base_tip`` and its covariance by a marker on the arm; None without one in view, or without the base."""
+    try:
+        T_base_camera, spread = base_from_camera(marker_map, sightings)
+    except NoBaseError:
+        return None
+    seen = next((each for each in sightings if each.object.role == "arm" and not each.refused), None)
+    return None if seen is None else place_in_base(T_base_camera, spread, seen)
+
+
 def place_in_base(T_base_camera: pin.SE3, base_covariance: Matrix, sight: Sighting) -> tuple[pin.SE3, Matrix]:
     """``T_base_object`` and its covariance: position [m] and small rotation [rad] in the axes of the base, (6, 6).
 

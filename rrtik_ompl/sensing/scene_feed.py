@@ -31,7 +31,9 @@ def scene_feed(
         InputError: If the pictures end before everything was seen; it names what was not. If a picture cannot be used.
     """
     around = Scene(()) if scene is None else scene
-    solids = [name for each in sensor.marker_map.objects if each.role != "base" for name in each.solid_names]
+    solids = [
+        name for each in sensor.marker_map.objects if each.role not in ("base", "arm") for name in each.solid_names
+    ]
     given, seen = {obstacle.name for obstacle in around.obstacles}, dict[str, Obstacle]()
     begin, why = None, ""
     for picture in pictures:

@@ -104,7 +104,7 @@ def objects_in_base(
     return tuple(
         SeenObject(each.object, *place_in_base(T_base_camera, spread, each), each, sigmas)
         for each in sightings
-        if each.object.role != "base" and not each.refused
+        if each.object.role not in ("base", "arm") and not each.refused
     )
 
 

@@ -17,7 +17,7 @@ from rrtik_ompl.pilot.devices.watchdog import Report
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
-from rrtik_ompl.sensing.frames import base_from_camera
+from rrtik_ompl.sensing.frames import base_from_camera, tip_seen
 from rrtik_ompl.sensing.sensor import Sensor, View
 
 FINGERS = 0.02  # [m]; a gripper that closes this near to a grasp takes the object
@@ -78,6 +78,8 @@ class LivePerception:
             return
         self.lost, self.picture = "", taken.pixels
         session.see(view.placed, time)
+        if tip := tip_seen(self._sensor.marker_map, view.seen):
+            session.see_arm(*tip, time)
         self.hint = self._why_nothing(view, time, known=bool(session.surroundings.seen))
         if not view.why_not_placed:
             self.T_base_camera, _ = base_from_camera(self._sensor.marker_map, view.seen)
@@ -134,6 +136,10 @@ class SimulatedSource:
         q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
         if isinstance(arm, SimulatedArm):
             self._carry(arm, arm.robot.fk(q))
+        tip = self.camera.T_start_base * self.camera.robot.fk(q)
+        on_arm = {each.name: tip for each in self.camera.marker_map.objects if each.role == "arm"}
+        if on_arm:
+            self.camera.places = {**self.camera.places, **on_arm}
         return self.camera.picture(q, float(self._count))
 
     def _carry(self, arm: SimulatedArm, T_base_tip: pin.SE3) -> None:

@@ -14,7 +14,7 @@ from rrtik_ompl.poses import rigid
 from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
 
-ROLES = ("base", "target", "obstacle")
+ROLES = ("base", "arm", "target", "obstacle")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +77,8 @@ class MarkedObject:
 
     Attributes:
         name: Its name.
-        role: "base" (of the arm: its frame is the world of the scene), "target" or "obstacle".
+        role: "base" (of the arm: its frame is the world of the scene), "arm" (on its last link: its frame is that of
+            the tip), "target" or "obstacle".
         markers: Where they sit; several are used together.
         solids: What it is made of, with poses ``T_object_solid``.
         grasps: Its grasp types.

@@ -49,7 +49,7 @@ class ObjectEntry(Section):
     """A thing with markers."""
 
     name: Name
-    role: Literal["base", "target", "obstacle"]
+    role: Literal["base", "arm", "target", "obstacle"]
     markers: Annotated[list[MarkerEntry], Field(min_length=1)]
     solids: list[SolidEntry] = Field(default=[], description="with poses in the frame of the object")
     grasps: list[GraspEntry] = Field(default=[])
