@@ -238,7 +238,7 @@ class JointPath:
             "continuous": [name for name, endless in zip(self.joint_names, self.continuous, strict=True) if endless],
             "length": self.length,
             "transitions": self.transitions,
-            "waypoints": self.waypoints.tolist(),
+            "waypoints": (self.waypoints + 0.0).tolist(),  # a person reads 0.0, not -0.0
         }
 
 

@@ -19,8 +19,14 @@ NOT_RIGID = 1e-6  # largest entry of R R^T - 1 that still counts as rounding, an
 ROUNDING = 1e-12  # the same of a rotation that stays as it is
 
 
-def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike = IDENTITY_QUATERNION, what: str = "pose") -> Any:
+def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike | None = None, what: str = "pose") -> Any:
     """Make a pose from a position [m] and a unit quaternion in the order x, y, z, w.
+
+    Args:
+        xyz: The position, shape (3,); without ``quat_xyzw`` a pose in any form that :func:`rigid` takes, such as
+            [x, y, z, roll, pitch, yaw] in radians or a 4 x 4 matrix.
+        quat_xyzw: The orientation, shape (4,).
+        what: Its name, for messages.
 
     Raises:
         InputError: If a number is not finite, or the quaternion's length differs from 1 by more than 1e-3.
@@ -28,7 +34,11 @@ def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike = IDENTITY_QUATE
     Example:
         >>> rrtik.pose([0.1, 0.2, 0.3], [0.0, 0.0, 1.0, 0.0]).translation
         array([0.1, 0.2, 0.3])
+        >>> rrtik.pose([0.1, 0.2, 0.3, 0.0, 0.0, 1.57]).translation
+        array([0.1, 0.2, 0.3])
     """
+    if quat_xyzw is None:
+        return rigid(xyz, what)
     position = bounded_array(xyz, (3,), f"{what}: xyz")
     quaternion = finite_array(quat_xyzw, (4,), f"{what}: quat_xyzw")
     length = float(np.linalg.norm(quaternion))
@@ -98,7 +108,7 @@ def rigid(T: Any, what: str) -> Any:
 def _written_pose(numbers: ArrayLike, what: str) -> Any:
     values = finite_array(numbers, (None,), what)
     if len(values) == 3:
-        return pin.SE3(np.eye(3), values)
+        return pin.SE3(np.eye(3), bounded_array(values, (3,), what))
     if len(values) == 6:
         return pose_from_rpy(values[:3], values[3:], what)
     if len(values) == 7:

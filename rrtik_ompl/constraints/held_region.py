@@ -182,7 +182,7 @@ def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tu
     held = next((each for each in scene.attached if each.name == frame), None)
     name = robot.tip if frame is None else frame if held is None else held.link
     if not name.isprintable() or not robot.model.existFrame(name):
-        names = [*(each.name for each in robot.model.frames), *(each.name for each in scene.attached)]
+        names = [*robot.link_names, *(each.name for each in scene.attached)]
         raise UnknownNameError(f"frame of {label}", name, names)
     target = robot.model.frames[robot.model.getFrameId(name)]
     return name, int(target.parentJoint), target.placement * (pin.SE3.Identity() if held is None else held.pose)

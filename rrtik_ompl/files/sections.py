@@ -39,6 +39,7 @@ def _one(value: object) -> Any:
 
 Version = Annotated[Literal[1], BeforeValidator(_one)]
 
+_NO_KIND, _ONE_OF = "no_kind", "needs one of the keys "
 _TAG = "<"  # tags of unions begin with it, so that they differ from the keys in an error's location
 
 
@@ -87,8 +88,8 @@ def told_apart_by(*keys: str, what: str, text: str | None = None) -> Discriminat
             return tag(text)
         return next((tag(key) for key in keys if key in data), None) if isinstance(data, dict) else None
 
-    message = f"needs one of the keys {', '.join(keys)}" + (f", or {text}" if text else "")
-    return Discriminator(choose, custom_error_type="no_kind", custom_error_message=f"{what} {message}")
+    message = f"{_ONE_OF}{', '.join(keys)}" + (f", or {text}" if text else "")
+    return Discriminator(choose, custom_error_type=_NO_KIND, custom_error_message=f"{what} {message}")
 
 
 def tag(key: str) -> str:
@@ -154,7 +155,18 @@ def _message(error: ErrorDetails) -> str:
     found = describe(error["input"])
     if write is not None:
         return write(error.get("ctx", {}), found)
-    return str(error["msg"])
+    return str(error["msg"]) + (_unknown_kind(error) if error["type"] == _NO_KIND else "")
+
+
+def _unknown_kind(error: ErrorDetails) -> str:
+    """What stands where a key should tell the kind, and which key may be meant."""
+    data, kinds = error["input"], error["msg"].partition(_ONE_OF)[2].split(", ")
+    near = [close for key in data for close in get_close_matches(str(key), kinds, n=1)] if isinstance(data, dict) else []
+    return f"; found {describe(data)}" + (f"; did you mean '{near[0]}'?" if near else "")
+
+
+def _entries(count: int) -> str:
+    return "1 entry" if count == 1 else f"{count} entries"
 
 
 def _must_be(what: str) -> Callable[[dict[str, Any], str], str]:
@@ -179,8 +191,8 @@ _MESSAGES: dict[str, Callable[[dict[str, Any], str], str]] = {
     "greater_than": lambda context, found: f"must be greater than {context['gt']:g}, found {found}",
     "less_than_equal": lambda context, found: f"must be {context['le']:g} or less, found {found}",
     "greater_than_equal": lambda context, found: f"must be {context['ge']:g} or more, found {found}",
-    "too_short": lambda context, found: f"needs at least {context['min_length']} entries, found {found}",
-    "too_long": lambda context, found: f"takes at most {context['max_length']} entries, found {found}",
+    "too_short": lambda context, found: f"needs at least {_entries(context['min_length'])}, found {found}",
+    "too_long": lambda context, found: f"takes at most {_entries(context['max_length'])}, found {found}",
     "string_too_short": lambda _context, _found: "must not be empty",
     "literal_error": lambda context, found: f"must be {context['expected']}, found {found}",
 }

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,13 @@ from rrtik_ompl.files.text import known_ending
 from rrtik_ompl.plots.joints import FORMATS, save_figure, tidy
 from rrtik_ompl.reach.grid_map import Slice
 
-INK, CAMERA = "#1d2733", "#d55e00"
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.image import AxesImage
+
+BASE: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "#1d2733", "markersize": 4}
+MARK: dict[str, Any] = {"linestyle": "none", "marker": "^", "color": "#d55e00", "markersize": 8}
+VEHICLE: dict[str, Any] = {"fill": False, "hatch": "//", "edgecolor": "#7f8a96"}
 
 
 def plot_slices(
@@ -53,14 +59,31 @@ def plot_slices(
             panel.imshow(values, origin="lower", extent=extent, cmap=colors, vmin=0.0, vmax=most, aspect="equal")
         )
         for x, y, right, top in each.boxes:
-            panel.add_patch(Rectangle((x, y), right - x, top - y, fill=False, hatch="//", edgecolor="#7f8a96"))
+            panel.add_patch(Rectangle((x, y), right - x, top - y, **VEHICLE))
         if each.points:
-            panel.plot(*np.array(each.points).T, linestyle="none", marker="^", color=CAMERA, markersize=8)
-        panel.plot(*each.base, marker="o", color=INK, markersize=4)
+            panel.plot(*np.array(each.points).T, **MARK)
+        panel.plot(*each.base, **BASE)
         panel.set(xlabel=each.across, ylabel=each.up, xlim=extent[:2], ylim=extent[2:])
         panel.set_title(each.title, fontsize=10)
         tidy(panel, grid=False)
     if label:
         figure.colorbar(drawn[0], ax=panels, label=label, shrink=0.8)
+    if slices[0].meanings:
+        figure.legend(handles=_keys(slices[0].meanings, drawn[0]), loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle(title, fontsize=11)
     save_figure(figure, file, dpi=110)
+
+
+def _keys(meanings: Mapping[float, str], image: AxesImage) -> list[Artist]:
+    """Lines of the legend."""
+    from matplotlib.colors import to_hex
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    colors = [to_hex(color) for color in image.to_rgba(np.array(list(meanings)))]
+    return [
+        *(Patch(color=color, label=meaning) for color, meaning in zip(colors, meanings.values(), strict=True)),
+        Patch(label="vehicle", **VEHICLE),
+        Line2D([], [], label="camera", **MARK),
+        Line2D([], [], label="base of the arm", **BASE),
+    ]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from io import BytesIO
 
 import numpy as np
@@ -137,6 +138,7 @@ class Slice:
         boxes: Rectangles to draw: low x, low y, high x, high y.
         points: Places to mark, each x, y.
         base: Where the arm's base is in this plane.
+        meanings: What values mean, for a legend, where they are no amounts; boxes are then a vehicle, points cameras.
     """
 
     title: str
@@ -148,6 +150,7 @@ class Slice:
     boxes: tuple[tuple[float, float, float, float], ...] = ()
     points: tuple[tuple[float, float], ...] = ()
     base: tuple[float, float] = (0.0, 0.0)
+    meanings: Mapping[float, str] = field(default_factory=dict)
 
 
 def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:

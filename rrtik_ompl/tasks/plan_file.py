@@ -75,7 +75,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
         {
             "stage": stage_data(stage),
             **_world_data(world, folder),
-            "waypoints": path.waypoints.tolist(),
+            "waypoints": path.document()["waypoints"],
         }
         for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True)
     ]

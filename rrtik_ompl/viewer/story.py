@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
     robot = subject.robot
     return {
         "title": title,
-        "robot": None if robot is None else _robot(robot),
+        "robot": None if robot is None else _robot(robot, subject.tips),
         "obstacles": _obstacles(subject.scene),
         "moving": subject.run is not None or any(o.motion is not None for o in subject.scene.obstacles),
         "attached": [item.name for item in subject.scene.attached],
@@ -132,9 +133,8 @@ def grid_cell(size: float) -> float:
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= size / 15.0))
 
 
-def _robot(robot: Robot) -> dict[str, Any]:
-    tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
-    chain = robot.chain
+def _robot(robot: Robot, tips: Sequence[str]) -> dict[str, Any]:
+    chain, shown = robot.chain, [_tip(robot, name) for name in tips]
     return {
         "name": robot.name,
         "nodes": joint_nodes(robot),
@@ -144,11 +144,8 @@ def _robot(robot: Robot) -> dict[str, Any]:
         "prismatic": chain.prismatic.tolist(),
         "gain": _numbers(chain.gain),
         "offset": _numbers(chain.offset),
-        "tip": {
-            "name": robot.tip,
-            "joint": int(tip.parentJoint),
-            "placement": _numbers(tip.placement.homogeneous.ravel()),
-        },
+        "tip": _tip(robot, robot.tip),
+        "trails": shown,
         "joints": [
             {"name": name, "unit": shown_unit(slides)[1], "lower": _limit(low), "upper": _limit(high)}
             for name, slides, low, high in zip(
@@ -156,6 +153,11 @@ def _robot(robot: Robot) -> dict[str, Any]:
             )
         ],
     }
+
+
+def _tip(robot: Robot, name: str) -> dict[str, Any]:
+    tip = robot.model.frames[robot.model.getFrameId(name)]
+    return {"name": name, "joint": int(tip.parentJoint), "placement": _numbers(tip.placement.homogeneous.ravel())}
 
 
 def _ghosts(rows: Matrix | None) -> list[dict[str, Any]]:

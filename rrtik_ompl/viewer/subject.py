@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.goal import Goal, JointGoal, MultiGoal
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.robot import Robot
@@ -77,6 +77,13 @@ class Subject:
         wanted = self.ghosts is None and (self.is_path or self.goal is not None)
         start: Vector | None = self.waypoints[0] if wanted else None
         return start
+
+    @property
+    def tips(self) -> tuple[str, ...]:
+        """Links whose ways are drawn: those of a goal for several, or the robot's tip."""
+        if self.robot is None:
+            return ()
+        return tuple(self.goal.frames) if isinstance(self.goal, MultiGoal) else (self.robot.tip,)
 
     @property
     def end(self) -> Vector | None:

@@ -150,7 +150,8 @@ def test_the_effective_workspace_is_part_of_the_reach_and_never_in_the_vehicle(t
         inside = (x > left) & (x < right) & (y > low) & (y < high)
         assert not (each.values[inside] == 3.0).any() or each is top  # the top view passes below the vehicle
     plot_slices([side, top], tmp_path / "workspace.svg", title="titan4")
-    assert "straight ahead" in (tmp_path / "workspace.svg").read_text()
+    drawn = (tmp_path / "workspace.svg").read_text()
+    assert all(words in drawn for words in ("straight ahead", "in reach", "vehicle", "camera", "base of the arm"))
 
 
 def test_the_command_writes_a_map_a_picture_and_a_page(capsys, tmp_path):

@@ -69,6 +69,12 @@ def test_every_format_gives_back_the_same_numbers(tmp_path_factory, ending, rows
         assert again.joint_names == path.joint_names
 
 
+@pytest.mark.parametrize("ending", ["json", "csv", "txt"])
+def test_no_file_shows_a_zero_with_a_sign(tmp_path, ending):
+    JointPath(np.array([[-0.0, 1.0], [1.0, -0.0]])).save(tmp_path / f"path.{ending}")
+    assert "-0" not in (tmp_path / f"path.{ending}").read_text()
+
+
 def test_a_path_takes_the_names_of_the_robot_it_is_read_for(tmp_path, sdu_route):
     robot = load_robot("titan4")
     file = tmp_path / "path.txt"

@@ -44,3 +44,11 @@ def test_what_is_no_pose_is_refused_in_a_line(form):
     with pytest.raises(InputError, match=r"^here:") as caught:
         rigid(form, "here")
     assert "\n" not in str(caught.value)
+
+
+def test_pose_takes_every_form_that_a_person_may_write():
+    angles = rrtik.pose([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    assert angles.isApprox(rrtik.PoseGoal([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]).T_world_tip)
+    assert rrtik.pose(angles.homogeneous) == angles
+    with pytest.raises(InputError, match=r"pose: .*1e"):
+        rrtik.pose([0.0, 0.0, 1e30])

@@ -182,6 +182,8 @@ def test_the_ways_of_both_tips_are_drawn() -> None:
     left, right = (PositionGoal([1.5, y, 0.0]) for y in (0.4, -0.4))
     goal = MultiGoal({"left_grip_point": left, "right_grip_point": right})
     rows = two.posture("ready") + np.array([[0.0], [0.05]])
-    window, _ = draw(subject_of(Problem(World(two), rows[0], goal), rows))
+    subject = subject_of(Problem(World(two), rows[0], goal), rows)
+    assert subject.tips == ("left_grip_point", "right_grip_point")
+    window, _ = draw(subject)
     trails = [path for path in window.paths if path.startswith("/meshcat/trail/")]
     assert trails == ["/meshcat/trail/piece 0", "/meshcat/trail/piece 0/tip 2"]

@@ -77,6 +77,7 @@ CAMERAS = (
 )
 
 
+MEANINGS = {1.0: "in reach", 3.0: "and seen, clear of the vehicle, away from limits"}  # of values in slices
 ALL_SEEING = Camera(np.array([-50.0, 0.0, 0.0]), np.zeros(3), diagonal_deg=170.0, farthest=1e3)
 
 
@@ -167,7 +168,7 @@ def effective_slices(space: EffectiveWorkspace | None = None, *, cell: float = C
     low, high = used.vehicle
     return [
         Slice(
-            title=f"{title}: {effective.sum() * cell**2:.2f} m2 of {reachable.sum() * cell**2:.2f} m2",
+            title=f"{title}: {effective.sum() * cell**2:.2f} m² of {reachable.sum() * cell**2:.2f} m²",
             across="x [m]",
             up=up,
             x=x,
@@ -175,6 +176,7 @@ def effective_slices(space: EffectiveWorkspace | None = None, *, cell: float = C
             values=np.where(effective, 3.0, np.where(reachable, 1.0, 0.0)),
             boxes=((float(low[0]), float(low[k]), float(high[0]), float(high[k])),),
             points=tuple((float(camera.position[0]), float(camera.position[k])) for camera in used.cameras),
+            meanings=MEANINGS,
         )
         for title, up, other, k, reachable, effective in views
     ]

@@ -4,7 +4,7 @@ const GHOSTS_FIRST = 0.05;  // of the picture's size: so much nearer a ghost cou
 let selected = "goal";
 
 function tipFrame(q) {
-  return jointFrames(q)[robot.tip.joint].multiply(rowMajor(robot.tip.placement));
+  return carried(robot.tip, jointFrames(q));
 }
 
 /** Move the tip of an end by a shift [m] and a turn about z [rad], through inverse kinematics. */

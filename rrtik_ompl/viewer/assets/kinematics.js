@@ -17,10 +17,14 @@ function jointFrames(q) {
   return frames;
 }
 
+/** Pose in the world of a tip that is carried by one of the joint frames. */
+function carried(tip, frames) {
+  return frames[tip.joint].clone().multiply(rowMajor(tip.placement));
+}
+
 /** Position of the tip in the world [m]. */
 function tipPosition(q) {
-  const frame = jointFrames(q)[robot.tip.joint].multiply(rowMajor(robot.tip.placement));
-  return new THREE.Vector3().setFromMatrixPosition(frame);
+  return new THREE.Vector3().setFromMatrixPosition(carried(robot.tip, jointFrames(q)));
 }
 
 function rowMajor(numbers) {

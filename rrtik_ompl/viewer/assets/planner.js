@@ -67,9 +67,12 @@ function drawTrail(rows) {
     piece.name = `piece ${k - 1}`;
     const turn = Math.max(...rows[k].map((value, j) => Math.abs(value - rows[k - 1][j])));
     const steps = Math.min(Math.max(Math.ceil(turn / 0.06), 1), 60);
-    const points = Array.from({ length: steps + 1 }, (_, s) => tipPosition(rows[k - 1].map((a, j) => a + ((rows[k][j] - a) * s) / steps)).toArray());
-    const apart = points.filter((point, s) => s === 0 || Math.hypot(...point.map((x, i) => x - points[s - 1][i])) > 1e-6);
-    if (apart.length > 1) piece.add(lineMesh(apart, story.colors.trail, 0.0025 * size));
+    const frames = Array.from({ length: steps + 1 }, (_, s) => jointFrames(rows[k - 1].map((a, j) => a + ((rows[k][j] - a) * s) / steps)));
+    for (const tip of robot.trails) {
+      const points = frames.map((each) => new THREE.Vector3().setFromMatrixPosition(carried(tip, each)).toArray());
+      const apart = points.filter((point, s) => s === 0 || Math.hypot(...point.map((x, i) => x - points[s - 1][i])) > 1e-6);
+      if (apart.length > 1) piece.add(lineMesh(apart, story.colors.trail, 0.0025 * size));
+    }
     trail.add(piece);
   }
   viewer.delete_path([...ROOT, "trail"]);
