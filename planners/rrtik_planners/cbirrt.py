@@ -16,7 +16,7 @@ from rrtik_ompl.fast.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ik.held_tables import HeldTables, held_tables
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
-from rrtik_ompl.world.motion_queries import has_kernels, is_conservative, keeps_constraints
+from rrtik_ompl.world.motion_queries import decider, has_kernels, keeps_constraints
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree
 from rrtik_planners.one_joint_options import iteration_limit
 
@@ -87,7 +87,7 @@ class CBiRRT(SafePlanner):
     ) -> SearchResult:
         lower, upper = self._box(motions)
         search = ConstrainedSearch(motions, tables.address, lower, upper, range_=self.range)
-        ask = None if is_conservative(self._world) else checker.motion_valid_batch
+        ask = decider(self._world, checker.motion_valid_batch)
         limit = NO_LIMIT if self.max_iterations is None else self.max_iterations
         seed, first = self.rng.bit_generator.random_raw(), min(limit, PLAIN_SAMPLES)
         path = search.solve(starts, goals, seed, ask=ask, stop=ptc, max_iterations=first)

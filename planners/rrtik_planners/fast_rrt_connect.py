@@ -18,7 +18,7 @@ from rrtik_ompl.fast.tables.memory import Table
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.inspection.graph import Tree, without
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
-from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels, is_conservative
+from rrtik_ompl.world.motion_queries import KernelWorld, decider, has_kernels
 from rrtik_planners.one_joint_options import iteration_limit
 
 
@@ -91,7 +91,7 @@ class FastRRTConnect(SafePlanner):
                 starts,
                 goals,
                 self.rng.bit_generator.random_raw(),
-                ask=None if is_conservative(world) else checker.motion_valid_batch,
+                ask=decider(world, checker.motion_valid_batch),
                 stop=ptc,
                 max_iterations=max_iterations,
                 bound=bound,

@@ -161,7 +161,9 @@ def _message(error: ErrorDetails) -> str:
 def _unknown_kind(error: ErrorDetails) -> str:
     """What stands where a key should tell the kind, and which key may be meant."""
     data, kinds = error["input"], error["msg"].partition(_ONE_OF)[2].split(", ")
-    near = [close for key in data for close in get_close_matches(str(key), kinds, n=1)] if isinstance(data, dict) else []
+    near = (
+        [close for key in data for close in get_close_matches(str(key), kinds, n=1)] if isinstance(data, dict) else []
+    )
     return f"; found {describe(data)}" + (f"; did you mean '{near[0]}'?" if near else "")
 
 

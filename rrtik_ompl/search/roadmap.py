@@ -22,7 +22,7 @@ from rrtik_ompl.problem import usable_configurations
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.search.roadmap_in_python import PythonGraph
 from rrtik_ompl.world import World
-from rrtik_ompl.world.motion_queries import MotionQueries, Stop, has_kernels, is_conservative
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop, decider, has_kernels
 
 VERTICES = 2000
 NEAR = 10
@@ -86,7 +86,7 @@ def graph_in(
     """An empty roadmap in a box of a world: in kernels where it has some; ``checks`` answers what these do not."""
     if not has_kernels(world, KERNELS):
         return PythonGraph(lower, upper, near=near, seed=seed, valid=checks.valid, motion_free=checks.motion_valid)
-    ask = None if is_conservative(world) else checks.motion_valid_batch
+    ask = decider(world, checks.motion_valid_batch)
     lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)
     return KernelGraph(world.motions, lower, upper, near=near, seed=seed, ask=ask)
 

@@ -13,7 +13,7 @@ from rrtik_ompl.ik.held_tables import held_tables
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening.task import Task
 from rrtik_ompl.transitions import route_length
-from rrtik_ompl.world.motion_queries import HoldingQueries, is_conservative, keeps_constraints
+from rrtik_ompl.world.motion_queries import HoldingQueries, decider, keeps_constraints
 
 TRIES = 200  # where there is no end to the time
 PATIENCE = 40  # tries without gain that end the work
@@ -33,7 +33,7 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
         return route
     lower, upper = _box(world, route)
     search = ConstrainedSearch(motions, tables.address, lower, upper)
-    ask = None if is_conservative(world) else world.motion_valid_batch
+    ask = decider(world, world.motion_valid_batch)
     rng, failures = np.random.default_rng(task.seed), 0
     pair = (0, len(route) - 1)
     for _ in range(TRIES):

@@ -13,7 +13,7 @@ from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.shortening.task import Task
 from rrtik_ompl.transitions import without_repeats
-from rrtik_ompl.world.motion_queries import is_conservative
+from rrtik_ompl.world.motion_queries import decider
 
 TRIES = 400  # where there is no end to the time
 PATIENCE = 2000  # tries without gain that end the search where there is one
@@ -43,7 +43,7 @@ def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) ->
 
 
 def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: float, asking: bool) -> ShortcutSearch:
-    """A search in the kernels of a task's world, which must have them; a conservative one checks nothing itself."""
+    """A search in the kernels of a task's world, which must have them; it asks where the world decides anything."""
     world = task.kernel_world
     assert world is not None
     return ShortcutSearch(
@@ -52,7 +52,7 @@ def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: f
         seed=seed,
         share=share,
         pull=pull,
-        asking=asking and not is_conservative(world),
+        asking=asking and decider(world, task.free_batch) is not None,
     )
 
 

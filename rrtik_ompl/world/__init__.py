@@ -39,8 +39,8 @@ class World:
     """Exact collision checks of a robot in a scene, for one thread at a time.
 
     Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
-    (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal: what the kernels cannot prove free is
-    refused.
+    (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal: what kernels cannot prove
+    free, by outer balls or convex solids, is refused.
 
     Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
     no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
@@ -102,6 +102,8 @@ class World:
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
         self._always_colliding = always = fixed_contact(robot, self.bodies, standing) is not None
         self.prover = Prover(robot, self.bodies, moving, self_margin=own, always_colliding=always)
+
+    resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
 
     def __repr__(self) -> str:
         return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"

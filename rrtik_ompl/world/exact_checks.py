@@ -35,7 +35,7 @@ class ExactChecker:
 
     Attributes:
         fast: The same pairs for the kernels.
-        conservative: Whether nothing falls back to coal: doubtful configurations then count as colliding.
+        conservative: Whether nothing falls back to coal: what kernels leave undecided then counts as colliding.
 
     Args:
         robot: The arm.
@@ -72,7 +72,7 @@ class ExactChecker:
 
     def free(self, rows: Matrix) -> Mask:
         """Which rows, shape (m, dof), are free of collision. Shape (m,)."""
-        answers = self.fast.classify(self._robot.joint_values(rows), resolve=not self.conservative)
+        answers = self.fast.classify(self._robot.joint_values(rows))
         free: Mask = answers == FREE
         if not self.conservative and not free.all():
             undecided = rows[answers == UNDECIDED]
@@ -85,7 +85,7 @@ class ExactChecker:
     def motions_free(self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64]) -> Mask:
         """Which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,)."""
         sides = self._robot.joint_values(starts), self._robot.joint_values(ends)
-        answers = self.fast.classify_edges(*sides, steps, resolve=not self.conservative)
+        answers = self.fast.classify_edges(*sides, steps)
         free: Mask = answers == FREE
         if not self.conservative:
             for k in np.flatnonzero(answers == UNDECIDED):

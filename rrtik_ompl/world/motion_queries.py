@@ -130,6 +130,23 @@ def is_conservative(world: object) -> bool:
     return bool(getattr(world, "accuracy", "exact") == "conservative")
 
 
+def decider(world: object, ask: MotionsFree) -> MotionsFree | None:
+    """Who decides the motions that kernels leave undecided; None if they are left at what outer balls say.
+
+    Args:
+        world: Any.
+        ask: Decides them in an exact world. A conservative `World` compares solids too, and refuses what they leave.
+    """
+    if not is_conservative(world):
+        return ask
+    return _none_free if getattr(world, "resolves", False) else None
+
+
+def _none_free(starts: Matrix, ends: Matrix) -> Mask:
+    del ends
+    return np.zeros(len(starts), dtype=bool)
+
+
 def keeps_constraints(world: object) -> TypeGuard[HoldingQueries]:
     """Whether motions in a world also have to keep path constraints."""
     return getattr(world, "constraints", None) is not None

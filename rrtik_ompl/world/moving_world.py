@@ -52,6 +52,7 @@ class MovingWorld:
     """
 
     accuracy: Accuracy = "conservative"
+    resolves = False  # outer balls alone: a repair has a fixed share of a tick
 
     def __init__(
         self, world: World, *, moving: Sequence[str] | None = None, copies: int = 1, self_collision: bool = True

@@ -92,9 +92,10 @@ def test_a_conservative_world_calls_nothing_free_that_is_not(name, dented_cube):
     Q = short_sweeps(world, rng, 400)
     exact, careful = world.valid_batch(Q), world.with_accuracy("conservative").valid_batch(Q)
     assert not (careful & ~exact).any()
-    assert 0.8 * exact.sum() < careful.sum() < exact.sum()
     covered = world.fast.classify(robot.joint_values(Q), resolve=False) == FREE
-    np.testing.assert_array_equal(careful, covered)
+    assert covered.sum() < careful.sum() <= exact.sum()
+    assert careful.sum() > 0.95 * exact.sum()
+    assert not (covered & ~careful).any()
 
 
 @pytest.mark.slow

@@ -9,6 +9,8 @@ import pytest
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.collision.contacts import measured
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.fast import FREE
+from rrtik_ompl.fast.search.motions.motion_table import step_counts
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, HalfSpace, Prism, Sphere
 from rrtik_ompl.world import World
@@ -36,9 +38,13 @@ def test_a_moved_world_answers_as_a_new_one():
     ends = np.clip(rows + 0.2 * rng.normal(size=rows.shape), robot.lower, robot.upper)
     for scene in scenes[1:]:
         moving.move(scene)
-        fresh = World(robot, scene, accuracy="conservative")
-        assert (moving.valid_batch(rows) == fresh.valid_batch(rows)).all()
-        assert (moving.motion_valid_batch(rows, ends) == fresh.motion_valid_batch(rows, ends)).all()
+        fresh, values = World(robot, scene), robot.joint_values
+        steps = step_counts(rows, ends, fresh.weights, fresh.motion_resolution)
+        here = fresh.fast.classify(values(rows), resolve=False) == FREE
+        way = fresh.fast.classify_edges(values(rows), values(ends), steps, resolve=False) == FREE
+        assert (moving.valid_batch(rows) == here).all()
+        assert (moving.motion_valid_batch(rows, ends) == way).all()
+        assert not (here & ~fresh.with_accuracy("conservative").valid_batch(rows)).any()
         assert 0.0 < moving.valid_batch(rows).mean() < 1.0
 
 

@@ -161,8 +161,8 @@ class MotionSource(Protocol):
     motion_resolution: float
 
     @property
-    def accuracy(self) -> str:
-        """Whether doubtful motions are resolved: "exact" or "conservative"."""
+    def resolves(self) -> bool:
+        """Whether motions that outer balls leave in doubt are resolved."""
 
     @property
     def fast(self) -> FastWorld | None:
@@ -176,7 +176,7 @@ def motions_of(world: MotionSource, tables: dict[bool, FastMotions]) -> FastMoti
         world: The world.
         tables: Those that are kept, by whether doubtful motions are resolved.
     """
-    fast, resolve = world.fast, world.accuracy == "exact"
+    fast, resolve = world.fast, world.resolves
     if fast is None:
         return None
     kept, resolution = tables.get(resolve), world.motion_resolution
