@@ -17,6 +17,7 @@ from rrtik_ompl.files.text import check_target, comma_numbers
 if TYPE_CHECKING:
     from rrtik_ompl.arrays import Matrix, Vector
     from rrtik_ompl.goal import Goal, TipGoal
+    from rrtik_ompl.problem import Problem
     from rrtik_ompl.robot import Robot
     from rrtik_ompl.world import World
 
@@ -238,7 +239,7 @@ def _many(
 
 
 def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
-    """The page: the first solution as the arm and the others as ghosts, or the arm moving through all of them."""
+    """The page: one solution as a goal to drag, several as ghosts, or the arm moving through all of them."""
     if output.html is None:
         if not output.as_json and not output.as_csv:
             suggest("see it: --html ik.html", *(["every solution: --all"] if len(q) == 1 else []))
@@ -248,14 +249,32 @@ def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, mo
     from rrtik_ompl.viewer.subject import Shown
 
     shown = Shown(given.robot, Scene() if given.world is None else given.world.scene, goal, q[0])
+    name = given.robot.name
+    question = _question(given, q[0]) if len(q) == 1 else None
     with progress("drawing"):
-        if moving and len(q) > 1:
-            view(shown, q, html=output.html, title=f"{given.robot.name}: trajectory of {count(len(q), 'point')}")
+        if question is not None:
+            view(question, html=output.html, title=f"{name}: drag the goal, the joints follow")
+        elif moving and len(q) > 1:
+            view(shown, q, html=output.html, title=f"{name}: trajectory of {count(len(q), 'point')}")
         else:
-            view(shown, ghosts=q, html=output.html, title=f"{given.robot.name}: {count(len(q), 'solution')}")
+            view(shown, ghosts=q, html=output.html, title=f"{name}: {count(len(q), 'solution')}")
     if not output.as_json and not output.as_csv:
         say(f"wrote {output.html}")
         suggest(f"open {output.html}")
+
+
+def _question(given: Setting, q: Vector) -> Problem | None:
+    """A problem from the given posture to a solution, whose page plans; None where a page could not begin."""
+    import numpy as np
+
+    from rrtik_ompl import Problem, World
+
+    if not given.robot.collision.geometryObjects:
+        return None
+    world = World(given.robot) if given.world is None else given.world
+    start = given.robot.clamp(np.zeros(given.robot.dof)) if given.near is None else given.near
+    free = world.valid_batch(np.stack([start, q]))
+    return Problem(world, start if free[0] else q, q, name=given.robot.name) if free[1] else None
 
 
 def _more(rows: int) -> list[str]:

@@ -42,6 +42,7 @@ PLANNING = (
     "moves.js",
     "shapes.js",
     "saving.js",
+    "opening.js",
     "opinion.js",
     "planner.js",
     "dragging.js",

@@ -39,8 +39,7 @@ class World:
     """Exact collision checks of a robot in a scene, for one thread at a time.
 
     Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
-    (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal: what kernels cannot prove
-    free, by outer balls or convex solids, is refused.
+    (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal and refuses what they cannot prove.
 
     Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
     no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
@@ -83,9 +82,8 @@ class World:
         require(self.scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
         self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))
         if self.motion_resolution < FINEST_RESOLUTION:
-            raise InputError(
-                f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {self.motion_resolution:g}"
-            )
+            least = f"{FINEST_RESOLUTION:g} metres or more"
+            raise InputError(f"motion_resolution must be {least}, got {self.motion_resolution:g}")
         if not robot.collision.geometryObjects:
             message = f"robot '{robot.name}' has no collision geometry: every configuration counts as free"
             warnings.warn(MeshWarning(message), stacklevel=2)

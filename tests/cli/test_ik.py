@@ -176,6 +176,15 @@ def test_a_page_shows_every_solution_as_a_ghost(capsys, tmp_path):
     assert story["goal"] == "tip pose"
 
 
+def test_the_page_of_one_solution_plans_to_it(capsys, tmp_path):
+    page = tmp_path / "ik.html"
+    asked = rrtik(capsys, "ik", "titan4", "--position", 1.2, 0.3, 0.2, "--html", page)
+    found = json.loads(rrtik(capsys, "ik", "titan4", "--position", 1.2, 0.3, 0.2, "--json")[1])
+    story = json.loads(page.read_text().split('id="story"', 1)[1].split(">", 1)[1].split("</script>", 1)[0])
+    assert asked[0] == 0
+    np.testing.assert_allclose(story["plan"]["goal"], found["solutions"][0], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -12,6 +12,7 @@ import umsgpack
 
 from rrtik_ompl.viewer.drawing.nodes import Recording
 from rrtik_ompl.viewer.drawing.objects import (
+    GRAIN,
     BoxGeometry,
     CylinderGeometry,
     Material,
@@ -20,7 +21,7 @@ from rrtik_ompl.viewer.drawing.objects import (
 )
 
 RNG = np.random.default_rng(1)
-CORNERS, FACES = RNG.normal(size=(5, 3)), np.array([[0, 1, 2], [2, 3, 4]])
+CORNERS, FACES = np.round(RNG.normal(size=(5, 3)) / GRAIN) * GRAIN, np.array([[0, 1, 2], [2, 3, 4]])
 GEOMETRIES = {
     "sphere": (SphereGeometry(0.3), mg.Sphere(0.3)),
     "cylinder": (CylinderGeometry(0.5, 0.2, 0.2), mg.Cylinder(0.5, 0.2)),

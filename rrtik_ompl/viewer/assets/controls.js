@@ -147,7 +147,8 @@ function wireControls() {
     return download("path.json", pathText());
   });
   on("plan-save-problem", "click", () => download("problem.yaml", problemText()));
-  document.getElementById("plan-save-problem").hidden = planning.problem === null;
+  for (const id of ["plan-save-problem", "plan-open", "plan-typing"]) document.getElementById(id).hidden = planning.problem === null;
+  if (planning.problem !== null) wireOpening();
   pane.addEventListener("pointerdown", startDrag, true);
   pane.addEventListener("pointermove", goOnDragging, true);
   pane.addEventListener("pointerup", endDrag, true);

@@ -18,6 +18,7 @@ from rrtik_ompl.shapes.surfaces import Faces
 
 BOTH_SIDES = 2  # three.js's DoubleSide
 IDENTITY = np.eye(4).ravel().tolist()
+GRAIN = 2.0**-14  # [m], to which corners of triangles are rounded: the zeros that follow take no room
 FLOATS, INDICES = ("Float32Array", 0x17), ("Uint32Array", 0x16)  # meshcat's numbers of msgpack extensions
 
 
@@ -73,7 +74,8 @@ class TriangleGeometry:
 
     def described(self) -> dict[str, Any]:
         """Its kind, corners and triangles."""
-        position = _packed(np.asarray(self.vertices, dtype=np.float32), FLOATS)
+        corners = np.round(np.asarray(self.vertices, dtype=np.float64) / GRAIN) * GRAIN
+        position = _packed(corners.astype(np.float32), FLOATS)
         index = _packed(np.asarray(self.faces, dtype=np.uint32), INDICES)
         return {"type": "BufferGeometry", "data": {"attributes": {"position": position}, "index": index}}
 

@@ -18,7 +18,7 @@ from rrtik_ompl.viewer.drawing.meshes import Look, look_of_coal, look_of_shape, 
 from rrtik_ompl.viewer.drawing.nodes import Node
 from rrtik_ompl.viewer.drawing.objects import Material
 
-ROBOT_TRIANGLES = 100_000  # drawn for the whole arm at most; its meshes are thinned out above that
+ROBOT_TRIANGLES = 40_000  # drawn for the whole arm at most; its meshes are thinned out above that
 GHOST_TRIANGLES = 15_000  # of each ghost
 
 
