@@ -124,6 +124,11 @@ class VisualServo:
         self._goal: pin.SE3 | None = None
         self._unseen = 0.0
 
+    def go_on_with(self, servo: Servo) -> None:
+        """Take another servo for the same target, where the world has changed; what was seen is not forgotten."""
+        require(servo, Servo, "servo")
+        self._servo = servo
+
     def step(self, q: ArrayLike, seen: ArrayLike | pin.SE3 | None, dt: float) -> ServoStep:
         """Rates for a time step.
 

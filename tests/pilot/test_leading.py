@@ -79,6 +79,18 @@ def test_servoing_stops_when_the_target_is_out_of_view_and_begins_only_near_it()
     assert not far.driving
 
 
+def test_servoing_stops_when_the_target_jumps():
+    made, arm, time = at_the_valve()
+    for k, aside in enumerate((0.01, 0.012, 0.06)):
+        time += 0.03
+        made.see([seen_at(PLACE * pose([aside, 0.0, 0.0]))], time)
+        said = made.command("servo", time, press=92)
+        assert ("has jumped" in said) == (k == 2), said
+        arm.advance(0.03)
+        made.tick(time)
+    assert not made.driving
+
+
 def with_master(q):
     arm, master = SimulatedArm(ROBOT, PROBLEM.start), SimulatedArm(ROBOT, q)
     made = Session(PROBLEM, arm, seed=1, master=master)

@@ -81,10 +81,12 @@ class Leading:
                 raise InputError(
                     f"the grasp is {far}; servoing is for the last {100 * NEAR:.0f} cm: plan a route first"
                 )
-            self._world = None
-        if world is not self._world or self._visual is None:  # something has moved
-            self._visual = VisualServo(Servo(world), session.robot)
-            self._world, self._before = world, session.time - LEASH_SECONDS
+            self._visual, self._before = None, session.time - LEASH_SECONDS
+        if self._visual is None:
+            self._visual, self._world = VisualServo(Servo(world), session.robot), world
+        if world is not self._world:  # something has moved
+            self._visual.go_on_with(Servo(world))
+            self._world = world
         seconds = float(np.clip(session.time - self._before, 1e-3, MAX_STEP_SECONDS))
         self._before = session.time
         step = self._visual.step(session.q, goal if session.unseen(session.target) == 0.0 else None, seconds)
