@@ -69,7 +69,7 @@ def triangles(quick: bool) -> list[Row]:
         judged("the same, told how fast triangles are", "not in the print", f"{bounded} of {count}", bounded / count,
                all_of(), f"speed_bound {FASTEST:g}: the robot keeps as far as they come in a tick"),
         judged("ticks with a free path while things move, for which there is no branch", "none, by implication",
-               f"{idle:.0%} of the ticks", idle, Bar((0.0, 1.0), held=(0.0, 0.0), refuted=(0.0, 1.0)),
+               f"{idle:.0%} of the ticks", float(idle), Bar((0.0, 1.0), held=(0.0, 0.0), refuted=(0.0, 1.0)),
                "to the letter the robot stands still in them; treated as if nothing had moved"),
     ]  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import astuple
 
 import numpy as np
@@ -46,7 +47,7 @@ def environment_e(quick: bool) -> list[Row]:
     return [*rows, *_ratios(means, printed)]
 
 
-def _ratios(means: dict[str, list[float]], printed: dict[str, tuple[float, ...]]) -> list[Row]:
+def _ratios(means: dict[str, list[float]], printed: Mapping[str, tuple[float, ...]]) -> list[Row]:
     """C-RDT over RRT: both are claimed to be below 1."""
     rows = []
     for k, lowest in ((0, 0.25), (2, 0.7)):
