@@ -72,13 +72,13 @@ def by_arc_tangent(branches: Matrix) -> Matrix:
 
 def printed_routes(joints: int, grid: int, edges: int) -> int:
     """The count of single-joint routes of (6.1)."""
-    return int(factorial(edges) * factorial(joints * grid) // factorial(grid) ** joints
+    return int(factorial(edges) * factorial(joints * grid) // factorial(grid) ** joints)
 
 
 def listed_routes(joints: int, grid: int, edges: int) -> int:
     """The same by listing: the orders of the unit steps of an edge, for each edge, in the order of the edges."""
     orders = set(permutations([joint for joint in range(joints) for _ in range(grid)]))
-    return int(len(orders) ** edges
+    return int(len(orders) ** edges)
 
 
 def undefined(route: Matrix) -> int:
