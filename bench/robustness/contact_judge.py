@@ -200,9 +200,9 @@ def _gap(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, k
     return _by_coal(first, first_pose, second, second_pose, kept)
 
 
-def _order(ends: tuple[Part, pin.SE3, Part, pin.SE3]) -> bool:
-    """Half-spaces come first: what is below them is easier to say than what is near them."""
-    return not isinstance(ends[0].shape, HalfSpace)
+def _order(ends: tuple[Part, pin.SE3, Part, pin.SE3]) -> int:
+    """Half-spaces come first, then clouds: nothing here measures how far a point is from them."""
+    return next((k for k, kind in enumerate((HalfSpace, PointCloud)) if isinstance(ends[0].shape, kind)), 2)
 
 
 def _cloud_gap(cloud: PointCloud, between: pin.SE3, other: Part) -> float:
