@@ -15,6 +15,7 @@ from rrtik_ompl.shapes.shape import Shape
 from rrtik_ompl.shapes.surfaces import Triangles
 
 MOST_TRIANGLES = 5_000_000
+SAME_DIGITS = 12  # of metres; vertices that differ less differ by rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,11 +84,23 @@ class Mesh(Shape):
 
 
 def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
-    """Merge equal vertices (STL repeats them per triangle) and drop triangles that collapse to a line or a point."""
-    unique, index = np.unique(points, axis=0, return_inverse=True)
-    merged = np.asarray(index).reshape(-1)[faces]
+    """Merge equal vertices (STL repeats them per triangle) and drop triangles that collapse to a line or a point.
+
+    Where vertices differ by rounding alone, those are merged too: coal takes a ball for one that touches the sliver
+    between them, wherever it is.
+    """
+    unique, merged = _merged(points, points, faces)
+    sides = unique[merged] - unique[np.roll(merged, 1, axis=1)]
+    if (np.abs(sides).max(axis=2) < 10.0**-SAME_DIGITS).any():
+        unique, merged = _merged(np.round(unique, SAME_DIGITS) + 0.0, unique, merged)
     a, b, c = (unique[merged[:, k]] for k in range(3))
     return unique, merged[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.0]
+
+
+def _merged(keys: Matrix, points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
+    """One point for all of the same key, and the faces of those."""
+    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return points[first], np.asarray(index).reshape(-1)[faces]
 
 
 def _open_edges(faces: NDArray[np.int64]) -> int:
