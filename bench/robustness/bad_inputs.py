@@ -55,6 +55,7 @@ GOOD: dict[tuple[str, ...], tuple[str, ...]] = {
 }
 NO_NUMBERS = {int: ("x", "", "1.5", "nan", "1e3", "0x10"), float: ("x", "", "nan", "inf", "-inf", "1e999", "1,5")}
 NO_NAMES = ("nowhere/none.xyz", "\ud800", "\x00")
+NO_FOLDER = "suite.yaml/none"  # where a folder would be made
 ANY_TEXT = {"--token", "--grasp"}  # a word as good as any other
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
 
@@ -85,18 +86,20 @@ def _of_commands() -> Iterator[BadInput]:
                 yield BadInput({}, (*good, f"{option}=maybe"))
                 continue
             yield BadInput({}, (*good, option))
-            for value in _no_values(option, parameter):
+            for value in _no_values(name, option, parameter):
                 yield BadInput({}, (*good, option, *[value] * parameter.nargs))
         if any(parameter.required for parameter in parameters):
             yield BadInput({}, name)
         yield BadInput({}, (*good, *["one too many"] * 3))
 
 
-def _no_values(option: str, parameter: Any) -> tuple[str, ...]:
+def _no_values(name: tuple[str, ...], option: str, parameter: Any) -> tuple[str, ...]:
     kind = parameter.bare_type()
     if kind in NO_NUMBERS:
         return NO_NUMBERS[kind]
-    return () if option in ANY_TEXT else NO_NAMES
+    if option in ANY_TEXT:
+        return ()
+    return (NO_FOLDER, *NO_NAMES[1:]) if name == ("bench",) and option == "--out" else NO_NAMES
 
 
 def _of_files() -> Iterator[BadInput]:

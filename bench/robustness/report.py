@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import gc
+import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -78,10 +79,15 @@ def main() -> int:
     add_options(parser, PAGE)
     for name, usual in SIZES.items():
         parser.add_argument(f"--{name}", type=int, default=usual)
+    parser.add_argument(
+        "--works", nargs="+", choices=list(WORK), default=list(WORK), help="long work that is disturbed"
+    )
     given = parser.parse_args()
     command = " ".join(
         f"--{name} {getattr(given, name)}" for name in ("calls", "messages", "faults", "plans", "pages", "bad")
     )
+    if given.works != list(WORK):
+        command += f" --works {' '.join(map(shlex.quote, given.works))}"
     report = Report("Nothing breaks it", f"python bench/robustness/report.py {command}", processes(given.jobs))
     report.intro = (
         "Wanted are 1,000,000 calls, 10,000 messages to each server, 2,000 kills and interrupts, 20,000 plans and "
@@ -91,7 +97,7 @@ def main() -> int:
         _calls(report, parts(calls, _blocks(given.calls, CALLS)), given.calls)
         _bad_inputs(report, parts(bad, _blocks(given.bad, INPUTS)), given.bad)
         _peers(report, parts, given.messages)
-        _faults(report, parts, given.faults)
+        _faults(report, parts, given.faults, given.works)
         for what, count in (("plans", given.plans), ("pages", given.pages)):
             _memory(report, what, count, parts(memory, [(what, count)])[0])
     return report.finish(given.out)
@@ -127,9 +133,9 @@ def _peers(report: Report, parts: Parts, count: int) -> None:
     report.table("Mutating peers", ["peer", "rule", "messages", "broken"], rows, text=_listed(wrong))
 
 
-def _faults(report: Report, parts: Parts, count: int) -> None:
+def _faults(report: Report, parts: Parts, count: int, works: Sequence[str]) -> None:
     rows, wrong, whole = [], list[str](), 0
-    for work in WORK:
+    for work in works:
         counts = []
         for kind in faults.KINDS:
             n = 1 if kind == "clock" else count
