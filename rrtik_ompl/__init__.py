@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.planning import Plan as Plan
     from rrtik_ompl.planning import list_planners as list_planners
     from rrtik_ompl.planning import plan as plan
+    from rrtik_ompl.planning.many import plan_many as plan_many
     from rrtik_ompl.plots.joints import plot_joints as plot_joints
     from rrtik_ompl.poses import pose as pose
     from rrtik_ompl.problem import Problem as Problem
@@ -152,6 +153,7 @@ else:
         "moves.staircase": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),
         "planning": ("Plan", "list_planners", "plan"),
+        "planning.many": ("plan_many",),
         "plots.joints": ("plot_joints",),
         "poses": ("pose",),
         "problem": ("Problem",),

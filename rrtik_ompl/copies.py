@@ -1,11 +1,12 @@
-"""Copies of objects and views of them: variants that share most, copies for other processes, lines, pictures."""
+"""Copies of objects and views of them: variants that share most, copies for other threads and processes, lines."""
 
 from __future__ import annotations
 
 import sys
+import threading
 from dataclasses import fields, is_dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Thing = TypeVar("Thing")
+Kept = TypeVar("Kept", bound="ForThread")
 MOST_SHOWN = 8  # numbers of an array, or items of a tuple, in one line
 LONGEST_TEXT = 100  # letters of an item in one line
 
@@ -125,3 +127,48 @@ def in_notebook(thing: object) -> str | None:
     package: Any = sys.modules[__package__]
     drawn: str | None = package.html_of(thing)
     return drawn
+
+
+class ForThread(Protocol):
+    """What is not for two threads at a time, but can be had again."""
+
+    def for_thread(self) -> Any:
+        """The same for another thread."""
+
+
+class _Cell(threading.local):
+    """A value of the thread that has made it, and what other threads have in its place once they ask."""
+
+    def __init__(self, value: ForThread, maker: int) -> None:
+        self.value: Any = value if threading.get_ident() == maker else value.for_thread()
+
+
+class ThreadOwn(Generic[Kept]):
+    """An attribute of what several threads may use: the value that was set, or in other threads its like for them.
+
+    Example:
+        >>> class World:
+        ...     checks: ThreadOwn[Checks] = ThreadOwn()
+    """
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, thing: None, kind: type) -> ThreadOwn[Kept]: ...
+    @overload
+    def __get__(self, thing: object, kind: type) -> Kept: ...
+    def __get__(self, thing: object, kind: type) -> Any:
+        """The value of this thread; it ends with the thread."""
+        return self if thing is None else vars(thing)[self._name].value
+
+    def __set__(self, thing: object, value: Kept) -> None:
+        vars(thing)[self._name] = _Cell(value, threading.get_ident())
+
+
+class KeptHere(dict[Any, Any]):
+    """What is kept from one call to the next by this thread; other threads begin with nothing."""
+
+    def for_thread(self) -> KeptHere:
+        """Nothing."""
+        return KeptHere()

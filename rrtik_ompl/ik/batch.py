@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,8 +21,11 @@ from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
 from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, mid_range_configuration, solve_ik
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.threads import cores, in_threads
 from rrtik_ompl.world import World
 from rrtik_ompl.world.check_world import check_world
+
+LEAST_SHARE = 256  # poses of a thread: fewer take less time than it does to begin one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +65,7 @@ def solve_ik_batch(
     world: World | None = None,
     seconds: float = SECONDS,
     seed: int = 0,
+    threads: int | None = None,
 ) -> IkBatch:
     """For each pose a solution inside the limits and, if a world is given, free of collision.
 
@@ -72,6 +77,7 @@ def solve_ik_batch(
         world: If given, solutions in collision are left out. Its robot must be this one.
         seconds: For each pose that has no closed-form solution.
         seed: Of the random numbers.
+        threads: That share the poses; as many as there are cores if None. The solutions do not depend on it.
 
     Raises:
         UnknownNameError: If there is no such method.
@@ -85,27 +91,46 @@ def solve_ik_batch(
     """
     check_world(world, robot)
     load_kernels(robot)
-    begin = time.monotonic()
     targets = finite_array(poses, (None, 4, 4), "poses")
     posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
     limit, first_seed = not_negative(seconds, "seconds"), whole_number(seed, "seed")
+    count = cores() if threads is None else whole_number(threads, "threads", 1)
+    check_poses(targets, "poses")
+    share = max(LEAST_SHARE, -(-len(targets) // count))
+    how = partial(_solved, robot, targets, method, posture, world, limit, first_seed)
+    found = in_threads(how, [slice(k, k + share) for k in range(0, max(len(targets), 1), share)], count)
+    q, residuals = (np.concatenate([each[k] for each in found]) for k in (0, 1))
+    reasons, details = (tuple(line for each in found for line in each[k]) for k in (2, 3))
+    return IkBatch(frozen(q), frozen(~np.isnan(q[:, 0]), bool), frozen(residuals), reasons, details)
+
+
+def _solved(
+    robot: Robot,
+    poses: NDArray[np.float64],
+    asked: IkMethod,
+    near: Vector,
+    world: World | None,
+    seconds: float,
+    seed: int,
+    part: slice,
+) -> tuple[Matrix, Matrix, list[str], list[str]]:
+    """The answers for a part of the poses: q, residuals, reasons and details of an :class:`IkBatch`."""
+    begin, method, targets = time.monotonic(), asked, poses[part]
     q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
     reasons, details = [""] * len(targets), [""] * len(targets)
-    check_poses(targets, "poses")
-    asked = method
     if len(targets):
-        method = chosen_method(robot, (PoseGoal(targets[0]),), method)
+        method = chosen_method(robot, (PoseGoal(targets[0]),), asked)
     if method == "closed-form" and form_of(robot).kind == "pose":
-        _by_closed_form(robot, targets, posture, world, q, residuals)
+        _by_closed_form(robot, targets, near, world, q, residuals)
     elif method == "numeric":
-        _by_search(robot, targets, posture, world, begin + limit * len(targets), q, residuals)
-    for k in np.flatnonzero(np.isnan(q[:, 0])):
-        goal = PoseGoal(targets[k])
-        result = solve_ik(robot, goal, method=asked, near=posture, world=world, seconds=limit, seed=first_seed + int(k))
+        _by_search(robot, targets, near, world, begin + seconds * len(targets), q, residuals)
+    for k in np.flatnonzero(np.isnan(q[:, 0])).tolist():
+        goal, own = PoseGoal(targets[k]), seed + part.start + k
+        result = solve_ik(robot, goal, method=asked, near=near, world=world, seconds=seconds, seed=own)
         reasons[k], details[k] = result.reason, result.detail
         if result.found:
             q[k], residuals[k] = result.solutions[0], result.residuals[0]
-    return IkBatch(frozen(q), frozen(~np.isnan(q[:, 0]), bool), frozen(residuals), tuple(reasons), tuple(details))
+    return q, residuals, reasons, details
 
 
 def _by_closed_form(

@@ -18,7 +18,7 @@ from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights
-from rrtik_ompl.copies import in_notebook, shallow_copy
+from rrtik_ompl.copies import KeptHere, ThreadOwn, in_notebook, shallow_copy
 from rrtik_ompl.errors import InputError, MeshWarning, Renamed, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
@@ -32,14 +32,16 @@ from rrtik_ompl.world.rebuild import reduce_world
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
+NO_GEOMETRY = "has no collision geometry: every configuration counts as free"
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
 
 
 class World:
-    """Exact collision checks of a robot in a scene, for one thread at a time.
+    """Exact collision checks of a robot in a scene.
 
     Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
     (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal and refuses what they cannot prove.
+    Several threads may ask one world: each has memory of its own to compute in, and answers are the same.
 
     Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
     no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
@@ -67,6 +69,10 @@ class World:
         UnknownNameError: If there is no such accuracy.
     """
 
+    prover: ThreadOwn[Prover] = ThreadOwn()
+    _checks: ThreadOwn[ExactChecker] = ThreadOwn()
+    _motions: ThreadOwn[KeptHere] = ThreadOwn()
+
     def __init__(
         self,
         robot: Robot,
@@ -76,17 +82,14 @@ class World:
         accuracy: Accuracy = "exact",
         self_margin: float = 0.0,
     ) -> None:
-        self.robot = robot
-        self.scene = Scene() if scene is None else scene
+        self.robot, self.scene = robot, Scene() if scene is None else scene
         require(robot, Robot, "robot of a world", "use load_robot(name or file)")
         require(self.scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
         self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))
         if self.motion_resolution < FINEST_RESOLUTION:
-            least = f"{FINEST_RESOLUTION:g} metres or more"
-            raise InputError(f"motion_resolution must be {least}, got {self.motion_resolution:g}")
+            raise InputError(f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {motion_resolution}")
         if not robot.collision.geometryObjects:
-            message = f"robot '{robot.name}' has no collision geometry: every configuration counts as free"
-            warnings.warn(MeshWarning(message), stacklevel=2)
+            warnings.warn(MeshWarning(f"robot '{robot.name}' {NO_GEOMETRY}"), stacklevel=2)
         self.self_margin = own = not_negative(self_margin, "self_margin")
         self.bodies = link_bodies(robot, own) + scene_bodies(robot, self.scene.at(0.0), own)
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
@@ -94,7 +97,7 @@ class World:
         moving, standing = by_motion(self.bodies, pairs)
         self.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
         self._certificate = cache(partial(Certificate, robot, self.bodies, pairs))
-        self._motions: dict[bool, FastMotions] = {}
+        self._motions = KeptHere()
         self._proven_clearance: float | None = None
         self._room = 0.0  # kept on top of the margins of obstacles
         self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
@@ -140,7 +143,7 @@ class World:
             InputError: If the size is no number greater than 0.
         """
         other = copy.copy(self)
-        other.motion_resolution, other._motions = positive(motion_resolution, "motion_resolution"), {}
+        other.motion_resolution, other._motions = positive(motion_resolution, "motion_resolution"), KeptHere()
         return other
 
     refined = Renamed("with_resolution")
@@ -158,7 +161,7 @@ class World:
             return self
         other = copy.copy(self)
         wide = tuple(replace(b, margin=b.margin + wider) if b.kind == "obstacle" else b for b in self.bodies)
-        other._checks, other._motions, other._room = self._checks.with_bodies(wide), {}, wider
+        other._checks, other._motions, other._room = self._checks.with_bodies(wide), KeptHere(), wider
         return other
 
     def proving(self, clearance: float = 0.0) -> World:
@@ -242,8 +245,7 @@ class World:
 
         ``known_free`` leaves out the check for contacts, where they were ruled out before.
         """
-        touching = () if known_free is True else self.contacts(q)
-        if touching:
+        if known_free is not True and (touching := self.contacts(q)):
             return touching[0]
         found = measured(self.bodies, self.pairs, self.robot.joint_frames(self._rows(q, 1))[0], near_only=False)
         return min(found, key=lambda c: c.clearance, default=None)
@@ -293,8 +295,8 @@ class World:
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
         mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
         starts, ends = one_way(starts[mask], ends[mask])
-        steps = step_counts(starts, ends, self.weights, self.motion_resolution)
-        mask[mask] = free = self._checks.motions_free(starts, ends, steps)
+        counts = step_counts(starts, ends, self.weights, self.motion_resolution)
+        mask[mask] = free = self._checks.motions_free(starts, ends, counts)
         if self._proven_clearance is not None:
             mask[mask] = self.prover.proven(starts[free], ends[free], clearance=self._proven_clearance)
         return mask

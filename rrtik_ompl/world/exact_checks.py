@@ -63,6 +63,12 @@ class ExactChecker:
         other.conservative = conservative
         return other
 
+    def for_thread(self) -> ExactChecker:
+        """The same checker for another thread."""
+        other = copy.copy(self)
+        other.fast, other._data = self.fast.for_thread(), self._robot.model.createData()
+        return other
+
     def with_bodies(self, bodies: tuple[Body, ...]) -> ExactChecker:
         """The same checker of the same bodies with other margins."""
         other = copy.copy(self)

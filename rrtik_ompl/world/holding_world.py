@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +27,13 @@ class HoldingProver(Prover):
 
     def __init__(self, prover: Prover, constraints: HeldRegions) -> None:
         vars(self).update(vars(prover))
-        self.free, self._constraints = prover, constraints
+        self.free, self._constraints, self._kin = prover, constraints, object()
+
+    def for_thread(self) -> HoldingProver:
+        """The same prover for another thread."""
+        other = HoldingProver(self.free.for_thread(), self._constraints)
+        other._kin = self._kin
+        return other
 
     def route(self, rows: Matrix, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None) -> Proof:
         """Prove the motions between waypoints, shape (k, dof), free and held; see :meth:`Prover.route`."""
@@ -61,7 +67,7 @@ class HoldingWorld(World):
     def __init__(self, world: World, constraints: HeldRegions) -> None:
         vars(self).update(vars(world))
         self.constraints = constraints
-        self.prover = self._holding = HoldingProver(world.prover, constraints)
+        self.prover = HoldingProver(world.prover, constraints)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.unheld, self.constraints)
@@ -81,7 +87,7 @@ class HoldingWorld(World):
         """The same world without constraints."""
         other: World = object.__new__(World)
         vars(other).update({key: value for key, value in vars(self).items() if key != "constraints"})
-        other.prover = self._holding.free
+        other.prover = cast(HoldingProver, self.prover).free
         return other
 
     @property

@@ -6,10 +6,11 @@ planners use, and nothing else: their forward kinematics are their own, in float
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -34,7 +35,7 @@ FEW = 200  # configurations
 PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
 DOUBLE, INT = 8, 4  # bytes of a number
 NOWHERE = partial(float, "nan")
-Ends: TypeAlias = tuple[Matrix, Matrix]  # of motions: where they begin, and where they end
+Ends: TypeAlias = tuple[Matrix, Matrix]  # where motions begin, and where they end
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,26 +131,28 @@ class Prover:
         always_colliding: bool = False,
     ) -> None:
         self.robot, self.bodies, self.pairs, self.self_margin = robot, bodies, pairs, self_margin
-        self._always_colliding = always_colliding
+        self._always_colliding, self._kin = always_colliding, object()
         self._gain, self._offset = np.ascontiguousarray(robot.chain.gain.T), robot.chain.offset
         ends = np.stack([robot.lower, robot.upper])
-        finite = bool(np.isfinite(ends).all())
-        self._bounded = finite and bool((np.abs(robot.joint_values(ends)) < 0.5 * LARGEST_VALUE).all())
+        self._bounded = bool(np.isfinite(ends).all() and np.abs(robot.joint_values(ends)).max() < 0.5 * LARGEST_VALUE)
         self._packed: ProofPairs | None = None
         self._coal: CoalProof | None = None
-        self._margin: float | None = None
+
+    def for_thread(self) -> Prover:
+        """The same prover for another thread; each takes the other's proofs for its own."""
+        other = copy.copy(self)
+        other._packed, other._coal = None if self._packed is None else self._packed.for_thread(), None
+        return other
 
     @property
     def digest(self) -> str:
         """See :attr:`Proof.digest`."""
         return world_digest(self.robot, self.bodies, self.pairs)
 
-    @property
+    @cached_property
     def margin(self) -> float:
         """The least margin of the obstacles [m]; 0 without obstacles."""
-        if self._margin is None:
-            self._margin = min((body.margin for body in self.bodies if body.kind == "obstacle"), default=0.0)
-        return self._margin
+        return min((body.margin for body in self.bodies if body.kind == "obstacle"), default=0.0)
 
     def route(self, rows: Matrix, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None) -> Proof:
         """Prove the motions between waypoints, shape (k, dof).
@@ -212,8 +215,8 @@ class Prover:
         return packed.table.address
 
     def made(self, proof: Proof) -> bool:
-        """Whether a proof is one of these bodies, by this object."""
-        return proof.prover is self
+        """Whether a proof is one of these bodies, by this object or its like for another thread."""
+        return proof.prover is not None and proof.prover._kin is self._kin
 
     def still_proven(self, rows: Matrix) -> Mask:
         """Which configurations, shape (m, dof), are proven free. Shape (m,).
@@ -237,16 +240,14 @@ class Prover:
 
     def _joint_values(self, rows: Matrix) -> Matrix:
         """Values of every joint of the chain, shape (m, joints), row after row in memory."""
-        values: Matrix = rows @ self._gain + self._offset
-        return values
+        return np.asarray(rows @ self._gain + self._offset)
 
     def _sound(self, rows: Matrix, values: Matrix) -> Mask | None:
         """Which configurations are inside the limits and not too large for the bound on rounding; None for all."""
         inside = self.robot.within_limits(rows)
         if inside.all() and (self._bounded or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
             return None
-        sound: Mask = inside & (np.abs(values) <= LARGEST_VALUE).all(axis=1)
-        return sound
+        return np.asarray(inside & (np.abs(values) <= LARGEST_VALUE).all(axis=1))
 
     def _gaps(
         self, rows: Ends, values: Ends, sound: Mask | None, kept: tuple[float, float], seconds: float | None
@@ -257,7 +258,7 @@ class Prover:
         """
         tails, heads = values
         count, joints = heads.shape
-        begin, kernels = time.monotonic(), library(PROOF_KERNELS)
+        begin, looked, open_, kernels = time.monotonic(), 0, 0, library(PROOF_KERNELS)
         if kernels is None or self._always_colliding:
             return [Gap(k, float("nan"), "", "") for k in range(count)]
         packed = self._packed_for(*kept)
@@ -265,7 +266,6 @@ class Prover:
         pairs, places = np.full(count, NOT_LOOKED_AT, dtype=np.int32), np.full(count, np.nan)
         table = ProofTable(packed.table.address)
         at, found, where = (tails.ctypes.data, heads.ctypes.data), pairs.ctypes.data, places.ctypes.data
-        looked, open_ = 0, 0
         for first in range(0, count, MOTIONS_AT_ONCE):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break

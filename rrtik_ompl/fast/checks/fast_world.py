@@ -7,6 +7,7 @@ covered by a margin, so the first two answers are certain.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,8 +21,8 @@ from rrtik_ompl.fast.checks.clearance import Clearance, rounded
 from rrtik_ompl.fast.checks.inputs import LARGEST_ANGLE, STROKE, checked_step_counts, joint_limits
 from rrtik_ompl.fast.checks.reference import ReferenceChecks
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.layout import MARKS, OUTER_PRIMITIVES, STANDING_SOLIDS, UNDECIDED
-from rrtik_ompl.fast.tables.memory import Table, table
+from rrtik_ompl.fast.tables.layout import CORNERS, MARKS, OUTER_PRIMITIVES, SIZES, STANDING_SOLIDS, UNDECIDED
+from rrtik_ompl.fast.tables.memory import Table, table, with_own
 from rrtik_ompl.fast.tables.packing import (
     ArmTables,
     Flags,
@@ -48,7 +49,7 @@ class FastWorld:
     Joint values are those of the chain's own joints: mimic joints resolved, one value for a continuous joint. A value
     beyond what the margin covers (``LARGEST_ANGLE``, ``strokes``) makes a configuration undecided.
 
-    A world is meant for one thread at a time.
+    It is meant for one thread at a time: see :meth:`for_thread`.
 
     Attributes:
         address: Of the tables in memory, for other kernels; 0 without kernels. Valid as long as this object lives.
@@ -108,11 +109,25 @@ class FastWorld:
         self._moved = False
         self.address = 0
         if self._kernels is not None:
-            self._scratch = scratch_table(self._arm.arm, self._arm.balls, self._arm.bounds, self._primitives)
             self._solids = standing_solids(bodies, standing, solids)
-            self.table = table({k: t.address for k, t in enumerate(self.tables)})
-            self.address = self.table.address
-            self._marks = self._scratch[MARKS]
+            self._take_memory()
+
+    def _take_memory(self) -> None:
+        """Memory to compute in, and the table of all that kernels read."""
+        self._scratch = scratch_table(self._arm.arm, self._arm.balls, self._arm.bounds, self._primitives)
+        self.table = table({k: t.address for k, t in enumerate(self.tables)})
+        self.address = self.table.address
+        self._marks = self._scratch[MARKS]
+
+    def for_thread(self) -> FastWorld:
+        """The same tables with memory of their own to compute in."""
+        other = copy.copy(self)
+        other._probe = None
+        if other._kernels is not None:
+            if other._primitives[0].parts or other._primitives[1].parts:  # of a cloud, a point is put among the solids
+                other._solids = with_own(other._solids, {place: other._solids[place] for place in (SIZES, CORNERS)})
+            other._take_memory()
+        return other
 
     def update_obstacles(self, bodies: Sequence[Body], inflation: Sequence[float]) -> None:
         """Put what stands still elsewhere, in place: the arm, the pairs and addresses stay as they are.

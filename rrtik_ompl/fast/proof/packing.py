@@ -19,13 +19,14 @@ from rrtik_ompl.fast.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, NODES,
 from rrtik_ompl.fast.tables.cloud_tables import cloud_table
 from rrtik_ompl.fast.tables.layout import CLOUD_SOLID, HALF_SPACE_SOLID
 from rrtik_ompl.fast.tables.layout import CONVEX_SOLID as IS_CONVEX
-from rrtik_ompl.fast.tables.memory import Table, table
+from rrtik_ompl.fast.tables.memory import Table, table, with_own
 from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, Solids, placed_bodies
 from rrtik_ompl.robot import Chain
 
 ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
 KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE, CLOUD_SOLID: CLOUD}
 SIZED = (IS_CONVEX, CLOUD_SOLID)  # have a ball and a box around them
+COMPUTED = (layout.MARGINS, *range(layout.FRAMES, layout.LAST_STAMP + 1), layout.LOG, layout.LOG_WAYS, layout.LOG_COUNT)
 
 
 @dataclass(slots=True, eq=False)
@@ -55,6 +56,13 @@ class ProofPairs:
         if (clearance, ROOM + slack) != self.kept:
             self.kept = clearance, ROOM + slack
             self.table[layout.MARGINS][:] = self.margins + self.kept[1] + clearance * self.beside_obstacle
+
+    def for_thread(self) -> ProofPairs:
+        """The same pairs in a table with memory of its own to compute in."""
+        own = {place: np.zeros_like(self.table[place]) for place in COMPUTED}
+        if self.table.parts:  # of a cloud, points that are compared stand among the solids
+            own |= {place: self.table[place] for place in (layout.SOLIDS, layout.CORNERS)}
+        return ProofPairs(with_own(self.table, own), self.bodies, self.sides, self.margins, self.beside_obstacle)
 
 
 def proof_pairs(

@@ -89,6 +89,15 @@ def table(fields: Mapping[int, int | NDArray[Any]], parts: Sequence[Table] = ())
     return Table(aligned(np.array(header, dtype=np.int64)), arrays, tuple(parts))
 
 
+def with_own(shared: Table, own: Mapping[int, NDArray[Any]]) -> Table:
+    """A table of the same fields whose arrays are shared but for some, which are copied: for another thread."""
+    placed = {place: _placed(array) for place, array in own.items()}
+    header = aligned(shared.header)
+    for place, (_, address) in placed.items():
+        header[place] = address
+    return Table(header, shared.arrays | {place: array for place, (array, _) in placed.items()}, shared.parts)
+
+
 def record(size: int, numbers: Mapping[int, float | NDArray[Any]]) -> NDArray[np.float64]:
     """A record of ``size`` numbers, each number or run of numbers by its place; the others are 0."""
     made = np.zeros(size)

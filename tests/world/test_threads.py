@@ -1,0 +1,116 @@
+"""Several threads ask one world: answers as of one thread, and no kernel writes beyond its memory."""
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.threads import in_threads
+from rrtik_tests.sizes import how_many
+
+CALLS = how_many(100_000, 4_000)  # mixed
+
+
+@pytest.fixture(scope="module")
+def world():
+    """A UR5 among boxes and points, which share memory that kernels write to."""
+    robot, rng = rrtik.load_robot("ur5"), np.random.default_rng(4)
+    places = rng.uniform(-0.9, 0.9, (3000, 3))
+    places = places[np.linalg.norm(places[:, :2], axis=1) > 0.3]
+    boxes = (rrtik.Obstacle(f"box {k}", rrtik.Box([0.1, 0.05, 0.08]), rrtik.pose(places[k])) for k in range(12))
+    cloud = rrtik.Obstacle("cloud", rrtik.PointCloud(places[12:1200], 0.01))
+    return rrtik.World(robot, rrtik.Scene((*boxes, cloud)))
+
+
+def answers(world, rows, ends, seed):
+    """What a world says to a share of the calls: configurations, motions, proofs, distances, in some order."""
+    rng, found = np.random.default_rng(seed), []
+    for _ in range(CALLS // 8):
+        k = int(rng.integers(len(rows)))
+        kind = rng.integers(5)
+        if kind == 0:
+            found.append(world.valid(rows[k]))
+        elif kind == 1:
+            found.append(world.motion_valid(rows[k], ends[k]))
+        elif kind == 2:
+            found.append(world.motion_proven(rows[k], ends[k]))
+        elif kind == 3:
+            found.append(world.valid_batch(rows[k : k + 9]).tolist())
+        else:
+            found.append(world.prove(np.stack([rows[k], ends[k], rows[k]]), clearance=1e-4).unproven)
+    return found
+
+
+def test_threads_get_the_answers_of_one(world):
+    rng = np.random.default_rng(5)
+    rows = rng.uniform(*world.robot.finite_range(), (400, world.robot.dof))
+    rows = np.concatenate([rows, rows[world.valid_batch(rows)]])
+    ends = rows + rng.normal(scale=0.03, size=rows.shape)
+    ask = partial(answers, world, rows, ends)
+    alone = [ask(seed) for seed in range(8)]
+    with ThreadPoolExecutor(4) as pool:
+        assert [str(each) for each in pool.map(ask, range(8))] == [str(each) for each in alone]
+        tables = list(pool.map(lambda _: (world.fast, world.prover), range(8)))
+    assert world.fast.intact()
+    assert all(fast.intact() and own._packed.table.intact() for fast, own in tables)
+
+
+def test_each_thread_has_its_own_memory_and_takes_the_proofs_of_others(world):
+    q = np.array([[0.0, -1.2, 0.5, 0.0, 0.0, 0.0]] * 2)
+    with ThreadPoolExecutor(1) as pool:
+        there = pool.submit(lambda: (world.fast, world.motions, world.prove(q))).result()
+    assert there[0] is not world.fast
+    assert there[1].address != world.motions.address
+    assert world.prover.made(there[2])
+    assert not rrtik.World(world.robot, world.scene).prover.made(there[2])
+
+
+@pytest.mark.parametrize("planner", [None, "fastrrtconnect", "RRTConnect"])
+def test_many_plans_do_not_depend_on_the_number_of_threads(planner):
+    problem = rrtik.load_problem("planar3_boxes")
+    goals = [rrtik.plan(problem, seed=1).path.end, problem.goal] * 3
+    goals = goals[1::2] if planner is None else np.stack(goals[::2])
+    plans = [rrtik.plan_many(problem.world, problem.start, goals, planner, seed=3, threads=n) for n in (1, 3)]
+    for one, other in zip(*plans, strict=True):
+        assert one.found
+        assert (one.path.waypoints == other.path.waypoints).all()
+        assert one.path.violations(problem.world) == ()
+    assert len({each.path.waypoints.tobytes() for each in plans[0]}) > 1
+
+
+def test_a_query_that_cannot_be_asked_is_a_plan_without_a_path():
+    problem = rrtik.load_problem("planar3_boxes")
+    starts = np.stack([problem.start, problem.start + 100.0])
+    one, other = rrtik.plan_many(problem.world, starts, [problem.goal] * 2, seed=1)
+    assert one.found
+    assert not other.found
+    assert "outside its limits" in other.reason
+
+
+def test_starts_and_goals_that_do_not_fit_are_refused(world):
+    with pytest.raises(InputError, match=r"as many starts as goals are needed, got 2 and 3"):
+        rrtik.plan_many(world, np.zeros((2, 6)), np.zeros((3, 6)))
+    with pytest.raises(InputError, match="threads must be"):
+        rrtik.plan_many(world, np.zeros((2, 6)), np.zeros((2, 6)), threads=0)
+    with pytest.raises(InputError, match="goals"):
+        rrtik.plan_many(world, np.zeros((2, 6)), np.zeros((2, 5)))
+
+
+def test_what_work_raises_in_a_thread_is_raised():
+    with pytest.raises(ZeroDivisionError):
+        in_threads(lambda k: 1 // k, [1, 0, 2], threads=2)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5"])
+def test_inverse_kinematics_of_many_poses_does_not_depend_on_the_number_of_threads(name):
+    robot, rng = rrtik.load_robot(name), np.random.default_rng(1)
+    poses = robot.fk_batch(rng.uniform(*robot.finite_range(), (700, robot.dof)))
+    poses[3, :3, 3] = 9.0
+    one, other = (rrtik.solve_ik_batch(robot, poses, seconds=0.05, threads=n) for n in (1, 2))
+    assert one.reasons == other.reasons
+    assert not one.found[3]
+    assert one.found.sum() > 600
+    np.testing.assert_array_equal(one.q, other.q)
