@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from rrtik_ompl.errors import UnknownNameError as UnknownNameError
     from rrtik_ompl.files.cloud import load_cloud as load_cloud
     from rrtik_ompl.files.cloud import save_cloud as save_cloud
+    from rrtik_ompl.files.heights import load_height_field as load_height_field
     from rrtik_ompl.files.mesh import load_mesh as load_mesh
+    from rrtik_ompl.files.octree import load_octree as load_octree
     from rrtik_ompl.following.follower import Followed as Followed
     from rrtik_ompl.following.follower import Follower as Follower
     from rrtik_ompl.following.links import RobotLink as RobotLink
@@ -90,7 +92,9 @@ if TYPE_CHECKING:
     from rrtik_ompl.shapes import Capsule as Capsule
     from rrtik_ompl.shapes import Cylinder as Cylinder
     from rrtik_ompl.shapes import HalfSpace as HalfSpace
+    from rrtik_ompl.shapes import HeightField as HeightField
     from rrtik_ompl.shapes import Mesh as Mesh
+    from rrtik_ompl.shapes import Octree as Octree
     from rrtik_ompl.shapes import PointCloud as PointCloud
     from rrtik_ompl.shapes import Prism as Prism
     from rrtik_ompl.shapes import Sphere as Sphere
@@ -149,7 +153,9 @@ else:
         "ompl_bridge.inspection.benchmark_notes": ("BenchmarkNotes",),
         "ompl_bridge.simple_setup": ("simple_setup", "space_information"),
         "files.cloud": ("load_cloud", "save_cloud"),
+        "files.heights": ("load_height_field",),
         "files.mesh": ("load_mesh",),
+        "files.octree": ("load_octree",),
         "moves.staircase": ("one_joint_moves",),
         "path": ("JointPath", "load_path"),
         "planning": ("Plan", "list_planners", "plan"),
@@ -166,7 +172,18 @@ else:
         "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses"),
         "problem_files.scene": ("load_scene", "save_scene"),
         "search.roadmap": ("Roadmap", "load_roadmap"),
-        "shapes": ("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "PointCloud", "Prism", "Sphere"),
+        "shapes": (
+            "Box",
+            "Capsule",
+            "Cylinder",
+            "HalfSpace",
+            "HeightField",
+            "Mesh",
+            "Octree",
+            "PointCloud",
+            "Prism",
+            "Sphere",
+        ),
         "shortening": ("MoveRules", "shorten"),
         "task_region": ("TaskRegion",),
         "tasks": ("Alternatives", "Attach", "Detach", "Gripper", "MoveTo", "Straight", "Task", "TaskPlan"),

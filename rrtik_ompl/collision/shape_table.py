@@ -19,7 +19,20 @@ import pinocchio as pin
 from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.collision.cloud_solid import CloudSolid, cloud_solid
 from rrtik_ompl.collision.solids import SameObject, bvh, convexified, hull, is_mesh, measured, mesh_arrays
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Shape, Sphere
+from rrtik_ompl.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    HeightField,
+    Mesh,
+    Octree,
+    PointCloud,
+    Prism,
+    Shape,
+    Sphere,
+)
+from rrtik_ompl.shapes.box_pile import BoxPile
 from rrtik_ompl.shapes.polygons import convex_parts
 
 BOX_CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -81,11 +94,13 @@ class ShapeRow:
         shape: Its class.
         solids: Coal geometries whose union is the shape.
         coal: What coal has for it; None if it becomes convex solids or a mesh.
+        places: Where in the shape's frame each of these geometries is (``pinocchio.SE3``); all at its origin if None.
     """
 
     shape: type[Shape]
     solids: Callable[[Any], Sequence[Any]]
     coal: CoalSolid | None = None
+    places: Callable[[Any], Sequence[Any]] | None = None
 
 
 def box_corners(half: Vector) -> Matrix:
@@ -110,6 +125,18 @@ def _extruded(polygon: Matrix, height: float) -> Matrix:
 def _mesh(mesh: Mesh) -> list[Any]:
     surface = bvh(mesh.vertices, mesh.triangles)
     return [convexified(surface) if mesh.closed else surface]
+
+
+def _solids_of_pile(pile: BoxPile) -> list[Any]:
+    """A box of coal for each box; those of one size share it."""
+    sizes = pile.boxes[1].tolist()
+    kept = {tuple(size): coal.Box(*size) for size in sizes}
+    return [kept[tuple(size)] for size in sizes]
+
+
+def _places_of_pile(pile: BoxPile) -> list[Any]:
+    upright = np.eye(3)
+    return [pin.SE3(upright, centre) for centre in pile.boxes[0]]
 
 
 ROWS = (
@@ -157,6 +184,8 @@ ROWS = (
     ShapeRow(Prism, lambda prism: [hull(_extruded(part, prism.height)) for part in convex_parts(prism.polygon)]),
     ShapeRow(Mesh, _mesh),
     ShapeRow(PointCloud, lambda cloud: [cloud_solid(cloud)]),
+    ShapeRow(HeightField, _solids_of_pile, places=_places_of_pile),
+    ShapeRow(Octree, _solids_of_pile, places=_places_of_pile),
 )
 _BY_SHAPE: dict[type, ShapeRow] = {}
 _BY_GEOMETRY: dict[type, CoalSolid] = {}
@@ -209,8 +238,10 @@ def _kept_pieces(key: _Measured) -> tuple[Piece, ...]:
 
 
 def _pieces(shape: Shape) -> tuple[Piece, ...]:
-    identity = pin.SE3.Identity()
-    return tuple(Piece(measured(solid), identity) for solid in _BY_SHAPE[type(shape)].solids(shape))
+    row = _BY_SHAPE[type(shape)]
+    solids = [measured(solid) for solid in row.solids(shape)]
+    places = [pin.SE3.Identity()] * len(solids) if row.places is None else row.places(shape)
+    return tuple(map(Piece, solids, places))
 
 
 def sizes_of(geometry: Any) -> Vector | None:

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import positive
 from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.files.octree import octree_points
 from rrtik_ompl.files.pcd import pcd_points
 from rrtik_ompl.files.ply import ply_points
-from rrtik_ompl.files.point_records import records, text_rows
+from rrtik_ompl.files.point_records import AXES, npy_rows, text_rows
 from rrtik_ompl.files.text import file_name, read_bytes, write_bytes
 from rrtik_ompl.shapes import PointCloud
 from rrtik_ompl.shapes.point_cloud import RADIUS, Invalid
@@ -29,7 +30,9 @@ PLY_HEADER = "ply\nformat binary_little_endian 1.0\nelement vertex {}\n" + "".jo
 def load_cloud(
     path: str | os.PathLike[str], radius: float = RADIUS, *, scale: float = 1.0, invalid: Invalid = "refuse"
 ) -> PointCloud:
-    """Read a cloud of points: ``.npy`` (an array of shape (n, 3)), ``.ply``, ``.pcd``, or ``.xyz`` (rows of numbers).
+    """Read a cloud of points: ``.npy`` (an array of shape (n, 3)), ``.ply``, ``.pcd``, ``.bt``, ``.xyz`` (text).
+
+    Of a map of OctoMap (``.bt``) it has the middle of each occupied cell; balls of half its diagonal cover the cells.
 
     Args:
         path: The file.
@@ -86,19 +89,7 @@ def save_cloud(cloud: PointCloud, path: str | os.PathLike[str]) -> PointCloud:
 
 
 def _npy_points(data: bytes, what: str) -> NDArray[Any]:
-    stream = io.BytesIO(data)
-    try:
-        version = np.lib.format.read_magic(stream)
-        read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
-        shape, columnwise, kind = read(stream)
-    except (ValueError, KeyError) as error:
-        raise InputError(f"{what}: not a .npy file of numpy: {str(error).splitlines()[0]}") from None
-    if kind.kind not in "fiu" or len(shape) != 2 or shape[1] != 3:
-        raise InputError(f"{what}: expected numbers of shape (any, 3), got {kind} of shape {shape}")
-    rows = records(data, stream.tell(), np.dtype((kind, (3,))), shape[0], what)
-    if not columnwise:
-        return rows
-    return records(data, stream.tell(), kind, 3 * shape[0], what).reshape(3, -1).T
+    return npy_rows(data, what, len(AXES))
 
 
 def _xyz_points(data: bytes, what: str) -> NDArray[Any]:
@@ -110,4 +101,5 @@ _READERS: dict[str, Callable[[bytes, str], NDArray[Any]]] = {
     ".ply": ply_points,
     ".pcd": pcd_points,
     ".xyz": _xyz_points,
+    ".bt": octree_points,
 }

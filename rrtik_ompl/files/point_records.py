@@ -1,7 +1,8 @@
-"""Points out of the bytes of files: records of a stated type, as many as a header claims, if they are there."""
+"""Numbers out of the bytes of files: records of a stated type, as many as a header claims, if they are there."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from typing import Any
 
@@ -36,18 +37,41 @@ def records(data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str
     return np.frombuffer(data, dtype=kind, count=count, offset=offset)
 
 
-def text_rows(data: bytes, columns: Sequence[int], what: str, most: int | None = None) -> NDArray[np.float64]:
-    """Columns of rows of numbers in a text, shape (n, len(columns)).
+def npy_rows(data: bytes, what: str, columns: int | None = None) -> NDArray[Any]:
+    """The array of a .npy file of numpy, shape (n, columns); any number of columns if None.
+
+    Raises:
+        InputError: If it is none, its shape is another one, or the file is too short for what its header claims.
+    """
+    stream = io.BytesIO(data)
+    try:
+        version = np.lib.format.read_magic(stream)
+        read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+        shape, columnwise, kind = read(stream)
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{what}: not a .npy file of numpy: {str(error).splitlines()[0]}") from None
+    if kind.kind not in "fiu" or len(shape) != 2 or columns not in (None, shape[1]):
+        wanted = f"(any, {'any' if columns is None else columns})"
+        raise InputError(f"{what}: expected numbers of shape {wanted}, got {kind} of shape {shape}")
+    if not columnwise:
+        return records(data, stream.tell(), np.dtype((kind, (shape[1],))), shape[0], what)
+    return records(data, stream.tell(), kind, shape[1] * shape[0], what).reshape(shape[::-1]).T
+
+
+def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int | None = None) -> NDArray[np.float64]:
+    """Columns of rows of numbers in a text, shape (n, len(columns)); all of them if None.
 
     Raises:
         InputError: If a row is too short or has something else.
     """
-    lines = data.decode("ascii", "replace").replace(",", " ").splitlines()
+    lines = [line for line in data.decode("ascii", "replace").replace(",", " ").splitlines() if line.strip()]
+    if not lines:
+        return np.zeros((0, len(columns or ())))
     try:
         rows = np.loadtxt(lines, usecols=columns, ndmin=2, max_rows=most, dtype=np.float64)
     except ValueError as error:
         raise InputError(f"{what}: not rows of numbers: {str(error).splitlines()[0]}") from None
-    return rows.reshape(-1, len(columns))
+    return rows if columns is None else rows.reshape(-1, len(columns))
 
 
 def coordinates(rows: NDArray[Any]) -> NDArray[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +13,9 @@ from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.cloud import load_cloud
+from rrtik_ompl.files.heights import load_height_field
 from rrtik_ompl.files.mesh import load_mesh
+from rrtik_ompl.files.octree import load_octree
 from rrtik_ompl.files.sections import (
     Length,
     Name,
@@ -25,7 +27,7 @@ from rrtik_ompl.files.sections import (
     Vector3,
     exactly_one,
 )
-from rrtik_ompl.shapes import SHAPES, Measure, Mesh, PointCloud, Shape
+from rrtik_ompl.shapes import SHAPES, HeightField, Measure, Mesh, Octree, PointCloud, Shape
 from rrtik_ompl.shapes.point_cloud import RADIUS, Invalid
 from rrtik_ompl.shapes.shape import MeasureKind
 
@@ -58,6 +60,33 @@ class CloudEntry(Section):
     invalid: Invalid = Field("refuse", description="what is done with points that are not finite")
 
 
+class HeightsEntry(Section):
+    """A grid of heights, each a column of one cell."""
+
+    file: Name = Field(description="NPY, CSV or TXT file, or a grey picture, relative to the folder of this file")
+    cell: Length = Field(description="side of a cell [m]")
+    floor: Number | None = Field(None, description="where the ground ends below [m]; a cell below the lowest if absent")
+    scale: Positive = Field(1.0, description="metres per unit of the file's heights")
+    invalid: Invalid = Field("refuse", description="what is done with heights that are not finite")
+
+
+class OctreeEntry(Section):
+    """The occupied cells of a map of OctoMap."""
+
+    file: Name = Field(description="BT file, relative to the folder of this file")
+    scale: Positive = Field(1.0, description="metres per unit of the file")
+
+
+_FILES: dict[type[Shape], tuple[type[Section], Callable[[Path, Any], Shape]]] = {
+    PointCloud: (CloudEntry, lambda path, e: load_cloud(path, e.radius, scale=e.scale, invalid=e.invalid)),
+    HeightField: (
+        HeightsEntry,
+        lambda path, e: load_height_field(path, e.cell, e.floor, scale=e.scale, invalid=e.invalid),
+    ),
+    Octree: (OctreeEntry, lambda path, e: load_octree(path, scale=e.scale)),
+}  # kinds whose numbers come from a file, and what reads it
+
+
 def _keys(kind: type[Shape]) -> dict[str, Any]:
     """The keys of one kind of shape, all of them optional, with their types and descriptions."""
     if kind is Mesh:
@@ -65,8 +94,8 @@ def _keys(kind: type[Shape]) -> dict[str, Any]:
             kind.key: _optional(Name, "STL, OBJ or DAE file, relative to the folder of this file"),
             "scale": _optional(Positive, "of a mesh: metres per unit of its file; 1 if absent"),
         }
-    if kind is PointCloud:
-        return {kind.key: _optional(CloudEntry, None)}
+    if kind in _FILES:
+        return {kind.key: _optional(_FILES[kind][0], None)}
     if kind.grouped:
         entry = create_model(
             f"{kind.__name__}Entry",
@@ -97,7 +126,6 @@ if TYPE_CHECKING:
     class _ShapeKeys(NamedEntry):
         mesh: str | None
         scale: float | None
-        cloud: CloudEntry | None
 else:
     _ShapeKeys = create_model(
         "_ShapeKeys", __base__=NamedEntry, **{key: field for keys in _KEYS.values() for key, field in keys.items()}
@@ -121,8 +149,8 @@ class ShapeEntry(_ShapeKeys):
         value: Any = getattr(self, kind.key)
         if kind is Mesh:
             return load_mesh(folder / str(value), 1.0 if self.scale is None else self.scale)
-        if kind is PointCloud:
-            return load_cloud(folder / value.file, value.radius, scale=value.scale, invalid=value.invalid)
+        if kind in _FILES:
+            return _FILES[kind][1](folder / value.file, value)
         return kind(**dict(self._values(kind, value)))
 
     def _values(self, kind: type[Shape], value: Any) -> Iterator[tuple[str, Any]]:
@@ -142,8 +170,8 @@ def shape_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
     """
     if isinstance(shape, Mesh):
         return _mesh_data(name, shape, folder)
-    if isinstance(shape, PointCloud):
-        return _cloud_data(name, shape, folder)
+    if isinstance(shape, (PointCloud, HeightField, Octree)):
+        return {shape.key: _file_data(name, shape, folder)}
     values = {m.name: np.asarray(getattr(shape, m.name), dtype=np.float64).tolist() for m in shape.measures}
     if shape.grouped:
         return {shape.key: values}
@@ -156,12 +184,19 @@ def _mesh_data(name: str, mesh: Mesh, folder: Path) -> dict[str, Any]:
     return {"mesh": _relative(mesh.source, folder)} | ({} if mesh.scale == 1.0 else {"scale": mesh.scale})
 
 
-def _cloud_data(name: str, cloud: PointCloud, folder: Path) -> dict[str, Any]:
-    if not cloud.source:
-        raise InputError(f"'{name}': a cloud made in memory cannot be written; use the one that save_cloud returns")
-    data: dict[str, Any] = {"file": _relative(cloud.source, folder), "radius": cloud.radius}
-    data |= {} if cloud.scale == 1.0 else {"scale": cloud.scale}
-    return {"cloud": data | ({"invalid": "drop"} if cloud.dropped else {})}
+def _file_data(name: str, shape: PointCloud | HeightField | Octree, folder: Path) -> dict[str, Any]:
+    if not shape.source:
+        remedy = "use the one that save_cloud returns" if isinstance(shape, PointCloud) else "load it from a file"
+        kind = type(shape).__name__.replace("PointCloud", "cloud").replace("HeightField", "height field").lower()
+        raise InputError(f"'{name}': a {kind} made in memory cannot be written; {remedy}")
+    data: dict[str, Any] = {"file": _relative(shape.source, folder)}
+    data |= {} if shape.scale == 1.0 else {"scale": shape.scale}
+    if isinstance(shape, PointCloud):
+        data |= {"radius": shape.radius} | ({"invalid": "drop"} if shape.dropped else {})
+    if isinstance(shape, HeightField):
+        data |= {"cell": shape.cell, "floor": shape.floor}
+        data |= {"invalid": "drop"} if np.isnan(shape.heights).any() else {}
+    return data
 
 
 def _relative(source: str, folder: Path) -> str:

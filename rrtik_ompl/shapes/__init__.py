@@ -15,7 +15,9 @@ from rrtik_ompl.arrays import TAU, Matrix, Vector, bounded_array, frozen, length
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, at_most
 from rrtik_ompl.shapes.half_space import HalfSpace
+from rrtik_ompl.shapes.height_field import HeightField
 from rrtik_ompl.shapes.mesh import Mesh
+from rrtik_ompl.shapes.octree import Octree
 from rrtik_ompl.shapes.point_cloud import PointCloud
 from rrtik_ompl.shapes.prism import Prism
 from rrtik_ompl.shapes.shape import Measure, Shape, same_shape
@@ -27,8 +29,10 @@ __all__ = [
     "Capsule",
     "Cylinder",
     "HalfSpace",
+    "HeightField",
     "Measure",
     "Mesh",
+    "Octree",
     "PointCloud",
     "Prism",
     "Shape",
@@ -206,5 +210,6 @@ def _circle(sides: int) -> tuple[Vector, Matrix]:
     return turn, np.stack([np.cos(turn), np.sin(turn)], 1)
 
 
-_KINDS: tuple[type[Shape], ...] = (Box, Sphere, Cylinder, Capsule, HalfSpace, Prism, Mesh, PointCloud)
-SHAPES: dict[str, type[Shape]] = {kind.key: kind for kind in _KINDS}
+_SIMPLE: tuple[type[Shape], ...] = (Box, Sphere, Cylinder, Capsule, HalfSpace, Prism)
+_OF_FILES: tuple[type[Shape], ...] = (Mesh, PointCloud, HeightField, Octree)
+SHAPES: dict[str, type[Shape]] = {kind.key: kind for kind in (*_SIMPLE, *_OF_FILES)}

@@ -18,7 +18,20 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.surfaces import surface_of_shape
 from rrtik_ompl.problem_files.scene import load_scene, save_scene
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import SHAPES, Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Sphere, same_shape
+from rrtik_ompl.shapes import (
+    SHAPES,
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    HeightField,
+    Mesh,
+    Octree,
+    PointCloud,
+    Prism,
+    Sphere,
+    same_shape,
+)
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin, look_of_shape
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,7 +39,8 @@ L_SHAPE = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0
 TETRAHEDRON = Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 PRIMITIVES = [Box([0.2, 0.3, 0.4]), Sphere(0.2), Cylinder(0.2, 0.5), Capsule(0.1, 0.5)]
 CLOUD = PointCloud([[0.25, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 1.0]], 0.125)
-BOUNDED = [*PRIMITIVES, Prism(L_SHAPE, 0.5), TETRAHEDRON, CLOUD]
+PILES = [HeightField([[0.1, 0.1, 0.4], [0.1, 0.1, 0.2]], 0.5), Octree([[0.0, 0.0, 0.5], [1.0, 0.0, 0.0]], [0.5, 0.25])]
+BOUNDED = [*PRIMITIVES, Prism(L_SHAPE, 0.5), TETRAHEDRON, CLOUD, *PILES]
 FLOOR = HalfSpace([0.0, 0.0, 1.0], -0.1)
 kinds = pytest.mark.parametrize("shape", BOUNDED, ids=lambda shape: type(shape).__name__)
 primitives = pytest.mark.parametrize("shape", PRIMITIVES, ids=lambda shape: type(shape).__name__)
@@ -55,8 +69,8 @@ def test_the_surface_lies_within_the_bounding_radius_and_reaches_it(shape):
 def test_coal_checks_what_is_drawn(shape):
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for piece in pieces(shape):
-        low = np.minimum(low, piece.geometry.aabb_local.min_)
-        high = np.maximum(high, piece.geometry.aabb_local.max_)
+        low = np.minimum(low, piece.placement.translation + piece.geometry.aabb_local.min_)
+        high = np.maximum(high, piece.placement.translation + piece.geometry.aabb_local.max_)
     vertices, _ = shape.surface()
     assert np.allclose([vertices.min(axis=0), vertices.max(axis=0)], [low, high], atol=0.01)
 
