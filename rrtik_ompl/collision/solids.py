@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import coal
 import numpy as np
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import LARGEST, Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
+
+Found = TypeVar("Found")
 
 # A mesh whose volume is at least this share of its convex hull's is taken as convex: its hull stands for it. The hull
 # contains the mesh, so nothing that touches the mesh is missed.
@@ -88,6 +91,12 @@ class SameObject:
 
     def __hash__(self) -> int:
         return id(self.geometry)
+
+
+def of_each(geometries: Iterable[Any], find: Callable[[Any], Found]) -> list[Found]:
+    """What is found of each of some coal geometries; looked for once where several are one object."""
+    known: dict[int, Found] = {}
+    return [known[key] if (key := id(each)) in known else known.setdefault(key, find(each)) for each in geometries]
 
 
 def around(geometry: Any) -> Any:

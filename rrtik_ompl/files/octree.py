@@ -90,7 +90,7 @@ def _occupied(data: bytes, what: str) -> tuple[NDArray[np.float64], NDArray[np.f
         if level == DEPTH or at + 2 > len(body):
             raise InputError(f"{what}: the tree {'is too deep' if level == DEPTH else 'ends too early'}; save it again")
         bits, at, half = body[at] | body[at + 1] << 8, at + 2, 1 << (DEPTH - 1 - level)
-        inner = []
+        inner: list[tuple[int, int, int, int]] = []
         for child in range(8):
             kind = bits >> (2 * child) & 3
             if kind >= OCCUPIED:

@@ -16,6 +16,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body, link_bodies
 from rrtik_ompl.collision.bodies import Pairs as Pairs
+from rrtik_ompl.collision.solids import of_each
 from rrtik_ompl.covers.cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.fast import FastWorld, needs_covers
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
@@ -44,7 +45,13 @@ class ArmCache:
 
     def covers_of(self, bodies: Sequence[Body]) -> tuple[Spheres, ...]:
         """Spheres around and inside all bodies of a world, those of the robot's links first."""
-        return (*self.covers, *(_spheres(body) for body in bodies[len(self.covers) :]))
+        others = bodies[len(self.covers) :]
+        known: dict[tuple[int, bool], Spheres] = {}  # those of one size share a geometry
+        keys = [(id(body.geometry), body.joint > 0) for body in others]
+        for key, body in zip(keys, others, strict=True):
+            if key not in known:
+                known[key] = _spheres(body)
+        return (*self.covers, *(known[key] for key in keys))
 
     def pack(self, bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres], *, share: bool = True) -> FastWorld:
         """The tables of a world.
@@ -62,7 +69,7 @@ class ArmCache:
             pairs,
             outer=outer,
             inner=inner,
-            solids=[convex_solids(body.geometry) for body in bodies],
+            solids=of_each((body.geometry for body in bodies), convex_solids),
             strokes=strokes(self._robot),
             like=self._latest if share else None,
         )

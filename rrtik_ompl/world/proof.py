@@ -18,6 +18,7 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.digests import world_digest
+from rrtik_ompl.collision.solids import of_each
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.proof.layout import WAYS, ProofTable
 from rrtik_ompl.fast.proof.packing import ProofPairs, proof_pairs
@@ -287,7 +288,7 @@ class Prover:
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
         """The table, with a clearance and a slack to keep."""
         if self._packed is None:
-            solids = [convex_solids(body.geometry) for body in self.bodies]
+            solids = of_each((body.geometry for body in self.bodies), convex_solids)
             arm = self.robot.chain, self.bodies, self.pairs
             self._packed = proof_pairs(*arm, solids, strokes(self.robot), fixed=self._fixed)
         self._packed.keep(clearance, slack)

@@ -19,7 +19,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.shape_table import Core, core_of
-from rrtik_ompl.collision.solids import SameObject
+from rrtik_ompl.collision.solids import SameObject, of_each
 from rrtik_ompl.covers.planes import known_planes, outer_planes
 from rrtik_ompl.fast.tables.cloud_tables import cloud_table
 from rrtik_ompl.fast.tables.layout import (
@@ -113,8 +113,9 @@ def _fits(primitives: Primitives) -> Mask:
 def _byprimitive_kind(bodies: Sequence[Body]) -> dict[int | None, list[int]]:
     """Places of the bodies by their kinds of primitive, None for those without a formula."""
     found: dict[int | None, list[int]] = {}
-    for k, body in enumerate(bodies):
-        found.setdefault(primitive_kind(SameObject(body.geometry)), []).append(k)
+    kinds = of_each((body.geometry for body in bodies), lambda geometry: primitive_kind(SameObject(geometry)))
+    for k, kind in enumerate(kinds):
+        found.setdefault(kind, []).append(k)
     return found
 
 
@@ -158,7 +159,7 @@ def _exact(
             made += [_BUILDERS[kind](bodies[k], k, grow, float(beside[k])) for k in chosen]
         elif kind is not None:
             poses = np.array([bodies[k].placement.homogeneous for k in chosen])
-            cores = [cast(Core, core_of(bodies[k].geometry)) for k in chosen]
+            cores = of_each((bodies[k].geometry for k in chosen), lambda geometry: cast(Core, core_of(geometry)))
             made.append(_MAKERS[kind](own, poses, cores, grow, beside[own]))
     return made
 

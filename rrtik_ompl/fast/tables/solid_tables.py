@@ -52,7 +52,7 @@ from rrtik_ompl.fast.tables.layout import (
     SPANS,
     UNKNOWN_SOLID,
 )
-from rrtik_ompl.fast.tables.memory import Table, table, whole_records
+from rrtik_ompl.fast.tables.memory import Table, table
 
 MAX_COMPARED_SIZE = 1e4  # [m]; what is larger or farther away is not compared
 SLACK_PER_METRE = 2e-6  # rounding of corners and of their heights in float32, relative to the coordinates
@@ -208,16 +208,17 @@ def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:
         start, middle = len(solids), len(solids) + len(around)
         solids += around if inside == around else around + inside
         first_inside = start if inside == around else middle
-        span = {AROUND_FIRST: start, AROUND_END: middle, INSIDE_FIRST: first_inside, INSIDE_END: len(solids)}
-        spans.append({SPAN_FRAME: frame} | span)
+        spans.append((frame, start, middle, first_inside, len(solids)))
     counts = np.array([len(solid.corners) for solid in solids], dtype=np.int64)
     blocks = np.concatenate([[0], np.cumsum(-(-counts // WIDTH))])
     numbers = np.zeros((len(solids), SOLID_INTS), dtype=np.int32)
     numbers[:, FIRST_BLOCK], numbers[:, END_BLOCK] = blocks[:-1], blocks[1:]
     numbers[:, SOLID_KIND], numbers[:, IS_INSIDE] = [s.kind for s in solids], [s.inside for s in solids]
+    records = np.zeros((len(spans), SPAN_INTS), dtype=np.int32)
+    records[:, [SPAN_FRAME, AROUND_FIRST, AROUND_END, INSIDE_FIRST, INSIDE_END]] = np.reshape(spans, (-1, SPAN_INTS))
     return table(
         {
-            SPANS: whole_records(SPAN_INTS, spans),
+            SPANS: records,
             SOLIDS: numbers,
             SIZES: _sizes(solids),
             CORNERS: _blocks(solids).astype(np.float32),
