@@ -11,6 +11,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.collision.shape_table import Piece, pieces
 from rrtik_ompl.collision.solids import robot_solids
 from rrtik_ompl.errors import InputError, UnknownNameError
@@ -56,6 +57,7 @@ def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
     )
 
 
+@collector_waits
 def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body, ...]:
     """Bodies of all obstacles and attached objects, these with a margin [m].
 
@@ -93,6 +95,7 @@ def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
         raise InputError(f"scene: '{item.name}': {error}") from None
 
 
+@collector_waits
 def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:
     """Numbers of the bodies that must not touch: all but what is rigidly joined or allowed, and adjacent links.
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.cloud_solid import cloud_gap, has_cloud
+from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
@@ -44,6 +45,7 @@ class ExactChecker:
         conservative: See above.
     """
 
+    @collector_waits
     def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: Pairs, *, conservative: bool = False) -> None:
         self.conservative = conservative
         arm = arm_cache(robot)

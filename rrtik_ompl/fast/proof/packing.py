@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
+from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.cloud_frames import cloud_bodies, cloud_poses
 from rrtik_ompl.fast.proof.groups import Members, compared_as_one, group_rows
@@ -65,6 +66,7 @@ class ProofPairs:
         return ProofPairs(with_own(self.table, own), self.bodies, self.sides, self.margins, self.beside_obstacle)
 
 
+@collector_waits
 def proof_pairs(
     chain: Chain,
     bodies: Sequence[Body],

@@ -1,0 +1,1 @@
+"""Large scenes: thousands of boxes, clouds of points, threads, clusters."""

@@ -1,0 +1,76 @@
+"""What thousands of boxes cost a UR5: worlds, checks, moving one, whole plans."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl import Box, Obstacle, Problem, Scene, World, load_robot, plan, pose
+from rrtik_ompl.world.moving_world import MovingWorld
+
+PLANNER, BUSY = "fastrrtconnect", 20.0  # [s]: no clock ends a search on a busy machine
+EDGE, ROOM = 0.02, 1.5  # [m] of a box; radius of the ball that they fill
+MANY = 1000  # boxes, from which on as much of the room is full
+PLANS, ROWS, WORLDS, MOVES = 12, 8000, 3, 20
+
+
+@dataclass(frozen=True)
+class Among:
+    """Processor times among so many boxes: a world [us a box], a configuration, a move of one box [us], plans [ms]."""
+
+    world: float
+    check: float
+    move: float
+    plans: list[float]
+    found: int
+
+
+def spent(call: Callable[[], Any]) -> tuple[float, Any]:
+    """Processor time of a call [s], and what it returns."""
+    begin = time.process_time()
+    returned = call()
+    return time.process_time() - begin, returned
+
+
+def scene_of(count: int) -> Scene:
+    """Boxes in a ball around the base, none of them in it."""
+    rng = np.random.default_rng(1)
+    away = rng.normal(size=(count, 3))
+    away *= (np.cbrt(rng.uniform(0.03, 1.0, count)) * ROOM / np.linalg.norm(away, axis=1))[:, None]
+    edge = EDGE * min(1.0, (MANY / count) ** (1 / 3))
+    return Scene(tuple(Obstacle(f"box {k}", Box([edge] * 3), pose(p)) for k, p in enumerate(away)))
+
+
+def among_boxes(count: int) -> Among:
+    """A UR5 among boxes."""
+    robot, scene = load_robot("ur5"), scene_of(count)
+    made = [spent(partial(World, robot, scene)) for _ in range(WORLDS + 1)][1:]
+    world: World = made[0][1]
+    rows = np.random.default_rng(2).uniform(*robot.finite_range(), (ROWS, robot.dof))
+    free = rows[world.valid_batch(rows)]
+    check = min(spent(partial(world.valid_batch, rows))[0] for _ in range(3)) / ROWS
+    problems = [Problem(world, a, b) for a, b in zip(free[: 2 * PLANS : 2], free[1::2], strict=False)]
+    ask = [partial(plan, problem, PLANNER, seed=1, seconds=BUSY) for problem in problems]
+    ask[0]()
+    runs = [spent(call) for call in ask]
+    return Among(
+        world=1e6 * min(taken for taken, _ in made) / count,
+        check=1e6 * check,
+        move=1e6 * _move(world),
+        plans=[1e3 * taken for taken, _ in runs],
+        found=sum(found.found for _, found in runs),
+    )
+
+
+def _move(world: World) -> float:
+    """Processor time of moving one box of a world where boxes may be moved [s]."""
+    moving, first = MovingWorld(world), world.scene.obstacles
+    other = replace(first[0], pose=pose(first[0].pose.translation + np.array([0.0, 0.0, 0.01])))
+    scenes = [replace(world.scene, obstacles=(each, *first[1:])) for each in (other, first[0])]
+    moving.move(scenes[0])
+    return min(spent(partial(moving.move, scenes[k % 2]))[0] for k in range(1, MOVES))

@@ -1,0 +1,181 @@
+"""Large scenes: thousands of boxes, clouds of points, many queries by threads, clusters.
+
+Usage: ``python -m bench.scale.report FOLDER [--boxes 1 10 100 1000 10000] [--problems 50] [--runs 200]``
+
+FOLDER has the Panda's problems of MotionBenchMaker, as for `bench/whole_calls/search.py`. One process; what is done is
+kept beside the page until that is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from bench.scale.boxes import PLANS, Among, among_boxes
+from bench.scale.clouds import RADIUS, Seen, files_of, memory_of, seen_as_points
+from bench.scale.cluster import TASKS, Measured, on_workers, simulated
+from bench.scale.replans import POINTS, RATE, Walk, walks
+from bench.scale.threads import Spread, plans_in_threads, poses_in_threads
+from bench.shared.parts import Parts, add_options
+from bench.speed.machine import machine
+from rrtik_bench.report.page import Report
+
+AT_ONCE = 10  # runs of replanning in a part
+MANY, MOST = 100_000, 1_000_000  # points
+
+
+def boxes(report: Report, found: dict[int, Among]) -> None:
+    """How time grows with the number of boxes."""
+    heads = ["boxes", "`World()`, a box [us]", "a configuration [us]", "moving one box [us]"]
+    heads += ["`plan()`, median [ms]", "95 % [ms]", "found"]
+    rows = []
+    for n, a in found.items():
+        numbers = (a.world, a.check, a.move, np.median(a.plans), np.quantile(a.plans, 0.95))
+        rows.append([f"{n:,}", *(f"{number:.3g}" for number in numbers), f"{a.found} of {PLANS}"])
+    text = "Boxes of 2 cm at most, drawn in a ball of 1.5 m; from 1,000 on they fill as much of it."
+    report.table("A UR5 among boxes", heads, rows, text=text)
+    first, last = max(n for n in found if n <= 100), max(found)
+    grown, root = (float(np.median(found[last].plans) / np.median(found[first].plans)), (last / first) ** 0.5)
+    what = f"plan() among {last:,} boxes beside {first:,}"
+    report.bar(what, f"<= {root:.1f} times", f"{grown:.1f}", grown <= root)
+    whole = float(np.median(found[last].plans))
+    report.bar(f"plan() among {last:,} boxes", "<= 12 ms", f"{whole:.3g} ms", whole <= 12.0)
+    report.bar(f"World() of {last:,} boxes, a box", "<= 15 us", f"{found[last].world:.3g} us", found[last].world <= 15)
+    moved = found[min(n for n in found if n >= 1000)].move if last >= 1000 else found[last].move
+    report.bar("moving one of 1,000 boxes", "<= 50 us", f"{moved:.3g} us", moved <= 50)
+
+
+def clouds(report: Report, count: int, found: list[Seen], bars: tuple[float, float, float]) -> None:
+    """Clouds of so many points; ``bars``: build [ms], a configuration [us], whole plan [ms]."""
+    asked = [each for each in found if each.state != "swallowed"]
+    planned = [each for each in asked if each.state == "planned"]
+    middle = {name: float(np.median([getattr(each, name) for each in asked])) for name in ("build", "world", "check")}
+    times = [each.plan for each in asked]
+    heads = [
+        "points",
+        "problems",
+        "swallowed",
+        "planned",
+        "proven",
+        "tree [ms]",
+        "`World()` [ms]",
+        "a configuration [us]",
+    ]
+    heads += ["`plan()` median [ms]", "95 % [ms]", "nearest point [mm]"]
+    judged = [each.nearest for each in planned if not np.isnan(each.nearest)]
+    row = [f"{count:,}", str(len(found)), str(len(found) - len(asked)), str(len(planned))]
+    row += [str(sum(each.proven for each in planned)), *(f"{middle[name]:.3g}" for name in ("build", "world", "check"))]
+    row += [f"{np.median(times):.3g}", f"{np.quantile(times, 0.95):.3g}", f"{1e3 * min(judged):.3g}" if judged else "-"]
+    text = (
+        f"Obstacles of the Panda's problems as points on their surfaces, {1e3 * RADIUS:g} mm each; a path is compared "
+    )
+    text += "with every point near it by coal alone, every 0.02 rad."
+    report.table(f"Clouds of {count:,} points", heads, [row], text=text)
+    build, plan = middle["build"] + middle["world"], float(np.median(times))
+    name = f"{count:,} points"
+    report.bar(f"{name}: build, with the world", f"<= {bars[0]:g} ms", f"{build:.3g} ms", build <= bars[0])
+    if bars[1]:
+        held = middle["check"] <= bars[1]
+        report.bar(f"{name}: one configuration", f"<= {bars[1]:g} us", f"{middle['check']:.3g} us", held)
+    report.bar(f"{name}: whole plan, median", f"<= {bars[2]:g} ms", f"{plan:.3g} ms", plan <= bars[2])
+    share = len(planned) / len(asked)
+    report.bar(f"{name}: solved of those not swallowed", "100 %", f"{100 * share:.3g} %", share == 1.0)
+    if judged:
+        close = sum(gap <= 0.0 for gap in judged)
+        report.bar(f"{name}: paths with a point too near, by coal", "0", f"{close} of {len(judged)}", close == 0)
+
+
+def threads(report: Report, plans: Spread, poses: Spread) -> None:
+    """One thread beside two."""
+    heads = ["work", "number", "found", "two threads beside one: median, best", "alike", "best rate [1/s]", "load"]
+    rows = []
+    for what, s in (("`plan_many`, Panda, bookshelf", plans), ("`solve_ik_batch`, UR5", poses)):
+        ratios = f"{np.median(s.ratios):.2f}, {max(s.ratios):.2f}"
+        alike = "yes" if s.alike else "NO"
+        rows.append([what, f"{s.count:,}", f"{s.found:,}", ratios, alike, f"{s.rate:,.0f}", f"{s.load:.1f}"])
+    text = "Wall times, by turns, so what else the machine does (its load stands beside it) makes the ratios smaller."
+    report.table("Threads", heads, rows, text=text)
+    best = max(plans.ratios)
+    report.bar("1,000 queries: 2 threads beside 1 (best of turns)", ">= 1.8 times", f"{best:.2f}", best >= 1.8)
+    report.bar("1,000 queries: same paths", "all", "all" if plans.alike else "NOT ALL", plans.alike)
+    report.bar("whole plans a second, both cores", ">= 3,000", f"{plans.rate:,.0f}", plans.rate >= 3000)
+
+
+def replanning(report: Report, found: list[Walk]) -> None:
+    """Runs from clouds."""
+    ticks = np.concatenate([each.ticks for each in found])
+    touched, slow = sum(each.contacts > 0 for each in found), float(np.quantile(ticks, 0.95))
+    arrived, proven = sum(each.arrived for each in found), float(np.mean([each.proven for each in found]))
+    text = (
+        f"{len(found)} runs of a UR5 beside a ball that sways, seen as {POINTS:,} points anew {RATE:g} times a second: "
+    )
+    text += (
+        f"{arrived} arrived in time, {100 * proven:.1f} % of the motions proven; ticks of {np.median(ticks):.3g} ms "
+    )
+    text += (
+        f"(median), {slow:.3g} ms (95 %), {ticks.max():.3g} ms (longest) of processor time, the making of the points "
+    )
+    report.note("Replanning from clouds", text + "left out. Contacts by coal, with the ball itself, six places a tick.")
+    report.bar(f"replanning from clouds, {len(found)} runs: with contact", "0", str(touched), touched == 0)
+    report.bar("replanning from clouds: tick, 95 %", "<= 20 ms", f"{slow:.3g} ms", slow <= 20.0)
+
+
+def cluster(report: Report, found: list[Measured]) -> None:
+    """Workers that are there, and a thousand that are not."""
+    heads = ["workers", "tasks", "solved", "wall [s]", "scheduler, a task [ms of processor time]"]
+    rows = [[str(m.workers), str(TASKS), str(m.solved), f"{m.wall:.2f}", f"{1e3 * m.scheduler:.2f}"] for m in found]
+    text = "Workers on this machine of 2 cores. A task is the name of a problem: its world is made on the worker, once."
+    report.table("A Dask cluster", heads, rows, text=text)
+    booked = float(np.median([m.scheduler for m in found]))
+    heads = ["workers", "task [s]", "tasks", "wall [s]", "time spent planning", "given out again"]
+    rows = []
+    for task in (0.01, 1.0, 60.0):
+        for workers in (1, 100, 1000):
+            s = simulated(workers, max(20 * workers, 1000), task, booked)
+            number = max(20 * workers, 1000)
+            rows.append(
+                [f"{workers:,}", f"{task:g}", f"{number:,}", f"{s.wall:.3g}", f"{100 * s.busy:.1f} %", str(s.again)]
+            )
+    text = f"One scheduler that books a task in {1e3 * booked:.2f} ms, as measured; workers begin in 3 s, get 50 kB of "
+    text += "problem files once each over one line of 1 Gbit/s, and are lost once a day; lengths are log-normal."
+    report.table("A thousand workers, by simulation", heads, rows, text=text)
+
+
+def main() -> None:
+    """Measure and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--boxes", type=int, nargs="+", default=[1, 10, 100, 1000, 10_000])
+    parser.add_argument("--problems", type=int, default=50)
+    parser.add_argument("--large", type=int, default=10, help="problems with a million points")
+    parser.add_argument("--runs", type=int, default=200)
+    parser.add_argument("--queries", type=int, default=1000)
+    add_options(parser, "scale.md")
+    given = parser.parse_args()
+    report = Report("Large scenes", "python -m bench.scale.report FOLDER")
+    folder = str(given.folder)
+    with Parts(given.out, given.jobs) as parts:
+        among = parts(among_boxes, [[n] for n in given.boxes])
+        files = files_of(given.folder, given.problems)
+        seen = parts(seen_as_points, [[file, folder, MANY, True] for file in files])
+        large = parts(seen_as_points, [[file, folder, MOST, False] for file in files[: given.large]])
+        memory = parts(memory_of, [[MOST]])[0]
+        plans, poses = parts(plans_in_threads, [[folder, given.queries]])[0], parts(poses_in_threads, [[100_000]])[0]
+        spread = parts(on_workers, [[n] for n in (1, 2, 4)])
+        starts = [[first, AT_ONCE] for first in range(0, given.runs, AT_ONCE)]
+        walked = [walk for part in parts(walks, starts) for walk in part]
+        report.note("Machine", machine())
+        boxes(report, dict(zip(given.boxes, among, strict=True)))
+        clouds(report, MANY, seen, (25.0, 2.0, 3.0))
+        clouds(report, MOST, large, (300.0, 0.0, 6.0))
+        report.bar("memory of a cloud of 1,000,000 points", "<= 150 MB", f"{memory:.0f} MB", memory <= 150.0)
+        threads(report, plans, poses)
+        replanning(report, walked)
+        cluster(report, spread)
+        report.finish(given.out)
+
+
+if __name__ == "__main__":
+    main()
