@@ -132,7 +132,7 @@ def in_notebook(thing: object) -> str | None:
 class ForThread(Protocol):
     """What is not for two threads at a time, but can be had again."""
 
-    def for_thread(self) -> Any:
+    def for_thread(self) -> object:
         """The same for another thread."""
 
 
@@ -158,7 +158,7 @@ class ThreadOwn(Generic[Kept]):
     def __get__(self, thing: None, kind: type) -> ThreadOwn[Kept]: ...
     @overload
     def __get__(self, thing: object, kind: type) -> Kept: ...
-    def __get__(self, thing: object, kind: type) -> Any:
+    def __get__(self, thing: object, kind: type) -> object:
         """The value of this thread; it ends with the thread."""
         return self if thing is None else vars(thing)[self._name].value
 

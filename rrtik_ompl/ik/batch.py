@@ -13,6 +13,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_ne
 from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.description.joint_weights import weighted_difference
+from rrtik_ompl.fast.threads import cores, in_threads
 from rrtik_ompl.goal import PoseGoal, joint_difference, tolerances
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
 from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
@@ -21,7 +22,6 @@ from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
 from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, mid_range_configuration, solve_ik
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.threads import cores, in_threads
 from rrtik_ompl.world import World
 from rrtik_ompl.world.check_world import check_world
 

@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Vector, finite_array, whole_number
 from rrtik_ompl.choices import ProofMode
 from rrtik_ompl.errors import InputError, ProblemError, require
+from rrtik_ompl.fast.threads import in_threads
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_options import is_safe
 from rrtik_ompl.planning import plan
 from rrtik_ompl.planning.outcome import Plan
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.threads import in_threads
 from rrtik_ompl.world import World
 
 Ends = ArrayLike | Sequence[Goal]

@@ -297,5 +297,4 @@ class Prover:
     def _gap(self, packed: ProofPairs, motion: int, pair: int, place: float) -> Gap:
         if pair < 0:
             return Gap(motion, float("nan"), "", "")
-        i, j = packed.bodies[pair].tolist()
-        return Gap(motion, place, self.bodies[i].name, self.bodies[j].name)
+        return Gap(motion, place, *(self.bodies[k].name for k in packed.bodies[pair].tolist()))

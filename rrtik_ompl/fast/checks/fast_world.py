@@ -13,12 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.checks import reference_distances
+from rrtik_ompl.fast.checks import inputs, reference_distances
 from rrtik_ompl.fast.checks.clearance import Clearance, rounded
-from rrtik_ompl.fast.checks.inputs import LARGEST_ANGLE, STROKE, checked_step_counts, joint_limits
 from rrtik_ompl.fast.checks.reference import ReferenceChecks
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.layout import CORNERS, MARKS, OUTER_PRIMITIVES, SIZES, STANDING_SOLIDS, UNDECIDED
@@ -82,13 +81,13 @@ class FastWorld:
         outer: Sequence[Spheres],
         inner: Sequence[Spheres],
         solids: Sequence[Solids] | None = None,
-        strokes: ArrayLike = STROKE,
+        strokes: ArrayLike = inputs.STROKE,
         like: FastWorld | None = None,
         compiled: bool = True,
     ) -> None:
         self._joints = len(chain.parent)
-        self._limits = joint_limits(chain, strokes)
-        self._smallest_limit = float(self._limits.min(initial=LARGEST_ANGLE))
+        self._limits = inputs.joint_limits(chain, strokes)
+        self._smallest_limit = float(self._limits.min(initial=inputs.LARGEST_ANGLE))
         moves = [body.joint > 0 for body in bodies]
         kept = [(i, j) for i, j in pairs if moves[i] or moves[j]]
         clear = partners(bodies, kept)
@@ -193,7 +192,7 @@ class FastWorld:
         else:
             found = np.empty(len(rows), dtype=np.int32)
             places = (rows.ctypes.data, len(rows), found.ctypes.data)
-            _require_sound(self._kernels.classify(self.address, *places, resolve))
+            inputs.require_sound(self._kernels.classify(self.address, *places, resolve))
             answers = found.astype(np.int8)
         return answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
 
@@ -214,7 +213,7 @@ class FastWorld:
             InputError: If shapes do not fit, a value is not finite or a number of steps is not a positive integer.
         """
         (starts, first), (ends, second) = self._values(A, "starts"), self._values(B, "ends")
-        steps = checked_step_counts(counts, len(starts))
+        steps = inputs.checked_step_counts(counts, len(starts))
         if len(starts) != len(ends):
             raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
         if self._kernels is None:
@@ -223,7 +222,7 @@ class FastWorld:
             found = np.empty(len(starts), dtype=np.int32)
             places = (starts.ctypes.data, ends.ctypes.data, steps.ctypes.data)
             sink = found.ctypes.data
-            _require_sound(self._kernels.classify_edges(self.address, *places, len(starts), sink, resolve))
+            inputs.require_sound(self._kernels.classify_edges(self.address, *places, len(starts), sink, resolve))
             answers = found.astype(np.int8)
         for beyond in (first, second):
             answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
@@ -266,7 +265,7 @@ class FastWorld:
             self._probe = probe_table(self._primitives)
         found, pairs = np.empty(len(rows)), np.empty(len(rows), dtype=np.int32)
         tables = (self.address, balls.address, scene.address, rows.ctypes.data, len(rows), self._probe.address)
-        _require_sound(kernels.measure(*tables, found.ctypes.data, pairs.ctypes.data))
+        inputs.require_sound(kernels.measure(*tables, found.ctypes.data, pairs.ctypes.data))
         return np.where(pairs < 0, np.inf, found), pairs
 
     def undecided_pairs(self, V: ArrayLike) -> list[list[tuple[int, int]]]:
@@ -291,25 +290,10 @@ class FastWorld:
         """Flags of the pairs that are not proven free, shape (m, flags), for a few rows."""
         if self._kernels is None:
             return self._reference.marks(rows)
-        count = _require_sound(self._kernels.mark_pairs(self.address, rows.ctypes.data, len(rows)))
+        count = inputs.require_sound(self._kernels.mark_pairs(self.address, rows.ctypes.data, len(rows)))
         lanes = np.arange(len(rows), dtype=np.int32)[:, None]
         return np.asarray((self._marks[:count] >> lanes) & 1, dtype=bool)
 
     def _values(self, V: ArrayLike, what: str) -> tuple[Matrix, Mask | None]:
         """Rows of values as the kernels want them, and which of them lie beyond the limits, if any."""
-        rows = V if isinstance(V, np.ndarray) and V.dtype == np.float64 else None
-        if rows is None or rows.ndim != 2 or rows.shape[1] != self._joints:
-            rows = finite_array(V, (None, self._joints), what)
-        rows = np.ascontiguousarray(rows)
-        if not rows.size or (rows.max() <= self._smallest_limit and rows.min() >= -self._smallest_limit):
-            return rows, None
-        rows = finite_array(rows, (None, self._joints), what)
-        beyond: Mask = np.any(np.abs(rows) > self._limits, axis=1)
-        return (np.where(beyond[:, None], 0.0, rows), beyond) if beyond.any() else (rows, None)
-
-
-def _require_sound(count: int) -> int:
-    """What a kernel returns, unless it has met a primitive of a kind that it does not know."""
-    if count < 0:
-        raise InputError("collision check: a primitive is of a kind that the kernels do not know")
-    return count
+        return inputs.kernel_values(V, self._limits, self._smallest_limit, what)

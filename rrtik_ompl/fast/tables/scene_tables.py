@@ -113,7 +113,7 @@ def _fits(primitives: Primitives) -> Mask:
 def _byprimitive_kind(bodies: Sequence[Body]) -> dict[int | None, list[int]]:
     """Places of the bodies by their kinds of primitive, None for those without a formula."""
     found: dict[int | None, list[int]] = {}
-    kinds = of_each((body.geometry for body in bodies), lambda geometry: primitive_kind(SameObject(geometry)))
+    kinds = of_each((body.geometry for body in bodies), lambda solid: primitive_kind(SameObject(solid)))
     for k, kind in enumerate(kinds):
         found.setdefault(kind, []).append(k)
     return found
@@ -159,7 +159,7 @@ def _exact(
             made += [_BUILDERS[kind](bodies[k], k, grow, float(beside[k])) for k in chosen]
         elif kind is not None:
             poses = np.array([bodies[k].placement.homogeneous for k in chosen])
-            cores = of_each((bodies[k].geometry for k in chosen), lambda geometry: cast(Core, core_of(geometry)))
+            cores = [cast(Core, core) for core in of_each((bodies[k].geometry for k in chosen), core_of)]
             made.append(_MAKERS[kind](own, poses, cores, grow, beside[own]))
     return made
 
@@ -240,8 +240,7 @@ def _bounded(
 
 def _slack(centres: Matrix, sizes: Vector) -> Vector:
     """Of primitives [m], shape (n,)."""
-    slack: Vector = SLACK_PER_METRE * (1.0 + np.abs(centres).max(axis=1, initial=0.0) + sizes)
-    return slack
+    return np.asarray(SLACK_PER_METRE * (1.0 + np.abs(centres).max(axis=1, initial=0.0) + sizes))
 
 
 def _balls(bodies: Sequence[Body], covers: Sequence[tuple[int, Spheres]], grow: float, beside: Vector) -> Primitives:
