@@ -16,18 +16,23 @@ from rrtik_ompl.world.moving_world import MovingWorld
 PLANNER, BUSY = "fastrrtconnect", 20.0  # [s]: no clock ends a search on a busy machine
 EDGE, ROOM = 0.02, 1.5  # [m] of a box; radius of the ball that they fill
 MANY = 1000  # boxes, from which on as much of the room is full
-PLANS, ROWS, WORLDS, MOVES = 12, 8000, 3, 20
+PLANS, FEWEST, ROWS, WORLDS, MOVES = 8, 3, 8000, 2, 3  # FEWEST plans among the most boxes
 
 
 @dataclass(frozen=True)
 class Among:
-    """Processor times among so many boxes: a world [us a box], a configuration, a move of one box [us], plans [ms]."""
+    """Processor times among so many boxes: a world [us a box], a configuration, a move of one box [us], plans [ms].
+
+    ``motions``: that each plan checked; ``free``: share of the configurations.
+    """
 
     world: float
     check: float
     move: float
     plans: list[float]
+    motions: list[int]
     found: int
+    free: float
 
 
 def spent(call: Callable[[], Any]) -> tuple[float, Any]:
@@ -54,7 +59,8 @@ def among_boxes(count: int) -> Among:
     rows = np.random.default_rng(2).uniform(*robot.finite_range(), (ROWS, robot.dof))
     free = rows[world.valid_batch(rows)]
     check = min(spent(partial(world.valid_batch, rows))[0] for _ in range(3)) / ROWS
-    problems = [Problem(world, a, b) for a, b in zip(free[: 2 * PLANS : 2], free[1::2], strict=False)]
+    plans = PLANS if count <= MANY else FEWEST
+    problems = [Problem(world, a, b) for a, b in zip(free[: 2 * plans : 2], free[1::2], strict=False)]
     ask = [partial(plan, problem, PLANNER, seed=1, seconds=BUSY) for problem in problems]
     ask[0]()
     runs = [spent(call) for call in ask]
@@ -63,7 +69,9 @@ def among_boxes(count: int) -> Among:
         check=1e6 * check,
         move=1e6 * _move(world),
         plans=[1e3 * taken for taken, _ in runs],
+        motions=[int(found.statistics.get("motions", 0)) for _, found in runs],
         found=sum(found.found for _, found in runs),
+        free=len(free) / ROWS,
     )
 
 

@@ -1,4 +1,4 @@
-"""Many planning queries at once: in processes of this machine that may be lost, or on a Dask cluster."""
+"""Many planning queries at once: in threads, in processes of this machine that may be lost, or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from typing import Any
 from rrtik_ompl.arrays import positive, whole_number
 from rrtik_ompl.benchmark import spread
 from rrtik_ompl.benchmark.campaign import all_jobs
-from rrtik_ompl.benchmark.sources import file_source
+from rrtik_ompl.benchmark.sources import build, file_source, from_plain
 from rrtik_ompl.benchmark.suite import Entrant, Suite
 from rrtik_ompl.benchmark.suite_file import NONE, SHORTENINGS
 from rrtik_ompl.choices import SuiteShortening, one_of
-from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto, options_of, refuse_options
+from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError, require
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto, options_of, refuse_options
+from rrtik_ompl.ompl_bridge.planner_options import is_safe
 
 
 def plan_batch(
@@ -33,6 +34,10 @@ def plan_batch(
 ) -> list[dict[str, Any]]:
     """Plan for many problems; one that crashes, hangs or takes too much memory is lost alone.
 
+    Planners of ours, which end in time and run side by side, work in threads of this process, so that nobody waits for
+    others to begin; those of OMPL, and shortening, in processes. Workers of a cluster are sent names of problems or
+    files, not worlds: each makes the world of a problem once, as long as its queries follow each other.
+
     The same seed gives the same paths however the queries are spread, as long as no time limit cuts in.
 
     Args:
@@ -42,7 +47,7 @@ def plan_batch(
         seed: Of all of them.
         parameters: Options of the planner.
         shorten: A method of shortening, "none", or "by-kind": axis for single-joint moves.
-        memory_mb: That a query may take beside robot, scene and library [MB].
+        memory_mb: That a query in a process may take beside robot, scene and library [MB].
         jobs: Queries at a time on this machine.
         scheduler: Address of a Dask scheduler whose workers do them instead.
 
@@ -75,9 +80,20 @@ def plan_batch(
         seed=whole_number(seed, "seed"),
     )
     left, count = all_jobs(suite), whole_number(jobs, "jobs", 1)
-    finished = spread.local(left, count) if scheduler is None else spread.cluster(left, scheduler)
+    finished = spread.local(left, count, _beside) if scheduler is None else spread.cluster(left, scheduler)
     records = {int(record["problem"]): record for record in finished}
     return [{**records[k], "problem": source.name} for k, source in enumerate(named)]
+
+
+def _beside(job: Mapping[str, Any]) -> bool:
+    """Whether a job may be done in a thread: its planner is one of ours, and nothing of OMPL shortens its path."""
+    if job["shorten"] != NONE:
+        return False
+    try:
+        name = job["planner"] or build(from_plain(job["source"])).planner or AUTO
+        return is_auto(name) or is_safe(find_planner(name))
+    except (RrtikError, MemoryError):  # a process will say what is wrong with the problem
+        return False
 
 
 def _entrant(planner: str | None, parameters: dict[str, Any], shorten: SuiteShortening) -> Entrant:

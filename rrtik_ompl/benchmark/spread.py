@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.benchmark.guard import Closed, Guards
+from rrtik_ompl.benchmark.run import execute
 from rrtik_ompl.errors import InputError, RrtikError
 
 if TYPE_CHECKING:
@@ -20,10 +21,15 @@ Job = Mapping[str, Any]
 Done = dict[str, Any]
 
 
-def local(jobs: Iterable[Job], count: int) -> Generator[Done, None, None]:
+def local(
+    jobs: Iterable[Job], count: int, beside: Callable[[Job], bool] = lambda _: False
+) -> Generator[Done, None, None]:
     """Do jobs ``count`` at a time on this machine; records come as they are finished.
 
-    Threads do nothing but wait for the guarded processes in which the work is done.
+    Args:
+        jobs: What is to be done.
+        count: See above.
+        beside: Which jobs are done in threads of this process; for others a thread waits for a guarded process.
     """
     from joblib import Parallel, delayed
 
@@ -31,7 +37,7 @@ def local(jobs: Iterable[Job], count: int) -> Generator[Done, None, None]:
 
     def one(job: Job) -> Done | None:
         try:
-            return {**job["run"], **guards.run(job)}
+            return {**job["run"], **(execute(job) if beside(job) else guards.run(job))}
         except Closed:
             return None
 

@@ -32,16 +32,14 @@ from rrtik_ompl.world.rebuild import reduce_world
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
-NO_GEOMETRY = "has no collision geometry: every configuration counts as free"
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
 
 
 class World:
-    """Exact collision checks of a robot in a scene.
+    """Exact collision checks of a robot in a scene; several threads may ask one world, each in memory of its own.
 
     Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
     (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal and refuses what they cannot prove.
-    Several threads may ask one world: each has memory of its own to compute in, and answers are the same.
 
     Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
     no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
@@ -89,7 +87,7 @@ class World:
         if self.motion_resolution < FINEST_RESOLUTION:
             raise InputError(f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {motion_resolution}")
         if not robot.collision.geometryObjects:
-            warnings.warn(MeshWarning(f"robot '{robot.name}' {NO_GEOMETRY}"), stacklevel=2)
+            warnings.warn(MeshWarning(f"robot '{robot.name}' has no collision geometry: all counts as free"), stacklevel=2)
         self.self_margin = own = not_negative(self_margin, "self_margin")
         self.bodies = link_bodies(robot, own) + scene_bodies(robot, self.scene.at(0.0), own)
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])

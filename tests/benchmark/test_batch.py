@@ -18,6 +18,19 @@ def test_a_batch_of_queries_comes_in_order_and_finds_what_plan_finds(tmp_path):
     assert records[1]["waypoints"] == alone.path.waypoints.tolist()
 
 
+def test_planners_of_ours_work_in_threads_and_find_the_same_however_many(monkeypatch):
+    def no_process(*_):
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr("rrtik_ompl.benchmark.guard.Guard.run", no_process)
+    queries = ["planar3_boxes", "titan4_prisms", "planar3_boxes"]
+    one, three = (plan_batch(queries, "fastrrtconnect", seed=2, jobs=jobs) for jobs in (1, 3))
+    assert [record["status"] for record in one] == ["solved"] * 3
+    assert [record["waypoints"] for record in one] == [record["waypoints"] for record in three]
+    with pytest.raises(AssertionError, match="a process"):
+        plan_batch(queries[:1], "RRTConnect", seed=2)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
