@@ -39,9 +39,7 @@ def boxes(report: Report, found: dict[int, Among]) -> None:
         numbers = [f"{number:.4g}" for number in whole]
         rows.append([f"{n:,}", *times, f"{100 * a.free:.0f} %", *numbers, f"{a.found} of {len(plans)}"])
     text = "Boxes of 2 cm at most, drawn in a ball of 1.5 m. From 1,000 on they fill as much of it, and the arm finds "
-    text += (
-        "less and less room: the last columns tell a plan's motions and what one costs, proofs and all else included."
-    )
+    text += "less room: the last columns tell a plan's motions and what one costs, proofs and all else included."
     report.table("A UR5 among boxes", heads, rows, text=text)
     first, last = max(n for n in found if n <= 100), max(found)
     grown, root = (float(np.median(found[last].plans) / np.median(found[first].plans)), (last / first) ** 0.5)

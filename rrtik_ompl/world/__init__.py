@@ -87,7 +87,7 @@ class World:
         if self.motion_resolution < FINEST_RESOLUTION:
             raise InputError(f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {motion_resolution}")
         if not robot.collision.geometryObjects:
-            warnings.warn(MeshWarning(f"robot '{robot.name}' has no collision geometry: all counts as free"), stacklevel=2)
+            warnings.warn(MeshWarning(f"robot '{robot.name}' has no collision geometry: all is free"), stacklevel=2)
         self.self_margin = own = not_negative(self_margin, "self_margin")
         self.bodies = link_bodies(robot, own) + scene_bodies(robot, self.scene.at(0.0), own)
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
