@@ -68,7 +68,7 @@ def directions(drawing: Drawing, quick: bool) -> None:
         if law is not None:
             panel.plot(*law, color=COLORS[1], linewidth=1.2, label="law")
         panel.set(xlabel="direction from the goal's [deg]", title=title)
-        panel.legend(frameon=False, fontsize=8)
+        panel.legend(frameon=False, fontsize=8, loc="upper center")
         tidy(panel)
 
 
