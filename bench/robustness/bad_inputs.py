@@ -24,7 +24,7 @@ from bench.robustness.spoilt_files import FILES, PROBLEM, STL, URDF, write
 from rrtik_ompl.cli.app import BAD_INPUT
 
 SECONDS, MEMORY_BYTES = 2.0, 1 << 30  # of the processor, and beside what a command has when it begins
-HANG_SECONDS = 120  # of wall time, on a busy machine
+HANG_SECONDS, ENDLESS_SECONDS = 120, 20.0  # of wall time, on a busy machine, and of the processor: then it is ended
 UNFIT, CRASHED = 8, 9  # exit codes of a child
 
 PATH = '{"version": 1, "waypoints": [[0, 0], [0.5, 0]]}'
@@ -196,7 +196,7 @@ def _child(given: BadInput, folder: Path) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (most + MEMORY_BYTES, most + MEMORY_BYTES))
         for name in (signal.SIGALRM, signal.SIGPROF):
             signal.signal(name, signal.SIG_DFL)
-        signal.setitimer(signal.ITIMER_PROF, 10.0 * SECONDS)
+        signal.setitimer(signal.ITIMER_PROF, ENDLESS_SECONDS)
         signal.alarm(HANG_SECONDS)
         for number in (1, 2):
             os.dup2(os.open(os.devnull, os.O_WRONLY), number)
