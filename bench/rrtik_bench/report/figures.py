@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from rrtik_ompl.plots.joints import save_figure
@@ -12,6 +13,7 @@ from rrtik_ompl.plots.joints import save_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
+LETTERS = 13  # of a caption on an inch
 PICTURE = "published only as a picture: no number to mark"
 
 
@@ -45,5 +47,6 @@ class Figure:
 
         drawing = matplotlib.figure.Figure(figsize=self.size, layout="constrained")
         self.draw(drawing, quick)
-        drawing.suptitle(f"{self.title}\n{self.source}; {self.marked}", fontsize=9)
+        lines = wrap(f"{self.source}; {self.marked}", round(LETTERS * self.size[0]))
+        drawing.suptitle("\n".join([self.title, *lines]), fontsize=9)
         save_figure(drawing, file)
