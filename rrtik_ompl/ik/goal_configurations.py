@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -40,7 +41,8 @@ FEWEST = 4  # for each part, to say how near the arm came
 PARTS = 6  # of a grasp set, among which the starts of a round are shared out
 MAX_ROUNDS = 4  # at most, until one free configuration is found
 LAST_ROUND = 64
-TREE_SECONDS = 1e9  # no limit: the passes of MB-RRT are counted, some 0.1 to 0.4 s of them
+NO_LIMIT = 1e9  # [s]; the passes of MB-RRT are counted, some 0.1 to 0.4 s of them
+LEAST_SECONDS = 1e-3
 MAX_CONFIGURATIONS = 16  # configurations that one round adds
 LARGEST = 96  # configurations altogether
 SAME_POSTURE = 1e-3  # [rad] or [m]
@@ -79,11 +81,22 @@ class GoalSearch:
             and configurations.
     """
 
-    def __init__(self, problem: Problem, rng: np.random.Generator | int, *, all_turns: bool = True) -> None:
-        """Prepare the search; see :func:`goal_configurations`. A seed will do for a generator."""
+    def __init__(
+        self,
+        problem: Problem,
+        rng: np.random.Generator | int,
+        *,
+        all_turns: bool = True,
+        seconds_left: Callable[[], float] = lambda: NO_LIMIT,
+    ) -> None:
+        """Prepare the search; see :func:`goal_configurations`. A seed will do for a generator.
+
+        ``seconds_left`` says how long there is time: a later round begins only then, and MB-RRT ends with it.
+        """
         self.rows: Matrix = frozen(np.zeros((0, problem.world.robot.dof)))
         self.exhausted = isinstance(problem.goal, JointGoal)
         self._problem, self._rounds, self._found = problem, 0, self.rows
+        self._seconds_left = seconds_left
         self._unheld = self.rows  # at the goal, whether or not they keep path constraints
         self._certain = False  # whether nothing random was in the first round
         if isinstance(problem.goal, JointGoal):
@@ -94,7 +107,7 @@ class GoalSearch:
     def first(self) -> Matrix:
         """Search until there is a free configuration, for a few rounds; all rows."""
         for _ in range(MAX_ROUNDS):
-            if len(self.rows) == 0:
+            if len(self.rows) == 0 and (self._rounds == 0 or self._seconds_left() > 0.0):
                 self.more()
         return self.rows
 
@@ -170,8 +183,9 @@ class GoalSearch:
             self.exhausted = self._certain and not leaves_a_curve(robot, drawn)
             return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
         if number == 1 and _fits("mb-rrt", robot, drawn):
+            left = max(self._seconds_left(), LEAST_SECONDS)
             return solve_ik(
-                robot, goal, method="mb-rrt", near=problem.start, world=problem.world, seconds=TREE_SECONDS, seed=seed
+                robot, goal, method="mb-rrt", near=problem.start, world=problem.world, seconds=left, seed=seed
             ).solutions
         starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
         starts[0] = problem.start

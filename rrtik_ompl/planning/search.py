@@ -64,7 +64,7 @@ class Search:
         self.reason, self.counting = "", 0.0
         self._problem, self._factory, self._clearance = problem, factory, clearance
         self._deadline, self._seeds = deadline, seeds
-        self._goals = GoalSearch(problem, seeds[0])
+        self._goals = GoalSearch(problem, seeds[0], seconds_left=self._left)
         self._traits, joints = traits_of(factory), isinstance(problem.goal, JointGoal)
         self._iterations = iterations if self._traits.supports_iteration_limit else None
         wanted = {"clearance": clearance} if self._traits.leaves_room and clearance is not None else {}

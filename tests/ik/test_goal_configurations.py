@@ -122,6 +122,18 @@ def test_a_search_ends(turning):
     assert len(search.rows) <= 96
 
 
+@pytest.mark.parametrize("left", [0.0, 0.25])
+def test_a_search_without_time_ends_after_a_round_and_leaves_mb_rrt_what_time_there_is(world, left, monkeypatch):
+    problem = Problem(world, HERE, PositionGoal([5.0, 0.0, 0.0]))
+    asked, solve = [], goal_configurations.solve_ik
+    monkeypatch.setattr(goal_configurations, "solve_ik", lambda *a, **b: asked.append(b["seconds"]) or solve(*a, **b))
+    monkeypatch.setattr(goal_configurations, "_fits", lambda method, *_: method == "mb-rrt")
+    search = GoalSearch(problem, 0, seconds_left=lambda: left)
+    assert len(search.first()) == 0
+    assert asked == ([left] if left else [])
+    assert ("in 1 round;" in search.reason) == (left == 0.0)
+
+
 @pytest.mark.parametrize("name", sorted(set(ompl_planners()) - set(ONE_GOAL_PLANNERS)))
 def test_the_sampler_serves_every_planner_of_ompl(quiet_ompl, turning, name):
     sampler = GoalSampler(turning, seed=1, most=20)
