@@ -6,16 +6,14 @@ it are there.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
-from typing import IO
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.pilot.records.record import Record
+from rrtik_ompl.pilot.records.record import GrowingFile, Record
 
 SUFFIX = ".mjpeg"
 QUALITY = 85
@@ -26,12 +24,8 @@ def beside(record: Path) -> Path:
     return record.with_name(record.name + SUFFIX)
 
 
-class PictureRecord:
-    """Grows picture by picture.
-
-    Attributes:
-        fault: Why there are no more pictures, as where the disk is full; "" while there are.
-    """
+class PictureRecord(GrowingFile):
+    """Grows picture by picture."""
 
     def __init__(self, record: Record, path: Path) -> None:
         """Begin.
@@ -43,11 +37,10 @@ class PictureRecord:
         Raises:
             InputError: If the file beside it cannot be written, or is there already.
         """
-        self.fault, self._told = "", False
         self._record, self._path = record, beside(path)
         self._last: NDArray[np.uint8] | None = None
         try:
-            self._file: IO[bytes] | None = open(self._path, "xb")  # noqa: SIM115 - open as long as the session
+            self._file = open(self._path, "xb")  # noqa: SIM115 - open as long as the session
         except FileExistsError:
             raise InputError(f"{self._path}: is there already; choose another --record, or delete it") from None
         except OSError as error:
@@ -68,18 +61,6 @@ class PictureRecord:
             self.close()
             return
         self._record.write("picture", time, at=begin, size=len(data))
-
-    def news(self) -> str:
-        """Why there are no more pictures, the first time that this is asked; else ""."""
-        said, self._told = "" if self._told else self.fault, bool(self.fault)
-        return said
-
-    def close(self) -> None:
-        """End it."""
-        if self._file is not None:
-            with suppress(OSError):
-                self._file.close()
-            self._file = None
 
 
 class RecordedPictures:

@@ -7,17 +7,37 @@ import os
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from rrtik_ompl.errors import InputError
 
 
-class Record:
-    """A file that grows line by line; whatever ends the session, the lines before it are there.
+class GrowingFile:
+    """A file of a session, which ends with a fault or with the session.
 
     Attributes:
-        fault: Why the record has ended before the session, as where the disk is full; "" if it has not.
+        fault: Why it has ended before the session, as where the disk is full; "" if it has not.
     """
+
+    fault = ""
+    _file: IO[bytes] | None = None
+    _told = False
+
+    def news(self) -> str:
+        """Why the record has ended, the first time that this is asked; else ""."""
+        said, self._told = "" if self._told else self.fault, bool(self.fault)
+        return said
+
+    def close(self) -> None:
+        """End the record."""
+        if self._file is not None:
+            with suppress(OSError):
+                self._file.close()
+            self._file = None
+
+
+class Record(GrowingFile):
+    """A file that grows line by line; whatever ends the session, the lines before it are there."""
 
     def __init__(self, path: str | os.PathLike[str] | None) -> None:
         """Begin a record; None keeps none.
@@ -25,8 +45,7 @@ class Record:
         Raises:
             InputError: If the file cannot be written, or holds something: a session cannot be repeated.
         """
-        self.fault, self._told = "", False
-        self._path, self._file, self._end = path, None, 0
+        self._path, self._end = path, 0
         if path is not None:
             try:
                 self._file = open(path, "ab", buffering=0)  # noqa: SIM115 - open as long as the session
@@ -51,18 +70,6 @@ class Record:
                 self._file.truncate(self._end)
             self.close()
         self._end += len(line)
-
-    def news(self) -> str:
-        """Why the record has ended, the first time that this is asked; else ""."""
-        said, self._told = "" if self._told else self.fault, bool(self.fault)
-        return said
-
-    def close(self) -> None:
-        """End the record."""
-        if self._file is not None:
-            with suppress(OSError):
-                self._file.close()
-            self._file = None
 
 
 def read_record(path: str | os.PathLike[str]) -> Iterator[dict[str, Any]]:
