@@ -230,7 +230,10 @@ def test_a_shape_of_somebody_else_is_read_checked_planned_around_and_drawn(tmp_p
     done = subprocess.run([sys.executable, "run.py"], cwd=tmp_path, capture_output=True, text=True, timeout=250)
     assert done.returncode == 0, done.stderr
     first, second, third = done.stdout.splitlines()[-3:]
-    assert "needs exactly one of box, sphere, cylinder, capsule, half_space, polygon, mesh, cloud, cone" in first
+    assert (
+        "needs exactly one of box, sphere, cylinder, capsule, half_space, polygon, mesh, cloud, heights, octree, cone"
+        in first
+    )
     assert "cone.length: missing; add this key" in second
     assert "cone.radius: must be 1e-06 or more, found -1" in third
     assert (tmp_path / "page.html").stat().st_size > 10_000
