@@ -97,9 +97,9 @@ def test_kernels_that_others_could_have_written_are_not_loaded(tmp_path, monkeyp
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     name, seen = "checks.check_kernels", []
     monkeypatch.setattr(libraries, "Library", lambda name, code: seen.append(code.code) or "a library")
-    write_code(libraries._file(name), libraries.machine_key(name), Code({}, b"code"))
+    write_code(libraries.code_file(name), libraries.machine_key(name), Code({}, b"code"))
     assert libraries._kept(name) == "a library"
-    libraries._file(name).chmod(0o666)
+    libraries.code_file(name).chmod(0o666)
     assert libraries._kept(name) is None
     assert seen == [b"code"]
 
