@@ -68,9 +68,20 @@ def pilot(
 
     source = next((each for each in (camera, video, images) if each is not None), None)
     options = SessionOptions(
-        problem, source, scenario, camera_file, map_file, record, record_pictures, _second(second), replay, arm, master,
-        seed, sigmas,
-    )  # fmt: skip
+        problem,
+        source=source,
+        vehicle=scenario,
+        camera_file=camera_file,
+        map_file=map_file,
+        record=record,
+        record_pictures=record_pictures,
+        second=_second(second),
+        replay=replay,
+        arm=arm,
+        master=master,
+        seed=seed,
+        sigmas=sigmas,
+    )
     server = PilotServer(port, host, token, f"rrtik pilot · {problem}", certificate=certificate, key=key)
     with progress("preparing"):
         opened = open_session(options)

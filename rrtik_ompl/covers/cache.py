@@ -7,8 +7,6 @@ that come along.
 from __future__ import annotations
 
 import hashlib
-import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,7 +18,9 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.shape_table import sizes_of
 from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.covers.shipped import shipped_cover
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.cache import cache_folder, nobody_else_s, write_whole
+from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.notice import COVERING, tell_once
 
 LAYOUT = 1
@@ -118,9 +118,9 @@ def needs_long(geometry: coal.CollisionGeometry) -> bool:
 def _read(file: Path, key: str) -> Matrix | None:
     """The spheres in a file, or None if it is absent, damaged or another's."""
     try:
-        with np.load(file, allow_pickle=False) as stored:
-            spheres, name, check = stored["spheres"], str(stored["key"]), str(stored["check"])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, MemoryError):
+        stored = NamedArrays(file)
+        spheres, name, check = stored["spheres"], str(stored["key"]), str(stored["check"])
+    except InputError:
         return None
     whole = spheres.dtype == np.float64 and spheres.ndim == 2 and spheres.shape[1] == 4
     if not whole or name != key or check != _check(spheres):

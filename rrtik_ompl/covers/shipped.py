@@ -6,8 +6,6 @@ made it, so that one of another version is never taken.
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -15,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.named_arrays import NamedArrays
 
 STORE = Path(__file__).with_name("shipped.npz")
 COLUMNS = 4  # numbers of a row of any cover
@@ -38,9 +38,9 @@ def write_store(covers: Mapping[str, Matrix], file: Path = STORE) -> None:
 def _stored(file: Path) -> dict[str, Matrix]:
     """All covers of a file by their hashes; none if it is absent or damaged."""
     try:
-        with np.load(file, allow_pickle=False) as stored:
-            keys, ends, rows = stored["keys"], stored["ends"].tolist(), frozen(stored["columns"].T)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        stored = NamedArrays(file)
+        keys, ends, rows = stored["keys"], stored["ends"].tolist(), frozen(stored["columns"].T)
+    except InputError:
         return {}
     starts = [0, *ends[:-1]]
     return {key.tobytes().hex(): rows[a:b] for key, a, b in zip(keys, starts, ends, strict=True)}

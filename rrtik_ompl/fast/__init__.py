@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rrtik_ompl.fast.checks.clearance import Clearance as Clearance
     from rrtik_ompl.fast.checks.fast_world import FastWorld as FastWorld
-    from rrtik_ompl.fast.simd.warming import warm_up as warm_up
     from rrtik_ompl.fast.tables.layout import COLLIDING as COLLIDING
     from rrtik_ompl.fast.tables.layout import FREE as FREE
     from rrtik_ompl.fast.tables.layout import UNDECIDED as UNDECIDED
     from rrtik_ompl.fast.tables.scene_tables import needs_covers as needs_covers
+    from rrtik_ompl.fast.warming import warm_up as warm_up
 else:
     _HOME_OF = {
         **dict.fromkeys(("COLLIDING", "FREE", "UNDECIDED"), "tables.layout"),
         "Clearance": "checks.clearance",
         "FastWorld": "checks.fast_world",
         "needs_covers": "tables.scene_tables",
-        "warm_up": "simd.warming",
+        "warm_up": "warming",
     }
     __all__ = sorted(_HOME_OF)
 

@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import at_most
 from rrtik_ompl.shapes.shape import Shape
-from rrtik_ompl.shapes.surfaces import Triangles
+from rrtik_ompl.shapes.surfaces import Triangles, extruded
 
 MOST_BOXES = 20_000
-CORNERS = np.indices((2, 2, 2)).reshape(3, -1).T - 0.5  # of a box of size 1
-SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
-FACES = np.array([face for a, b, c, d in SIDES for face in ((a, b, c), (a, c, d))])
+ONE = extruded(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]), 1.0)  # a box of size 1
 
 
 class BoxPile(Shape):
@@ -38,8 +36,8 @@ class BoxPile(Shape):
     def surface(self) -> Triangles:
         """The sides of all boxes."""
         centres, sizes = self.boxes
-        corners = centres[:, None] + CORNERS * sizes[:, None]
-        faces = FACES + len(CORNERS) * np.arange(len(centres))[:, None, None]
+        corners = centres[:, None] + ONE.vertices * sizes[:, None]
+        faces = ONE.faces + len(ONE.vertices) * np.arange(len(centres))[:, None, None]
         return Triangles(corners.reshape(-1, 3), faces.reshape(-1, 3))
 
 

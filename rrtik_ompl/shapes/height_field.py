@@ -11,7 +11,7 @@ from rrtik_ompl.arrays import LARGEST, Matrix, frozen, length, number_rows, posi
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.shapes.box_pile import BoxPile, few_enough, merged
-from rrtik_ompl.shapes.point_cloud import Invalid
+from rrtik_ompl.shapes.point_cloud import Invalid, known_choice
 
 COARSER = "take .coarser(2), or a part of it"
 
@@ -74,8 +74,7 @@ class HeightField(BoxPile):
         if rows.ndim != 2 or rows.size == 0:
             raise InputError(f"{what}: expected rows of numbers, shape (rows, columns), got shape {rows.shape}")
         finite = np.isfinite(rows)
-        if invalid not in ("refuse", "drop"):
-            raise InputError(f"{what}: invalid must be 'refuse' or 'drop', got {invalid!r}")
+        known_choice(invalid, what)
         if not finite.all() and invalid == "refuse":
             some = f"{np.count_nonzero(~finite)} of {rows.size} heights are not finite"
             raise InputError(f"{what}: {some}; invalid='drop' leaves out their columns")

@@ -92,8 +92,7 @@ class PointCloud(_Kept, Shape):
     ) -> None:
         require(source, str, "source of a cloud")
         what = f"cloud {source}" if source else "cloud"
-        if invalid not in ("refuse", "drop"):
-            raise InputError(f"{what}: invalid must be 'refuse' or 'drop', got {invalid!r}")
+        known_choice(invalid, what)
         rows, dropped = _usable(points, invalid, what)
         object.__setattr__(self, "points", rows)
         object.__setattr__(self, "radius", length(radius, f"{what}: radius"))
@@ -182,6 +181,12 @@ class PointCloud(_Kept, Shape):
         if not chosen.any():
             raise InputError(f"{what}: none of the {len(self.points)} points is left; leave the obstacle out")
         return self if chosen.all() else PointCloud(self.points[chosen], self.radius)
+
+
+def known_choice(invalid: Invalid, what: str) -> None:
+    """Refuse what does not say whether numbers that are not finite are refused or dropped."""
+    if invalid not in ("refuse", "drop"):
+        raise InputError(f"{what}: invalid must be 'refuse' or 'drop', got {invalid!r}")
 
 
 def _usable(points: ArrayLike, invalid: Invalid, what: str) -> tuple[Points, int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -13,9 +12,10 @@ from pathlib import Path
 from rrtik_ompl.fast.simd.bitcode_store import packaged_bitcode
 from rrtik_ompl.fast.simd.code_files import kept_code, kernel_modules, kernels_by_size, machine_key
 from rrtik_ompl.fast.simd.library import code_file, library
+from rrtik_ompl.fast.threads import cores
 from rrtik_ompl.files.notice import COMPILING, tell_once
 
-ROOT = Path(__file__).parents[3]  # where this package stands: another process shall take no other
+ROOT = Path(__file__).parents[2]  # where this package stands: another process shall take no other
 MAKE = "import sys; sys.path.insert(0, sys.argv[1]); from rrtik_ompl.fast.simd.library import library; "
 MAKE += "sys.exit(library(sys.argv[2]) is None)"
 
@@ -38,11 +38,6 @@ def warm_up(report: Callable[[str], None], *, jobs: int | None = None) -> bool:
             if library(name) is not None:
                 report(f"{name}: ready")
     return all(library(name) is not None for name in names)
-
-
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _missing(name: str) -> bool:
