@@ -18,6 +18,7 @@ pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at"),
 ]
 SAID = "document.getElementById('plan-state').textContent"
+REFUSED = "document.getElementById('plan-refusal').textContent"
 DROPPED = """(async () => {
   const dataTransfer = new DataTransfer();
   dataTransfer.items.add(new File([%s], "mine.yaml"));
@@ -104,10 +105,20 @@ def test_what_does_not_fit_is_refused_in_a_line_and_changes_nothing(browser: Bro
     spoil(problem)
     text = "version: 1\nrobot: ur5" if name == "text" else json.dumps(problem)
     browser.ask(f"openText('mine.yaml', {json.dumps(text)})")
-    said = browser.ask(SAID)
+    said = browser.ask(REFUSED)
     assert said.startswith("mine.yaml: ")
     assert message in said
     assert browser.ask("copyOf(state)") == before
+
+
+def test_a_refusal_stands_while_a_path_is_made_and_goes_with_the_next_change(browser: Browser) -> None:
+    browser.ask("planStatus('')")
+    browser.ask("changed(); openText('mine.yaml', 'robot: ur5')")
+    browser.wait(f"{SAID}.includes('found in')")
+    assert browser.ask(REFUSED).startswith("mine.yaml: not JSON")
+    browser.ask("changed()")
+    assert browser.ask(REFUSED) == ""
+    assert browser.ask("document.getElementById('plan-refusal').hidden")
 
 
 def test_a_start_in_a_wall_is_red_and_named_and_nothing_is_planned(browser: Browser) -> None:

@@ -256,7 +256,7 @@ def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tm
         type_in(browser, "pitch", 30)
         type_in(browser, "length", 0.4)
         type_in(browser, "radius", 0)
-        refused = browser.ask("document.getElementById('plan-state').textContent")
+        refused = browser.ask("document.getElementById('plan-refusal').textContent")
         browser.ask("changed()")
         browser.ask(FRAMES)
         status = browser.ask("document.getElementById('plan-state').textContent")
@@ -319,4 +319,4 @@ def test_the_page_says_what_it_cannot_plan(tmp_path: Path) -> None:
         assert blocked.startswith("start: ")
         assert "too near" in blocked
         browser.ask("document.getElementById('plan-save-path').click()")
-        assert browser.ask("document.getElementById('plan-state').textContent") == "there is no path to save"
+        assert browser.ask("document.getElementById('plan-refusal').textContent") == "there is no path to save"

@@ -43,7 +43,7 @@ function numberRow(text, unit, step, told, set, fault) {
     const bad = input.value === "" || !Number.isFinite(wanted) ? "must be a number" : fault(wanted);
     if (bad) {
       showSelected();
-      planStatus(`${selected}: ${text} ${bad}`, true);
+      planRefusal(`${selected}: ${text} ${bad}`);
       return;
     }
     remember();
@@ -97,7 +97,7 @@ function fillSelection() {
 
 function addShape(shape) {
   const k = planning.obstacles.findIndex((obstacle, n) => obstacle.spare && obstacle.shape === shape && !state.obstacles[n].shown);
-  if (k < 0) return planStatus(`this page has no room for another ${shape}`, true);
+  if (k < 0) return planRefusal(`this page has no room for another ${shape}`);
   remember();
   const tip = tipPosition(state.goal.map((value, j) => 0.5 * (value + state.start[j])));
   state.obstacles[k] = { pose: [1, 0, 0, tip.x, 0, 1, 0, tip.y, 0, 0, 1, tip.z, 0, 0, 0, 1], shown: true, sizes: planning.obstacles[k].first.sizes.slice() };
@@ -108,7 +108,7 @@ function addShape(shape) {
 }
 
 function removeSelected() {
-  if (ENDS[selected]) return planStatus("start and goal stay; select an obstacle to remove it", true);
+  if (ENDS[selected]) return planRefusal("start and goal stay; select an obstacle to remove it");
   remember();
   const k = numberOf(selected);
   state.obstacles[k].shown = false;
@@ -129,7 +129,7 @@ function wireControls() {
     const seed = Number(event.target.value);
     if (event.target.value === "" || !Number.isSafeInteger(seed) || seed < 0) {
       showState();
-      return planStatus("the seed must be a whole number, 0 or more", true);
+      return planRefusal("the seed must be a whole number, 0 or more");
     }
     remember();
     state.seed = seed;
@@ -143,7 +143,7 @@ function wireControls() {
   });
   on("plan-remove", "click", removeSelected);
   on("plan-save-path", "click", () => {
-    if (story.moves.length === 0) return planStatus("there is no path to save", true);
+    if (story.moves.length === 0) return planRefusal("there is no path to save");
     return download("path.json", pathText());
   });
   on("plan-save-problem", "click", () => download("problem.yaml", problemText()));

@@ -83,7 +83,7 @@ function openText(name, text) {
   try {
     wanted = stateIn(text);
   } catch (error) {
-    return planStatus(`${name}: ${error.message}`, true);
+    return planRefusal(`${name}: ${error.message}`);
   }
   remember();
   state = wanted;
@@ -94,7 +94,7 @@ function openText(name, text) {
 
 async function openFile(file) {
   if (!file) return;
-  if (file.size > LARGEST_FILE) planStatus(`${file.name}: larger than ${LARGEST_FILE / 1e6} MB, which no problem file of this page is`, true);
+  if (file.size > LARGEST_FILE) planRefusal(`${file.name}: larger than ${LARGEST_FILE / 1e6} MB, which no problem file of this page is`);
   else openText(file.name, await file.text());
 }
 

@@ -16,6 +16,12 @@ const planStatus = (text, bad = false) => {
   line.textContent = text;
   line.classList.toggle("bad", bad);
 };
+/** Say why an input was not taken; it stands until the next change, as a path may be in the making that says its own. */
+const planRefusal = (text) => {
+  const line = document.getElementById("plan-refusal");
+  line.textContent = text;
+  line.hidden = !text;
+};
 
 // The picture ------------------------------------------------------------------------------------------------------
 function moveGhost(end, q, free) {
@@ -116,6 +122,7 @@ function applyObstacle(k) {
 
 let waiting = false;
 function changed() {
+  planRefusal("");
   if (waiting) return;
   waiting = true;
   requestAnimationFrame(() => { waiting = false; plan(); });
