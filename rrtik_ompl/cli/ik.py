@@ -239,7 +239,7 @@ def _many(
 
 
 def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
-    """The page: one solution as a goal to drag, several as ghosts, or the arm moving through all of them."""
+    """The page: solutions of which one is a goal to drag, or the arm moving through all points of a trajectory."""
     if output.html is None:
         if not output.as_json and not output.as_csv:
             suggest("see it: --html ik.html", *(["every solution: --all"] if len(q) == 1 else []))
@@ -250,21 +250,21 @@ def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, mo
 
     shown = Shown(given.robot, Scene() if given.world is None else given.world.scene, goal, q[0])
     name = given.robot.name
-    question = _question(given, q[0]) if len(q) == 1 else None
+    question = None if moving and len(q) > 1 else _question(given, q)
     with progress("drawing"):
-        if question is not None:
+        if question is not None and len(q) == 1:
             view(question, html=output.html, title=f"{name}: drag the goal, the joints follow")
         elif moving and len(q) > 1:
             view(shown, q, html=output.html, title=f"{name}: trajectory of {count(len(q), 'point')}")
         else:
-            view(shown, ghosts=q, html=output.html, title=f"{name}: {count(len(q), 'solution')}")
+            view(question or shown, ghosts=q, html=output.html, title=f"{name}: {count(len(q), 'solution')}")
     if not output.as_json and not output.as_csv:
         say(f"wrote {output.html}")
         suggest(f"open {output.html}")
 
 
-def _question(given: Setting, q: Vector) -> Problem | None:
-    """A problem from the given posture to a solution, whose page plans; None where a page could not begin."""
+def _question(given: Setting, q: Matrix) -> Problem | None:
+    """A problem from the given posture to the first free solution, whose page plans; None where there is none."""
     import numpy as np
 
     from rrtik_ompl import Problem, World
@@ -273,8 +273,11 @@ def _question(given: Setting, q: Vector) -> Problem | None:
         return None
     world = World(given.robot) if given.world is None else given.world
     start = given.robot.clamp(np.zeros(given.robot.dof)) if given.near is None else given.near
-    free = world.valid_batch(np.stack([start, q]))
-    return Problem(world, start if free[0] else q, q, name=given.robot.name) if free[1] else None
+    free = world.valid_batch(np.vstack([start, q]))
+    if not free[1:].any():
+        return None
+    goal = q[np.argmax(free[1:])]
+    return Problem(world, start if free[0] else goal, goal, name=given.robot.name)
 
 
 def _more(rows: int) -> list[str]:

@@ -51,7 +51,8 @@ def view(
         before: Another path to compare with, such as the one that ``path`` was shortened from: the trail of its tip
             is drawn too.
         ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of
-            inverse kinematics; they take the place of the ghosts of start and goal.
+            inverse kinematics; they take the place of the ghosts of start and goal. If the goal of a problem is
+            one of them, the page plans to whichever is chosen there.
         marks: Further bodies: see ``rrtik_ompl.viewer.drawing.marks``.
         run: A ``ReplanRun`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.

@@ -45,6 +45,7 @@ PLANNING = (
     "opening.js",
     "opinion.js",
     "planner.js",
+    "running.js",
     "dragging.js",
     "controls.js",
 )
@@ -88,13 +89,13 @@ def page(
     heading = _title(subject) if title is None else title
     told = story_of(subject, frame, heading)
     told["plan"] = None if still else _planning(shown, subject, frame)
-    if told["plan"]:
-        told["plan"]["asks"] = asks
-    elif asks:
+    if asks and (not told["plan"] or told["plan"]["courses"]):
         raise InputError(
             f"{subject.name}: its page cannot plan: give a path or a goal of joint values, no path constraints and "
             "no obstacles that move; or use rrtik show"
         )
+    if told["plan"]:
+        told["plan"]["asks"] = asks
     story = json.dumps(told, allow_nan=False, separators=(",", ":"))
     return Template(asset("page.html")).substitute(
         title=html.escape(heading),
@@ -111,7 +112,7 @@ def page(
 
 def _planning(shown: Showable, subject: Subject, frame: Frame) -> dict[str, Any] | None:
     """What the page needs to plan by itself; None where it cannot, or nothing is to be planned."""
-    plain = subject.run is None and subject.times is None and subject.ghosts is None
+    plain = subject.run is None and subject.times is None
     if not isinstance(shown, Problem) or subject.end is None or not plain:
         return None
     one_joint = subject.is_path and bool(single_joint(subject.waypoints))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.poses import pose
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.problem_files.problem import problem_data
-from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.scene import Obstacle, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page_tables import BASE, layout_numbers, page_tables
@@ -45,8 +46,8 @@ PATH_RESULTS = ("length", "transitions", "waypoints")  # of a path's file; the p
 def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool = False) -> dict[str, Any] | None:
     """What the page of a problem reads to plan from its start to joint values, as values of JSON.
 
-    None where it cannot plan: there are no kernels, tasks constrain the path, obstacles move by themselves, or joints
-    go farther than kernels check.
+    None where it cannot plan: there are no kernels, tasks constrain the path, an obstacle moves that is no simple
+    shape, or joints go farther than kernels check. Obstacles that move are where they are at time 0.
 
     Args:
         problem: What the page shows.
@@ -54,9 +55,10 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
         side: Of the obstacles that a person may add, before they are made another size [m].
         one_joint: Whether the page moves one joint at a time at first.
     """
-    if problem.constraints or any(obstacle.motion is not None for obstacle in problem.world.scene.obstacles):
+    if problem.constraints:
         return None
     document = _document(problem)
+    problem, courses = _standing_still(problem)
     problem, spare = _with_spares(problem, side)
     room = room_between(problem.world, np.stack([problem.start, goal]), None) or Room(0.0, 0.0)
     world = leaving_room(densely_checked(problem).world, room)
@@ -66,6 +68,9 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     try:
         image, places = page_tables(problem, world, motions)
     except InputError:  # beyond what the margins of the kernels cover
+        return None
+    obstacles = _obstacles(problem.world, motions.fast, room.searched, spare)
+    if not {course["name"] for course in courses} <= {obstacle["name"] for obstacle in obstacles}:
         return None
     still, (lower, upper) = JointPath.of(problem.robot, problem.start[None]), problem.robot.finite_range()
     return {
@@ -87,7 +92,8 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
         "planner": "BiCRDT" if one_joint else "RRTConnect",
         "start": problem.start.tolist(),
         "goal": goal.tolist(),
-        "obstacles": _obstacles(problem.world, motions.fast, room.searched, spare),
+        "obstacles": obstacles,
+        "courses": courses,
         "moving": [_names(problem.world, members) for members in motions.fast.moving],
         "standing": [_names(problem.world, (number,)) for number in motions.fast.standing],
         "path": {key: value for key, value in still.document().items() if key not in PATH_RESULTS},
@@ -101,6 +107,24 @@ def _document(problem: Problem) -> dict[str, Any] | None:
         return problem_data(problem, Path.cwd())
     except InputError:
         return None
+
+
+def _standing_still(problem: Problem) -> tuple[Problem, list[dict[str, Any]]]:
+    """The problem at time 0 with obstacles that stay there, and how they would move on."""
+    scene = problem.world.scene.at(0.0)
+    courses = [_course(obstacle) for obstacle in scene.obstacles if obstacle.motion is not None]
+    if not courses:
+        return problem, courses
+    scene = replace(scene, obstacles=tuple(replace(obstacle, motion=None) for obstacle in scene.obstacles))
+    return problem.with_world(problem.world.with_scene(scene)), courses
+
+
+def _course(obstacle: Obstacle) -> dict[str, Any]:
+    if isinstance(obstacle.motion, TimedPoses):
+        poses = [pose.homogeneous.ravel().tolist() for pose in obstacle.motion.poses]
+        return {"name": obstacle.name, "times": obstacle.motion.times.tolist(), "poses": poses}
+    velocity = np.zeros(3) if obstacle.motion is None else obstacle.motion.velocity
+    return {"name": obstacle.name, "velocity": velocity.tolist()}
 
 
 def _with_spares(problem: Problem, side: float) -> tuple[Problem, set[str]]:

@@ -118,8 +118,10 @@ def play_times(robot: Robot, waypoints: Matrix, arm: float) -> Vector:
 
 
 def play_pace(robot: Robot, arm: float) -> dict[str, Any]:
-    """What :func:`play_times` goes by, for paths that the page finds itself."""
-    return {"speeds": _speeds(robot, arm).tolist(), "seconds": list(PLAY_SECONDS)}
+    """What :func:`play_times` goes by, for paths that the page finds itself; rates are those of an arm that runs."""
+    speeds = _speeds(robot, arm)
+    rates = np.where(np.isfinite(robot.velocity), robot.velocity, speeds)
+    return {"speeds": speeds.tolist(), "rates": rates.tolist(), "seconds": list(PLAY_SECONDS)}
 
 
 def _speeds(robot: Robot, arm: float) -> Vector:

@@ -74,7 +74,8 @@ class Subject:
     @property
     def start(self) -> Vector | None:
         """Configuration of the start ghost, shape (dof,), or None."""
-        wanted = self.ghosts is None and (self.is_path or self.goal is not None)
+        among = self.ghosts is not None and self.end is None
+        wanted = not among and (self.is_path or self.goal is not None)
         start: Vector | None = self.waypoints[0] if wanted else None
         return start
 
@@ -87,9 +88,13 @@ class Subject:
 
     @property
     def end(self) -> Vector | None:
-        """Configuration of the goal ghost, shape (dof,): end of the path or the goal's joint values, or None."""
+        """Configuration of the goal ghost, shape (dof,): end of the path or the goal's joint values, or None.
+
+        Ghosts take its place, but where the goal is one of them: that one can be dragged.
+        """
         if self.ghosts is not None:
-            return None
+            q = self.goal.q if isinstance(self.goal, JointGoal) else None
+            return q if q is not None and (self.ghosts == q).all(axis=1).any() else None
         if not self.is_path or (self.run is not None and not self.run.arrived):
             return self.goal.q if isinstance(self.goal, JointGoal) else None
         end: Vector = self.waypoints[-1]

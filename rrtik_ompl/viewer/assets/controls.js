@@ -90,7 +90,7 @@ function showState() {
 }
 
 function fillSelection() {
-  const names = [...Object.keys(ENDS), ...planning.obstacles.filter((_, k) => state.obstacles[k].shown).map(({ name }) => name)];
+  const names = [...Object.keys(ENDS), ...planning.obstacles.filter((_, k) => state.obstacles[k].shown && !staysOnCourse(k)).map(({ name }) => name)];
   document.getElementById("plan-selected").replaceChildren(...names.map((name) => make("option", { value: name, textContent: name })));
   select(names.includes(selected) ? selected : "goal");
 }
@@ -115,6 +115,19 @@ function removeSelected() {
   applyObstacle(k);
   fillSelection();
   return changed();
+}
+
+/** The goal is one of several solutions of inverse kinematics: a list to choose from. */
+function wireGoals() {
+  const list = document.getElementById("plan-goal");
+  document.getElementById("plan-goals").hidden = story.ghosts.length < 2;
+  list.append(...story.ghosts.map(({ name }, k) => make("option", { value: k, textContent: name })));
+  list.addEventListener("change", () => {
+    remember();
+    state.goal = story.ghosts[Number(list.value)].q.map((value, j) => Math.min(Math.max(value, planning.lower[j]), planning.upper[j]));
+    showSelected();
+    changed();
+  });
 }
 
 function wireControls() {
@@ -149,6 +162,8 @@ function wireControls() {
   on("plan-save-problem", "click", () => download("problem.yaml", problemText()));
   for (const id of ["plan-save-problem", "plan-open", "plan-typing"]) document.getElementById(id).hidden = planning.problem === null;
   if (planning.problem !== null) wireOpening();
+  wireGoals();
+  wireRunning();
   pane.addEventListener("pointerdown", startDrag, true);
   pane.addEventListener("pointermove", goOnDragging, true);
   pane.addEventListener("pointerup", endDrag, true);

@@ -36,7 +36,8 @@ function moveGhost(end, q, free) {
 
 /** Draw an obstacle where it is; anew if the page has added it or made it another size. */
 function moveDrawing(k) {
-  const { pose, shown, sizes } = state.obstacles[k];
+  const { shown, sizes } = state.obstacles[k];
+  const pose = poseNow(k);
   const obstacle = planning.obstacles[k];
   const drawnSizes = obstacle.drawnSizes ?? (obstacle.spare ? [] : obstacle.first.sizes);
   if (shown && !sameNumbers(sizes, drawnSizes)) drawShape(obstacle, sizes);
@@ -115,17 +116,18 @@ function undo() {
 
 function applyObstacle(k) {
   const kept = state.obstacles[k];
-  const pose = kept.shown ? kept.pose : kept.pose.map((value, n) => (n === 11 ? value - AWAY : value));
-  placeObstacle(kernels, resized(planning.obstacles[k], kept.sizes), pose);
+  const pose = poseNow(k);
+  const placed = kept.shown ? pose : pose.map((value, n) => (n === 11 ? value - AWAY : value));
+  placeObstacle(kernels, resized(planning.obstacles[k], kept.sizes), placed);
   moveDrawing(k);
 }
 
 let waiting = false;
 function changed() {
   planRefusal("");
-  if (waiting) return;
+  if (waiting || clock.running) return;
   waiting = true;
-  requestAnimationFrame(() => { waiting = false; plan(); });
+  requestAnimationFrame(() => { waiting = false; if (!clock.running) plan(); });
 }
 
 function plan() {
