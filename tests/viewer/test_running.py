@@ -90,7 +90,7 @@ def test_the_arm_reaches_its_goal_and_touches_nothing(
 ) -> None:
     log, plans = browser.ask(RUN % (seed, json.dumps(dragged)))
     before, fastest = problem.start, problem.robot.velocity
-    for time, q, done, pillar in log:
+    for time, q, _done, pillar in log:
         world = world_at(problem, time, pillar)
         assert world.clearance(q) > 0.0, time
         assert (np.abs(np.subtract(q, before)) <= 0.02 * fastest + 1e-9).all()
@@ -124,7 +124,7 @@ def test_a_saved_problem_keeps_its_motions(browser: Browser, problem: rrtik.Prob
     browser.ask("moveObstacle(0, new THREE.Vector3(-0.1, 0, 0), 0)")
     saved: Any = rrtik.load_problem(tmp_path / "problem.yaml").world.scene.at(1.5).obstacles
     expected: Any = problem.world.scene.at(1.5).obstacles
-    np.testing.assert_allclose(saved[0].pose.translation, expected[0].pose.translation + [0.1, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(saved[0].pose.translation, np.add(expected[0].pose.translation, [0.1, 0, 0]), atol=1e-9)
     np.testing.assert_allclose(saved[1].pose.homogeneous, expected[1].pose.homogeneous, atol=1e-9)
 
 
