@@ -87,12 +87,13 @@ def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[n
     """Merge equal vertices (STL repeats them per triangle) and drop triangles that collapse to a line or a point.
 
     Where vertices differ by rounding alone, those are merged too: coal takes a ball for one that touches the sliver
-    between them, wherever it is.
+    between them, wherever it is, and a solid whose seam is open by that would count as a surface.
     """
     unique, merged = _merged(points, points, faces)
     sides = unique[merged] - unique[np.roll(merged, 1, axis=1)]
-    if (np.abs(sides).max(axis=2) < 10.0**-SAME_DIGITS).any():
-        unique, merged = _merged(np.round(unique, SAME_DIGITS) + 0.0, unique, merged)
+    if (np.abs(sides).max(axis=2) < 10.0**-SAME_DIGITS).any() or _open_edges(merged) > 0:
+        for shift in (0.0, 0.37 * 10.0**-SAME_DIGITS):  # what one rounding parts, the other one joins
+            unique, merged = _merged(np.round(unique + shift, SAME_DIGITS) + 0.0, unique, merged)
     a, b, c = (unique[merged[:, k]] for k in range(3))
     return unique, merged[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.0]
 

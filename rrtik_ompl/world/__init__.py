@@ -28,7 +28,7 @@ from rrtik_ompl.world.exact_checks import ExactChecker, one_way
 from rrtik_ompl.world.proof import Gap as Gap
 from rrtik_ompl.world.proof import Proof as Proof
 from rrtik_ompl.world.proof import Prover
-from rrtik_ompl.world.rebuild import reduce_world
+from rrtik_ompl.world.rebuild import hollow_solids, reduce_world
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
@@ -86,8 +86,8 @@ class World:
         self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))
         if self.motion_resolution < FINEST_RESOLUTION:
             raise InputError(f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {motion_resolution}")
-        if not robot.collision.geometryObjects:
-            warnings.warn(MeshWarning(f"robot '{robot.name}' has no collision geometry: all is free"), stacklevel=2)
+        for doubt in hollow_solids(robot, self.scene):
+            warnings.warn(doubt, MeshWarning, stacklevel=2)
         self.self_margin = own = not_negative(self_margin, "self_margin")
         self.bodies = link_bodies(robot, own) + scene_bodies(robot, self.scene.at(0.0), own)
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])

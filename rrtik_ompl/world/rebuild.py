@@ -1,15 +1,16 @@
-"""Worlds for other processes: what they are made of goes there, and their tables are made anew."""
+"""Worlds for other processes: what they are made of goes there, and their tables are made anew. What they doubt."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from operator import attrgetter
 from typing import Any
 
 from rrtik_ompl.errors import MeshWarning
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
+from rrtik_ompl.shapes import Mesh
 
 _PARTS = attrgetter("robot", "scene")
 _SETTINGS = attrgetter("accuracy", "self_margin", "motion_resolution", "_room", "_proven_clearance")
@@ -27,3 +28,13 @@ def _rebuilt(kind: Callable[..., Any], robot: Robot, scene: Scene, settings: tup
         world = kind(robot, scene, accuracy=accuracy, self_margin=self_margin)
     world = world.with_resolution(resolution).with_clearance(room)
     return world if proven is None else world.proving(proven)
+
+
+def hollow_solids(robot: Robot, scene: Scene) -> Iterator[str]:
+    """What a world does not take for a solid, where nobody was told when a file was read."""
+    if not robot.collision.geometryObjects:
+        yield f"robot '{robot.name}' has no collision geometry: all is free"
+    for item in (*scene.obstacles, *scene.attached):
+        if isinstance(item.shape, Mesh) and not (item.shape.closed or item.shape.source):
+            what = f"the mesh of '{item.name}' has {item.shape.open_edges} open edges"
+            yield f"{what}; it is treated as a surface, not as a solid"

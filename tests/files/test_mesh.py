@@ -8,9 +8,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, MeshWarning
 from rrtik_ompl.files.mesh import load_mesh
+from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.shapes import Mesh
+from rrtik_ompl.world import World
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], dtype=np.float64)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -102,6 +106,25 @@ def test_an_open_surface_is_loaded_with_a_warning_that_counts_its_edges(tmp_path
     with pytest.warns(MeshWarning, match=r"open\.stl: 6 open edges.*surface, not as a solid"):
         mesh = load_mesh(tmp_path / "open.stl")
     assert not mesh.closed
+
+
+def test_a_solid_whose_seam_differs_by_rounding_is_closed_and_holds_what_is_inside_it():
+    around, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 41), np.linspace(0.0, np.pi, 21))  # first and last meet
+    radius = 4.0 * (1.0 + 0.15 * np.sin(5.0 * around) * np.sin(up) ** 2 + 0.1 * np.cos(6.0 * up))
+    way = [np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)]
+    k = np.arange(20 * 41).reshape(20, 41)[:, :-1].ravel()
+    sides = np.stack([k, k + 41, k + 1], axis=1)[40:], np.stack([k + 1, k + 41, k + 42], axis=1)[:-40]
+    faces = np.concatenate(sides)  # where two corners of a triangle meet there is none
+    solid = Mesh(np.stack([radius * x for x in way], axis=-1).reshape(-1, 3), faces)
+    assert solid.closed
+    world = World(load_robot("xarm7"), Scene([Obstacle("solid", solid)]))
+    assert not world.valid([0.2, -0.5, 0.1, 0.8, 0.0, 1.2, 0.0])
+
+
+def test_a_world_warns_of_a_mesh_of_the_memory_that_is_open():
+    leaf = Obstacle("leaf", Mesh(CORNERS, FACES[:3]), [3.0, 0.0, 0.0])
+    with pytest.warns(MeshWarning, match="the mesh of 'leaf' has 6 open edges; it is treated as a surface"):
+        World(load_robot("xarm7"), Scene([leaf]))
 
 
 def test_a_mesh_with_a_triangle_of_the_wrong_sense_is_not_a_solid(tmp_path):
