@@ -88,7 +88,11 @@ const ACTIONS = {
 /** Take over the moves and times of the story: bar, ticks, list of moves and labels. */
 function newPath() {
   total = story.times.length ? story.times[story.times.length - 1] : 0;
-  document.getElementById("player").hidden = false;
+  const player = document.getElementById("player");
+  if (player.hidden) {
+    player.hidden = false;
+    viewer.set_3d_pane_size();
+  }
   scrub.max = total;
   addTicks();
   if (!run && !story.timed) buildMoves(goTo);

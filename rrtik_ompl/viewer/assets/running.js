@@ -145,6 +145,7 @@ function startRun() {
   replacePath([]);
   if (rows.length > 1) drawTrail(rows);
   document.getElementById("player").hidden = true;
+  viewer.set_3d_pane_size();
   document.getElementById("run-start").textContent = "Stop";
   return requestAnimationFrame(runFrame);
 }
