@@ -35,6 +35,10 @@ def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.flo
     return shortest
 
 
+def _with_poses(part: Any) -> Any:
+    return PoseGoal(part) if isinstance(part, pin.SE3 | np.ndarray) else part
+
+
 @lru_cache(maxsize=64)
 def has_continuous(robot: Robot) -> bool:
     """Whether a joint of a robot turns without limits."""
@@ -122,7 +126,7 @@ class GoalSet:
     """Any of several goals: a grasp set. Poses may be given freedom: a turn about an axis, a box of positions.
 
     Attributes:
-        members: Goals of which one is enough.
+        members: Goals of which one is enough; a pose (``pinocchio.SE3`` or an array) counts as a :class:`PoseGoal`.
         free_rotation_axis: "x", "y" or "z" of the goal frame about which poses may be turned, or None.
         box: Full side lengths [m], in the goal frame, within which the position of poses is free, shape (3,).
         parts: The members, poses that have freedom as task-space regions.
@@ -136,13 +140,11 @@ class GoalSet:
     __reduce__ = as_value
 
     def __init__(
-        self, members: Iterable[GoalPart], free_rotation_axis: FrameAxis | None = None, box: ArrayLike = NO_BOX
+        self, members: Iterable[Any], free_rotation_axis: FrameAxis | None = None, box: ArrayLike = NO_BOX
     ) -> None:
-        goals = tuple(members) if isinstance(members, Iterable) else ()
+        goals = tuple(map(_with_poses, members)) if isinstance(members, Iterable) else ()
         if not goals or not all(isinstance(goal, PoseGoal | PositionGoal | TaskRegion) for goal in goals):
-            raise InputError(
-                "goal: a region needs a list of at least one pose or position or task-space region, and nothing else"
-            )
+            raise InputError("goal: a set needs a list of at least one pose or position or task-space region")
         if free_rotation_axis not in (None, "x", "y", "z"):
             raise InputError(
                 f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}; "
@@ -163,8 +165,7 @@ class GoalSet:
 
         Positions and poses are measured alike; of a position the turn is free. Tolerances do not count.
         """
-        nearest: Vector = np.min([part.distance(robot, Q) for part in self.parts], axis=0)
-        return nearest
+        return np.asarray(np.min([part.distance(robot, Q) for part in self.parts], axis=0))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """Which rows of Q are at one of the parts, shape (m,)."""
@@ -192,10 +193,9 @@ class MultiGoal:
 
     Attributes:
         frames: Names of the links that are tips.
-        parts: The goal of each, in their order.
+        parts: The goal of each, in their order; a pose counts as in a :class:`GoalSet`.
 
     Example:
-        >>> import rrtik_ompl as rrtik
         >>> left, right = (rrtik.PositionGoal([1.2, y, 0.1]) for y in (0.4, -0.4))
         >>> goal = rrtik.MultiGoal({"left_grip_point": left, "right_grip_point": right})
         >>> rrtik.plan(rrtik.Problem(rrtik.World(rrtik.load_robot("two_titan4")), "ready", goal), seed=1).found
@@ -205,14 +205,15 @@ class MultiGoal:
     frames: tuple[str, ...]
     parts: tuple[GoalPart, ...]
 
-    def __init__(self, goals: Mapping[str, GoalPart]) -> None:
+    def __init__(self, goals: Mapping[str, Any]) -> None:
         if not isinstance(goals, Mapping) or not goals:
             raise InputError("goal: MultiGoal needs a goal for each tip: MultiGoal({link: PoseGoal(...), ...})")
-        for name, part in goals.items():
+        parts = {name: _with_poses(part) for name, part in goals.items()}
+        for name, part in parts.items():
             require(name, str, "tip of a MultiGoal", "name a link")
             require(part, GoalPart, f"goal of '{name}'", "use a PoseGoal, a PositionGoal or a TaskRegion")
-        object.__setattr__(self, "frames", tuple(goals))
-        object.__setattr__(self, "parts", tuple(goals.values()))
+        object.__setattr__(self, "frames", tuple(parts))
+        object.__setattr__(self, "parts", tuple(parts.values()))
 
     def __reduce__(self) -> tuple[type[MultiGoal], tuple[dict[str, GoalPart]]]:
         return MultiGoal, (dict(zip(self.frames, self.parts, strict=True)),)

@@ -6,16 +6,18 @@ import copy
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import TAU, Vector, frozen
+from rrtik_ompl.arrays import TAU, Vector, dimensions, frozen
 from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.constraints.contradiction import contradiction
 from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.copies import as_value, in_notebook, shallow_copy
 from rrtik_ompl.errors import InputError, ProblemError, Renamed, require
-from rrtik_ompl.goal import Goal, JointGoal, MultiGoal, parts_of
+from rrtik_ompl.goal import Goal, JointGoal, MultiGoal, PoseGoal, parts_of
+from rrtik_ompl.poses import rigid
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
@@ -42,7 +44,7 @@ class Problem:
     Args:
         world: Robot and scene.
         start: Configuration, shape (dof,), rad or m, or the name of a posture.
-        goal: A goal, a configuration, or the name of a posture.
+        goal: A goal, a configuration, the name of a posture, or a pose (``pinocchio.SE3`` or shape (4, 4)).
         name: For messages and files.
         planner: Name of one of :func:`rrtik_ompl.list_planners`; it is looked up when it is used.
 
@@ -62,7 +64,7 @@ class Problem:
         self,
         world: World,
         start: ArrayLike | str,
-        goal: Goal | ArrayLike | str,
+        goal: Goal | ArrayLike | pin.SE3 | str,
         *,
         name: str = "problem",
         planner: str | None = None,
@@ -75,7 +77,7 @@ class Problem:
         self.planner = planner
         start = world.robot.posture(start) if isinstance(start, str) else start
         goal = world.robot.posture(goal) if isinstance(goal, str) else goal
-        wanted = goal if isinstance(goal, Goal) else JointGoal(goal)
+        wanted = _goal_of(goal)
         joints = {"goal": wanted.q} if isinstance(wanted, JointGoal) else {}
         ends = usable_configurations(world, {"start": start, **joints})
         self.start: Vector = frozen(ends["start"])
@@ -178,6 +180,14 @@ def _keep(robot: Robot, held: HeldRegions, q: Vector, what: str) -> None:
     if fault := held.explain(q):
         remedy = contradiction(robot, held) or "move it, or widen the tolerance"
         raise ProblemError(f"{what} breaks {fault}; {remedy}", part=what)
+
+
+def _goal_of(goal: Goal | ArrayLike | pin.SE3) -> Goal:
+    """A goal as it is given; a pose (``pinocchio.SE3`` or shape (4, 4)) of the tip, or a configuration, as one."""
+    if isinstance(goal, Goal):
+        return goal
+    pose = isinstance(goal, pin.SE3) or dimensions(goal) == 2
+    return PoseGoal(rigid(goal, "goal")) if pose else JointGoal(goal)
 
 
 def _nearest_turn(world: World, start: Vector, q: Vector) -> Vector:

@@ -8,7 +8,7 @@ import pytest
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
-from rrtik_ompl.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.goal import GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.scene import Obstacle, Scene
@@ -29,6 +29,23 @@ def test_a_start_in_collision_is_refused_with_the_pair(world):
     with pytest.raises(ProblemError, match=r"start is in collision.*panel.*mm") as caught:
         Problem(world, np.zeros(6), FREE)
     assert any("panel" in pair for pair in caught.value.contacts)
+
+
+@pytest.mark.parametrize("form", [lambda T: T, lambda T: T.homogeneous, lambda T: T.homogeneous.tolist()])
+def test_a_pose_of_the_tip_is_a_goal(world, form):
+    T = world.robot.fk(FREE)
+    problem = Problem(world, FREE + 0.05, form(T))
+    assert isinstance(problem.goal, PoseGoal)
+    assert problem.reached(FREE)
+    assert not problem.reached(FREE + 0.05)
+
+
+def test_poses_are_members_of_sets_and_goals_of_tips(world):
+    T, away = world.robot.fk(FREE), pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.5]))
+    assert GoalSet([away, T.homogeneous]).member_at(world.robot, FREE) == 1
+    goal = MultiGoal({world.robot.tip: T})
+    assert goal.satisfied(world.robot, FREE[None]).all()
+    assert MultiGoal({world.robot.tip: away}).satisfied(world.robot, FREE[None]).tolist() == [False]
 
 
 def test_a_goal_in_collision_is_refused_with_the_pair(world):
