@@ -35,7 +35,7 @@ def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.flo
     return shortest
 
 
-def _with_poses(part: Any) -> Any:
+def _with_poses(part: AnyPart) -> GoalPart:
     return PoseGoal(part) if isinstance(part, pin.SE3 | np.ndarray) else part
 
 
@@ -119,6 +119,7 @@ class PoseGoal(WithinTolerances):
 
 
 GoalPart: TypeAlias = PoseGoal | PositionGoal | TaskRegion
+AnyPart: TypeAlias = GoalPart | pin.SE3 | NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,16 +141,14 @@ class GoalSet:
     __reduce__ = as_value
 
     def __init__(
-        self, members: Iterable[Any], free_rotation_axis: FrameAxis | None = None, box: ArrayLike = NO_BOX
+        self, members: Iterable[AnyPart], free_rotation_axis: FrameAxis | None = None, box: ArrayLike = NO_BOX
     ) -> None:
         goals = tuple(map(_with_poses, members)) if isinstance(members, Iterable) else ()
         if not goals or not all(isinstance(goal, PoseGoal | PositionGoal | TaskRegion) for goal in goals):
             raise InputError("goal: a set needs a list of at least one pose or position or task-space region")
         if free_rotation_axis not in (None, "x", "y", "z"):
-            raise InputError(
-                f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}; "
-                "for another axis use TaskRegion.about_axis"
-            )
+            wrong = f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}"
+            raise InputError(f"{wrong}; for another axis use TaskRegion.about_axis")
         sides = finite_array(box, (3,), "goal box")
         if (sides < 0.0).any():
             raise InputError(f"goal box must not have negative sides, got {sides.tolist()}")
@@ -205,7 +204,7 @@ class MultiGoal:
     frames: tuple[str, ...]
     parts: tuple[GoalPart, ...]
 
-    def __init__(self, goals: Mapping[str, Any]) -> None:
+    def __init__(self, goals: Mapping[str, AnyPart]) -> None:
         if not isinstance(goals, Mapping) or not goals:
             raise InputError("goal: MultiGoal needs a goal for each tip: MultiGoal({link: PoseGoal(...), ...})")
         parts = {name: _with_poses(part) for name, part in goals.items()}

@@ -34,7 +34,6 @@ def hollow_solids(robot: Robot, scene: Scene) -> Iterator[str]:
     """What a world does not take for a solid, where nobody was told when a file was read."""
     if not robot.collision.geometryObjects:
         yield f"robot '{robot.name}' has no collision geometry: all is free"
-    for item in (*scene.obstacles, *scene.attached):
-        if isinstance(item.shape, Mesh) and not (item.shape.closed or item.shape.source):
-            what = f"the mesh of '{item.name}' has {item.shape.open_edges} open edges"
-            yield f"{what}; it is treated as a surface, not as a solid"
+    for name, shape in ((item.name, item.shape) for items in (scene.obstacles, scene.attached) for item in items):
+        if isinstance(shape, Mesh) and not (shape.closed or shape.source):
+            yield f"the mesh of '{name}' has {shape.open_edges} open edges; it is treated as a surface, not as a solid"
