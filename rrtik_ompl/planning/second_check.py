@@ -100,8 +100,10 @@ class SecondCheck:
             seed: Of the detours.
         """
         if outcome.rows is None:
-            self.reason = f"{self._name} ended with '{outcome.status}'"
-            self.reason += f": {outcome.reason}" if outcome.reason else ""
+            why = (
+                f": {outcome.reason}" if outcome.reason else f" with '{outcome.status}'"
+            )  # OMPL's words where it has none
+            self.reason = f"{self._name} ended{why}"
             return None
         problem, path = self._problem, JointPath.of(self._problem.robot, outcome.rows)
         if not (path.start == problem.start).all() or not _at_goal(problem, path.end):

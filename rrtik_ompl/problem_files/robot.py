@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 import pinocchio as pin
-from pydantic import ConfigDict, Field, Tag
+from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from rrtik_ompl.files.sections import (
     Length,
@@ -26,12 +26,18 @@ from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 PATH_KEYS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf", "packages")
 
 
+Padding: TypeAlias = Annotated[
+    Annotated[NotNegative, Tag(tag("number"))] | Annotated[dict[Name, NotNegative], Tag(tag("links"))],
+    Discriminator(lambda data: tag("links" if isinstance(data, dict) else "number")),
+]
+
+
 class _Mounted(Section):
     """What every kind of robot may say besides."""
 
     base_pose: PoseEntry | None = Field(None, description="pose of the base in the world; identity if absent")
     tip: Name | None = Field(None, description="link or frame that goals refer to")
-    padding: NotNegative | dict[Name, NotNegative] | None = Field(
+    padding: Padding | None = Field(
         None, description="how much thicker links are than their geometry [m]: by name, or one number for all"
     )
     joint_weights: dict[Name, Positive] | None = Field(

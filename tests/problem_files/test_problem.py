@@ -346,3 +346,17 @@ def test_the_world_of_a_loaded_problem_is_a_world_with_its_scene(tmp_path):
     assert isinstance(problem.world, World)
     assert problem.world.scene.names == ("a", "b", "c", "t")
     assert "titan4_sdu" in list_problems()
+
+
+@pytest.mark.parametrize(
+    ("padding", "message"),
+    [
+        ("{link4: -1}", r":2: robot\.padding\.link4: must be 0 or more, found -1$"),
+        ("{link4: abc}", r":2: robot\.padding\.link4: must be a number, found text 'abc'$"),
+        ("-1", r":2: robot\.padding: must be 0 or more, found -1$"),
+        ("[1]", r":2: robot\.padding: must be a number, found a list of 1$"),
+    ],
+)
+def test_a_wrong_padding_is_told_where_it_stands(tmp_path, padding, message):
+    with pytest.raises(InputError, match=message):
+        load(tmp_path, text(robot=f"{{name: xarm7, padding: {padding}}}"))
