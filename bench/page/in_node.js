@@ -1,6 +1,6 @@
 // The page's kernels in node, without a page: searches by seed, and what is free once obstacles were moved.
 const fs = require("fs");
-const parts = ["unpack.js", "kernels.js", "obstacles.js", "moves.js", "shapes.js"];
+const parts = ["unpack.js", "kernels.js", "obstacles.js", "fixed.js", "moves.js", "shapes.js"];
 const source = parts.map((name) => fs.readFileSync(`${process.argv[2]}/${name}`, "utf8")).join("");
 const shown = new Function(`${source}; return { Kernels, placeObstacle, resized, searchMoves }`)();
 

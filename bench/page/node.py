@@ -159,9 +159,10 @@ def answers_of(robot: rrtik.Robot, configurations: int, rng: np.random.Generator
         A = Q[: each // SHARE_MOTIONS]
         B = np.clip(A + rng.normal(0.0, 0.2, A.shape), *robot.finite_range())
         values, steps = robot.joint_values, step_counts(A, B, world.weights, world.motion_resolution)
-        assert world.fast is not None
-        wanted.append(world.fast.classify(values(Q)) == FREE)
-        wanted_motions.append(world.fast.classify_edges(values(A), values(B), steps) == FREE)
+        fast = world.fast  # None where what never moves collides with the obstacle: no answer is "free"
+        wanted.append(np.zeros(len(Q), bool) if fast is None else fast.classify(values(Q)) == FREE)
+        some = np.zeros(len(A), bool) if fast is None else fast.classify_edges(values(A), values(B), steps) == FREE
+        wanted_motions.append(some)
         pairs = np.stack([A, B], axis=1).tolist()
         moves.append({"obstacle": k, "pose": placed.homogeneous.ravel().tolist(), "sizes": larger, "Q": Q.tolist()})
         moves[-1]["motions"] = pairs

@@ -39,6 +39,7 @@ STARTING = ("unpack.js", "start.js")
 PLANNING = (
     "kernels.js",
     "obstacles.js",
+    "fixed.js",
     "moves.js",
     "shapes.js",
     "saving.js",

@@ -32,6 +32,7 @@ from rrtik_ompl.problem_files.problem import problem_data
 from rrtik_ompl.scene import Obstacle, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
+from rrtik_ompl.viewer.page_fixed import standing_parts
 from rrtik_ompl.viewer.page_tables import BASE, layout_numbers, page_tables
 from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
@@ -70,7 +71,8 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     except InputError:  # beyond what the margins of the kernels cover
         return None
     obstacles = _obstacles(problem.world, motions.fast, room.searched, spare)
-    if not {course["name"] for course in courses} <= {obstacle["name"] for obstacle in obstacles}:
+    fixed = standing_parts(problem.world)
+    if fixed is None or not {course["name"] for course in courses} <= {obstacle["name"] for obstacle in obstacles}:
         return None
     still, (lower, upper) = JointPath.of(problem.robot, problem.start[None]), problem.robot.finite_range()
     return {
@@ -94,6 +96,7 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
         "goal": goal.tolist(),
         "obstacles": obstacles,
         "courses": courses,
+        "fixed": fixed,
         "moving": [_names(problem.world, members) for members in motions.fast.moving],
         "standing": [_names(problem.world, (number,)) for number in motions.fast.standing],
         "path": {key: value for key, value in still.document().items() if key not in PATH_RESULTS},

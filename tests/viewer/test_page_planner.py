@@ -37,7 +37,7 @@ ASSETS = files("rrtik_ompl.viewer").joinpath("assets")
 RUN = """
 const fs = require("fs");
 const read = (name) => fs.readFileSync(`${process.argv[2]}/${name}`, "utf8");
-const source = ["unpack.js", "kernels.js", "obstacles.js", "moves.js", "shapes.js"].map(read).join("");
+const source = ["unpack.js", "kernels.js", "obstacles.js", "fixed.js", "moves.js", "shapes.js"].map(read).join("");
 const shown = "{ Kernels, placeObstacle, hasKernels, searchMoves, fewerMoves, resized }";
 const parts = new Function(`${source}; return ${shown}`)();
 const { Kernels, placeObstacle, hasKernels, searchMoves, fewerMoves, resized } = parts;
@@ -183,6 +183,30 @@ def test_every_kind_of_obstacle_is_packed_alike_wherever_and_however_large(tmp_p
             moves.append({"obstacle": k, "pose": placed.homogeneous.ravel().tolist(), "sizes": sizes, "Q": Q.tolist()})
     assert all(0.05 < share.mean() < 0.95 for share in wanted)
     np.testing.assert_array_equal(in_node(plan, tmp_path, moves=moves)["free"], wanted)
+
+
+@pytest.mark.parametrize("name", ["kinova", "titan4", "xarm7"])
+def test_what_touches_the_base_leaves_nothing_free(name, tmp_path):
+    robot, rng = rrtik.load_robot(name), np.random.default_rng(5)
+    start = next(q for q in rng.uniform(*robot.finite_range(), (100, robot.dof)) if rrtik.World(robot).valid(q))
+    solids = {"ball": rrtik.Sphere(0.05), "can": rrtik.Cylinder(0.04, 0.1), "box": rrtik.Box([0.1, 0.06, 0.1])}
+    far = pin.SE3(np.eye(3), np.array([2.0, 2.0, 2.0]))
+    problem = Problem(
+        rrtik.World(robot, Scene(tuple(rrtik.Obstacle(k, v, far) for k, v in solids.items()))), start, start
+    )
+    plan = page_planner(problem, start, 0.1)
+    room = room_between(problem.world, np.stack([start, start]), None) or Room(0.0, 0.0)
+    Q, moves, wanted = rng.uniform(*robot.finite_range(), (60, robot.dof)), [], []
+    for _ in range(40):
+        k = int(rng.integers(3))
+        placed = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.12, 3))
+        scene = Scene(tuple(rrtik.Obstacle(n, v, placed if n == [*solids][k] else far) for n, v in solids.items()))
+        fast = leaving_room(densely_checked(problem.with_world(rrtik.World(robot, scene))).world, room).fast
+        wanted.append(np.zeros(len(Q), bool) if fast is None else fast.classify(robot.joint_values(Q)) == FREE)
+        moves.append({"obstacle": k, "pose": placed.homogeneous.ravel().tolist(), "Q": Q.tolist()})
+        moves.append({"obstacle": k, "pose": far.homogeneous.ravel().tolist(), "Q": []})
+    assert 4 < sum(not free.any() for free in wanted) < 40  # by coal, where the obstacle touches what stands still
+    np.testing.assert_array_equal(in_node(plan, tmp_path, moves=moves)["free"][::2], wanted)
 
 
 def test_a_pose_is_reached_within_its_tolerances(tmp_path):

@@ -39,6 +39,7 @@ class Kernels {
     this.motions = this.table(places.motions, names.motion);
     this.world = this.table(places.world, names.table);
     this.spare = plan.end;
+    this.touched = new Map();  // by the names of obstacles that were moved: the part of the base that each touches, or null
     const joints = this.motions.get("JOINTS");
     this.room = { values: this.reserve(2 * NUMBER_BYTES * joints), steps: this.reserve(LANE_BYTES), found: this.reserve(NUMBER_BYTES), pair: this.reserve(LANE_BYTES), answer: this.reserve(LANE_BYTES) };
   }
@@ -74,9 +75,14 @@ class Kernels {
     return q.every((value, k) => value >= this.plan.lower[k] && value <= this.plan.upper[k]);
   }
 
+  /** An obstacle and the part of the base that it touches, or undefined. */
+  get contact() {
+    return [...this.touched].find(([, part]) => part !== null);
+  }
+
   /** Whether a configuration is inside the limits and proven free. */
   free(q) {
-    if (!this.inBox(q)) return false;
+    if (!this.inBox(q) || this.contact) return false;
     this.setValues(q);
     const { values, answer } = this.room;
     this.entries.check_classify(...[this.world.address, values, 1, answer, 1].map(BigInt));
@@ -85,7 +91,7 @@ class Kernels {
 
   /** Whether a straight motion is proven free at the configurations at which Python checks it. */
   motionFree(a, b) {
-    if (!this.inBox(a) || !this.inBox(b)) return false;
+    if (!this.inBox(a) || !this.inBox(b) || this.contact) return false;
     const { values, steps, answer } = this.room;
     this.setValues(a);
     this.setValues(b, 1);
@@ -201,7 +207,7 @@ class Kernels {
   /** Why a configuration is not free, in a few words. */
   blame(q) {
     if (!this.inBox(q)) return "outside the joint limits";
-    const { pair } = this.nearest(q);
+    const pair = this.contact ?? this.nearest(q).pair;
     return pair === null ? "not proven free" : `${pair.join(" and ")} are too near each other`;
   }
 }

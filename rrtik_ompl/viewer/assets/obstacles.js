@@ -105,4 +105,5 @@ function placeObstacle(kernels, obstacle, pose) {
   placePrimitive(kernels, "OUTER_PRIMITIVES", obstacle, pose, 1);
   placePrimitive(kernels, "INNER_PRIMITIVES", obstacle, pose, -1);
   placeSolid(kernels, obstacle, pose);
+  kernels.touched.set(obstacle.name, partTouched(kernels.plan, obstacle, pose));
 }

@@ -10,8 +10,6 @@ function pathText() {
   return JSON.stringify({ ...planning.path, length: lengthOf(rows), transitions: rows.length - 1, waypoints: rows }, null, 1);
 }
 
-const sameNumbers = (a, b) => a.every((value, k) => value === b[k]);
-
 /** An obstacle's entry in a problem file, as it is now. */
 function obstacleEntry(k, entry) {
   const { name, shape, first } = planning.obstacles[k];

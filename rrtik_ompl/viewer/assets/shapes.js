@@ -9,11 +9,11 @@ function resized(obstacle, sizes) {
   const along = (half) => obstacle.corners.map(([x, y, z]) => [x, y, Math.sign(z) * half]);
   if (obstacle.shape === "box") {
     const half = sizes.map((size) => 0.5 * size);
-    return { ...obstacle, half, corners: obstacle.corners.map((corner) => corner.map((value, i) => Math.sign(value) * half[i])) };
+    return { ...obstacle, sizes, half, corners: obstacle.corners.map((corner) => corner.map((value, i) => Math.sign(value) * half[i])) };
   }
-  if (obstacle.shape === "sphere") return { ...obstacle, radius: first };
-  if (obstacle.shape === "capsule") return { ...obstacle, radius: first, length: 0.5 * second, corners: along(0.5 * second) };
-  return { ...obstacle, disc: first, length: 0.5 * second, corners: along(0.5 * second) };
+  if (obstacle.shape === "sphere") return { ...obstacle, sizes, radius: first };
+  if (obstacle.shape === "capsule") return { ...obstacle, sizes, radius: first, length: 0.5 * second, corners: along(0.5 * second) };
+  return { ...obstacle, sizes, disc: first, length: 0.5 * second, corners: along(0.5 * second) };
 }
 
 /** The keys of a shape in a problem file. */
