@@ -11,7 +11,7 @@ from rrtik_ompl.world import World
 
 
 def standing_parts(world: World) -> list[dict[str, Any]] | None:
-    """The bodies of the arm that stand still, as convex solids in the world, and the obstacles that must not touch them.
+    """The bodies of the arm that stand still, as convex solids in the world, and which obstacles must not touch each.
 
     None if one of them cannot be given as such solids.
     """
