@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from bench.ik.genetic_extensions import extensions
 from bench.shared.pages import add_out
@@ -18,6 +19,7 @@ from rrtik_bench.genetic.runs import JUMP, TRAJECTORIES, TrajectoryRun, arm, mea
 from rrtik_bench.report.page import Report
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD
+from rrtik_ompl.plots.joints import COLORS, save_figure, tidy
 
 SLOW = replace(HISTORICAL, gene_mutation=0.005, stall=None)  # the other fit that the sources name
 D7 = (2.2, 4.0, 8.0)
@@ -205,29 +207,25 @@ def divergence(report: Report, seeds: int) -> None:
 
 def picture(file: Path) -> None:
     """The distance of the best individual over the generations, with and without the reduction, both presets."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(2, 1, figsize=(10, 7.5), constrained_layout=True)
+    figure = Figure(figsize=(9.0, 7.5), layout="constrained")
+    axes = figure.subplots(2, 1)
     for axis, name, preset, gain in ((axes[0], "standard", STANDARD, 1.0), (axes[1], "historical", HISTORICAL, 0.0)):
         for label, window, colour in (
-            ("whole range throughout", None, "tab:orange"),
-            ("5 degrees", preset.window, "tab:blue"),
+            ("whole range throughout", None, COLORS[1]),
+            ("5 degrees", preset.window, COLORS[0]),
         ):
             one = run(arm(3), 1, replace(preset, gain=gain, window=window), 0)
             text = f"{label}: {len(one.result.q)} points in {one.generations} generations"
             axis.plot(np.arange(1, one.generations + 1), one.result.distances / INCH, lw=0.6, color=colour, label=text)
-        axis.axhline(0.002, color="black", lw=0.8, ls="--", label="tolerance")
+        axis.axhline(0.002, color=COLORS[6], lw=0.8, ls="--", label="tolerance")
         axis.set(
             yscale="log", xscale="log", ylabel="distance of the best [in]", title=f"Trajectory 1, three joints, {name}"
         )
         axis.set_xlim(1, None)
-        axis.legend(loc="upper right", fontsize=8)
-        axis.grid(alpha=0.3)
+        axis.legend(loc="upper right", fontsize=9, frameon=False)
+        tidy(axis)
     axes[1].set_xlabel("generation")
-    figure.savefig(file, dpi=110)
+    save_figure(figure, file, dpi=110)
 
 
 def main() -> None:

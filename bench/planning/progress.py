@@ -14,7 +14,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from ompl import geometric as og
@@ -25,6 +24,7 @@ import rrtik_ompl as rrtik
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.plots.joints import COLORS, DASHES, save_figure, tidy
 from rrtik_planners import BiCRDT, FastAORRTC, FastRRTConnect, RestartShorten
 
 OURS = (RestartShorten, FastAORRTC, FastRRTConnect, BiCRDT)
@@ -86,18 +86,18 @@ def median(runs: list[Matrix], count: int, times: Vector) -> Vector:
 
 def draw(middles: dict[str, Vector], times: Vector, file: Path, title: str) -> None:
     """The picture."""
-    mpl.use("Agg")
     figure = Figure(figsize=(7.0, 4.2), layout="constrained")
     axes = figure.subplots()
-    for name, middle in sorted(middles.items(), key=lambda each: each[1][-1]):
+    for k, (name, middle) in enumerate(sorted(middles.items(), key=lambda each: each[1][-1])):
         shown = np.isfinite(middle)
+        style: dict[str, Any] = {"color": COLORS[k % len(COLORS)], "linestyle": DASHES[k // len(COLORS) % len(DASHES)]}
         if shown.any():
-            axes.step(times[shown], middle[shown], where="post", label=name)
+            axes.step(times[shown], middle[shown], where="post", label=name, **style)
     axes.set(xscale="log", yscale="log", title=title)
     axes.set(xlabel="time [s]", ylabel="best cost: length in joint space [rad]")
-    axes.grid(alpha=0.3)
-    axes.legend()
-    figure.savefig(file, dpi=110)
+    tidy(axes)
+    axes.legend(frameon=False)
+    save_figure(figure, file, dpi=110)
 
 
 def main() -> int:
