@@ -17,6 +17,8 @@ from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.copies import as_value, in_one_line
 
+TOUCHING = 1e-6  # [m] of overlap, below which bodies only touch: coal tells no less
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
@@ -50,6 +52,8 @@ class Contact:
         if self.distance > 0.0:
             return f"{pair} are {1e3 * self.distance:.4g} mm apart, within the margin of {1e3 * self.margin:.4g} mm"
         known = np.isfinite(self.point_first).all()
+        if known and abs(self.distance) < TOUCHING:
+            return f"{pair} touch"
         return f"{pair} overlap{f' by {1e3 * abs(self.distance):.3g} mm' if known else ''}"
 
 

@@ -143,6 +143,16 @@ def test_problem_files_name_the_folder(folder):
     assert load_problem(folder.parent / "problem.yaml").robot is robot
 
 
+def test_a_urdf_that_is_given_is_read_in_place_of_the_folders(folder):
+    given = next((folder.parent / PACKAGE).rglob("panda.urdf"))
+    (folder / ".setup_assistant").unlink()  # the message then says: give urdf=FILE
+    robot = load_robot(folder, urdf=given)
+    assert robot.posture("ready") == pytest.approx(READY)
+    assert list(robot.joint_names) == ARM
+    save_problem(Problem(World(robot), "ready", "ready"), folder.parent / "problem.yaml")
+    assert load_problem(folder.parent / "problem.yaml").robot is robot
+
+
 def test_a_changed_file_is_read_again(folder):
     before = load_robot(folder)
     (folder / "config" / "joint_limits.yaml").write_text(LIMITS.replace("1.25", "1.125"))

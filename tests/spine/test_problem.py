@@ -11,7 +11,7 @@ from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.goal import GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.shapes import Box
 from rrtik_ompl.world import World
 
@@ -46,6 +46,16 @@ def test_poses_are_members_of_sets_and_goals_of_tips(world):
     goal = MultiGoal({world.robot.tip: T})
     assert goal.satisfied(world.robot, FREE[None]).all()
     assert MultiGoal({world.robot.tip: away}).satisfied(world.robot, FREE[None]).tolist() == [False]
+
+
+@pytest.mark.parametrize("gap", [-5e-7, 0.0])
+def test_a_box_that_stands_on_a_table_is_said_to_touch_with_the_remedy(gap):
+    robot = load_robot("panda")
+    box = AttachedObject("box", "panda_hand", Box([0.05, 0.05, 0.05]), [0.0, 0.0, 0.2])
+    T = robot.fk(robot.posture("default"), "panda_hand").act(box.pose)
+    table = Obstacle("table", Box([0.2, 0.2, 0.02]), T * pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.035 + gap])))
+    with pytest.raises(ProblemError, match=r"'table' touch; move it or allow the pair|'box' touch; move it or allow"):
+        Problem(World(robot, Scene([table], [box])), "default", "default")
 
 
 def test_a_goal_in_collision_is_refused_with_the_pair(world):

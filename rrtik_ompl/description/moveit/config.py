@@ -37,8 +37,8 @@ def robot_from_moveit(folder: FilePath, **options: Any) -> Robot:
     Raises:
         InputError: If a file is missing or cannot be used; one line names it and the remedy.
     """
-    found = config_files(folder, options)
-    return robot_from_urdf(found.pop("urdf"), **{**options, **found})
+    found = {**options, **config_files(folder, options)}
+    return robot_from_urdf(found.pop("urdf"), **found)
 
 
 def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
