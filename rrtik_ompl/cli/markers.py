@@ -15,6 +15,8 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
+    from rrtik_ompl.sensing.cameras.camera import Camera
+    from rrtik_ompl.sensing.rig import Rig
     from rrtik_ompl.sensing.sensor import Sensor, View
 
 markers = typer.Typer(help="Print markers, calibrate a camera, sense what it sees.")
@@ -105,9 +107,15 @@ def calibrate_camera(
 
 @markers.command("sense")
 def sense(
-    source: Annotated[str, typer.Argument(help="An image, a folder of images, a video, or a camera's number.")],
-    camera: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
+    source: Annotated[
+        list[str],
+        typer.Argument(help="An image, a folder of images, a video, or a camera's number; with --rig one a camera."),
+    ],
     marker_map: Annotated[Path, typer.Option("--map", help="Marker map: which marker is on which object: .yaml.")],
+    camera: Annotated[Path | None, typer.Option(help="Camera file (see: rrtik markers calibrate).")] = None,
+    rig: Annotated[
+        Path | None, typer.Option(help="In place of --camera: several that take pictures together: .yaml.")
+    ] = None,
     frames: Annotated[int, typer.Option(help="Number of pictures at most; 0: all, of a camera device 1.", min=0)] = 0,
     scene: Annotated[Path | None, typer.Option(help="Write the scene in the frame of the base: .yaml.")] = None,
     task: Annotated[
@@ -135,17 +143,17 @@ def sense(
     check_target(task, SCENES)
     check_target(picture, PICTURES)
     goal = _task_goal(task, problem, grasp)
-    from rrtik_ompl.sensing.cameras.camera_file import load_camera
     from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
     from rrtik_ompl.sensing.sensor import Sensor
 
-    alone = Path(source).is_dir() if independent is None else independent
-    sensor = Sensor(load_camera(camera), load_marker_map(marker_map), smooth=not alone, sigmas=sigmas)
+    alone = Path(source[0]).is_dir() if independent is None else independent
+    eye = _camera_or_rig(source, camera, rig)
+    sensor = Sensor(eye, load_marker_map(marker_map), smooth=not alone, sigmas=sigmas)
     view = None
     for view in _views(sensor, source, frames):
         say(json.dumps(view.document())) if as_json else say(*view.lines())
     if view is None or not view.seen:
-        raise InputError(sensor.why_nothing(source))
+        raise InputError(sensor.why_nothing(source[0]))
     if picture is not None:
         view.save_picture(picture)
     if scene is not None:
@@ -173,14 +181,33 @@ def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tup
     return name, kind, int(level)
 
 
-def _views(sensor: Sensor, source: str, frames: int) -> Iterator[View]:
-    from rrtik_ompl.sensing.cameras.pictures import pictures_from
+def _camera_or_rig(sources: list[str], camera: Path | None, rig: Path | None) -> Camera | Rig:
+    """What took the pictures."""
+    from rrtik_ompl.sensing.cameras.camera_file import load_camera
+    from rrtik_ompl.sensing.rig_file import load_rig
 
-    most = frames or (1 if source.isdecimal() else None)
-    for count, picture in enumerate(pictures_from(source)):
+    if (camera is None) == (rig is None):
+        raise InputError("give --camera FILE, or --rig FILE for several cameras that take pictures at the same time")
+    if rig is not None:
+        found = load_rig(rig)
+        if len(sources) != len(found.cameras):
+            raise InputError(
+                f"--rig {rig} has {len(found.cameras)} cameras and needs as many sources, got {len(sources)}"
+            )
+        return found
+    if len(sources) > 1:
+        raise InputError(f"{len(sources)} sources need --rig FILE, which says how their cameras stand to each other")
+    return load_camera(str(camera))
+
+
+def _views(sensor: Sensor, sources: list[str], frames: int) -> Iterator[View]:
+    from rrtik_ompl.sensing.rig_file import pictures_together
+
+    most = frames or (1 if any(source.isdecimal() for source in sources) else None)
+    for count, pictures in enumerate(pictures_together(sources)):
         if count == most:
             return
-        yield sensor.view(picture)
+        yield sensor.view(*pictures)
 
 
 def _numbers(text: str) -> list[int]:

@@ -20,10 +20,12 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import rigid
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.corner_pose import CornerPose
+from rrtik_ompl.sensing.markers.detection import SeenMarker
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
-from rrtik_ompl.sensing.sight import Sighting, detect_objects
+from rrtik_ompl.sensing.sight import Sighting, check_size, detect_objects
 
 MAX_CONTRADICTION = 5.0  # squared deviations for each number that the cameras both give; 1 is usual
+NEAREST = 0.01  # [m] before a camera that it can see
 ROUNDS = 4  # of Gauss-Newton: rotations are nearly vectors after one
 
 
@@ -69,7 +71,8 @@ def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: M
         marker_map: The map of all objects.
 
     Returns:
-        An object that only one camera sees has the pose that this one gives.
+        An object that only one camera sees has the pose that this one gives. Markers are those that were seen, each
+        once; corners of what the first camera does not see are where it would see them.
 
     Raises:
         InputError: If there are not as many pictures as cameras, or one does not have its camera's size.
@@ -78,6 +81,7 @@ def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: M
         raise InputError(f"a rig of {len(rig.cameras)} cameras needs as many pictures, got {len(pictures)}")
     seen: dict[str, list[Sighting]] = {}
     for number, (picture, camera) in enumerate(zip(pictures, rig.cameras, strict=True)):
+        check_size(picture, camera, f"picture of camera {number + 1}")
         for each in detect_objects(picture, camera, marker_map):
             seen.setdefault(each.object.name, []).append(_in_first(each, rig, number))
     return tuple(joined(seen[each.name]) for each in marker_map.objects if each.name in seen)
@@ -95,9 +99,9 @@ def joined(sightings: Sequence[Sighting]) -> Sighting:
     doubtful = second is not None and second.surprise < MAX_CONTRADICTION
     if doubtful and second is not None:
         pose = replace(pose, other=second.T_camera_object, other_error=pose.error)
-    markers = tuple(marker for each in usable for marker in each.markers)
+    markers = {marker.number: marker for each in reversed(usable) for marker in each.markers}
     refused = "" if pose.surprise <= MAX_CONTRADICTION else CONTRADICTION.format(pose.surprise**0.5)
-    return Sighting(usable[0].object, pose, markers, refused)
+    return Sighting(usable[0].object, pose, tuple(markers[number] for number in sorted(markers)), refused)
 
 
 CONTRADICTION = (
@@ -118,7 +122,17 @@ def _in_first(sight: Sighting, rig: Rig, number: int) -> Sighting:
     spread = axes @ pose.covariance @ axes.T + lever @ doubt @ lever.T
     other = None if pose.other is None else T * pose.other
     moved = replace(pose, T_camera_object=T * pose.T_camera_object, other=other, covariance=frozen(spread))
-    return replace(sight, pose=moved)
+    return replace(sight, pose=moved, markers=tuple(_marker_in_first(m, moved, sight, rig) for m in sight.markers))
+
+
+def _marker_in_first(marker: SeenMarker, pose: CornerPose, sight: Sighting, rig: Rig) -> SeenMarker:
+    """A marker with its corners where the first camera of the rig would see them; in its corner what is behind it."""
+    mounted = next(each for each in sight.object.markers if each.number == marker.number)
+    T = pose.T_camera_object
+    corners = mounted.corners @ T.rotation.T + T.translation
+    ahead = bool((corners[:, 2] > NEAREST).all())
+    seen = rig.cameras[0].project(corners) if ahead else np.zeros((4, 2))
+    return replace(marker, corners=frozen(seen), spread=None)
 
 
 def _branches(sight: Sighting) -> list[pin.SE3]:

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.sensing.annotate import annotated
@@ -19,6 +20,7 @@ from rrtik_ompl.sensing.frames import NoBaseError
 from rrtik_ompl.sensing.markers.corner_pose import CornerPose
 from rrtik_ompl.sensing.markers.detection import dictionaries_seen
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
+from rrtik_ompl.sensing.rig import Rig, detect_in_rig
 from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject, checked_sigmas, objects_in_base
 from rrtik_ompl.sensing.sight import Sighting, as_gray, check_size, detect_objects
 from rrtik_ompl.sensing.tracker import PoseTracker
@@ -88,11 +90,13 @@ class View:
 class Sensor:
     """Detects and tracks objects in one picture after the other."""
 
-    def __init__(self, camera: Camera, marker_map: MarkerMap, *, smooth: bool = True, sigmas: float = SIGMAS) -> None:
+    def __init__(
+        self, camera: Camera | Rig, marker_map: MarkerMap, *, smooth: bool = True, sigmas: float = SIGMAS
+    ) -> None:
         """Begin without objects.
 
         Args:
-            camera: Of the pictures.
+            camera: Of the pictures; or several that take theirs at the same time, with poses in the frame of the first.
             marker_map: The map of all objects.
             smooth: Smooth poses over time and leave out outliers.
             sigmas: How many standard deviations of their places the margins of obstacles cover; 0 for no margins.
@@ -100,21 +104,26 @@ class Sensor:
         Raises:
             InputError: If ``sigmas`` is not 0 or more.
         """
-        self.camera, self.marker_map, self._sigmas = camera, marker_map, checked_sigmas(sigmas)
+        self._rig = camera if isinstance(camera, Rig) else None
+        self.camera = camera.cameras[0] if isinstance(camera, Rig) else camera
+        self.marker_map, self._sigmas = marker_map, checked_sigmas(sigmas)
         self._trackers = {each.name: PoseTracker() for each in marker_map.objects} if smooth else {}
         self._before: tuple[Sighting, ...] = ()
         self._count = 0  # of pictures
         self._blank: NDArray[np.uint8] | None = None  # the last picture in which nothing was found
 
-    def view(self, picture: Picture) -> View:
+    def view(self, picture: Picture, *others: Picture) -> View:
         """The objects in a picture, which is later than the one before.
 
+        Args:
+            picture: Of the camera, or of the first one.
+            others: Of the other cameras, taken at the same time.
+
         Raises:
-            InputError: If the picture does not have the camera's size, or times go backwards.
+            InputError: If there are not as many pictures as cameras, one does not have its camera's size, or times go
+                backwards.
         """
-        check_size(picture.pixels, self.camera, picture.name)
-        near = self._count % WHOLE_EVERY != 0
-        found = detect_objects(picture.pixels, self.camera, self.marker_map, before=self._before, near=near)
+        found = self._detected(picture, others)
         self._before, self._count = (found if self._trackers else ()), self._count + 1
         seen = tuple(self._tracked(each, picture.time) for each in found)
         if not seen:
@@ -124,6 +133,17 @@ class Sensor:
             return View(picture, self.camera, seen, placed)
         except NoBaseError as error:
             return View(picture, self.camera, seen, (), str(error))
+
+    def _detected(self, picture: Picture, others: tuple[Picture, ...]) -> tuple[Sighting, ...]:
+        cameras = (self.camera,) if self._rig is None else self._rig.cameras
+        if len(cameras) != 1 + len(others):
+            raise InputError(f"{len(cameras)} cameras need as many pictures of a moment, got {1 + len(others)}")
+        for each, camera in zip((picture, *others), cameras, strict=True):
+            check_size(each.pixels, camera, each.name)
+        if self._rig is not None:
+            return detect_in_rig([each.pixels for each in (picture, *others)], self._rig, self.marker_map)
+        near = bool(self._trackers) and self._count % WHOLE_EVERY != 0
+        return detect_objects(picture.pixels, self.camera, self.marker_map, before=self._before, near=near)
 
     def why_nothing(self, source: str) -> str:
         """One line on why no object was seen in the last picture without one, with a remedy.

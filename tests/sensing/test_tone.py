@@ -84,6 +84,18 @@ def test_a_marker_in_haze_is_found_at_the_second_try():
     assert np.abs(marker.corners - true).max() < 0.5
 
 
+def test_a_blurred_marker_is_found_at_the_third_try():
+    T = facing([0.8, 0.0, 0.4], [0.1, 0.05, 2.1])
+    clean = clean_picture(CAMERA, [(T, marker_print(marker_cells("apriltag_36h11", 7), SIDE))], rays=6)
+    noisy = cv2.GaussianBlur(clean, (0, 0), 1.9) + 0.008 * np.random.default_rng(0).standard_normal(clean.shape)
+    gray = np.clip(np.rint(255.0 * noisy), 0, 255).astype(np.uint8)
+    assert find_markers(gray, "apriltag_36h11", near=True) == ()  # two tries are too few
+    (marker,) = find_markers(gray, "apriltag_36h11")
+    assert marker.number == 7
+    found = pose_of_square(CAMERA, marker.corners, SIDE, spread=marker.spread)
+    assert np.linalg.norm(found.T_camera_object.translation - T.translation) < 3.0 * found.position_sigma
+
+
 def test_the_tone_of_a_picture_is_found():
     T = facing(*PLACES[0])
     assert looked(T, 0, 0.0)[0].look.tone == 0.0

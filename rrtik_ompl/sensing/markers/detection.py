@@ -24,8 +24,9 @@ DICTIONARIES = {
     "aruco_original": "DICT_ARUCO_ORIGINAL",
     "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
 }
-_ENLARGED = 2.0  # for the second try
-_CALM = 1.0  # standard deviation of the blur against noise there [pixels of the enlarged picture]
+_ENLARGED = 2.0  # for further tries
+_CALM = 1.0, 1.4  # standard deviation of the blur against noise there, in the second and the third [enlarged pixels]
+_SHARPENED, _EDGE = 8.0, 3.0  # in the third: times what is finer than a spot of this size is added [enlarged pixels]
 _AROUND = 81  # side of the window in which light and contrast are made even there
 _FAINT = 1.5  # grey values: less contrast is noise
 _CONTRAST = 60.0  # grey values for a standard deviation of the window
@@ -92,14 +93,15 @@ def find_markers(
         align: Align the ideal marker with the picture (`aligned_corners`); else corners are those of the detector.
         tone: Of the picture (`cameras.tone`); None: for each marker the one with which it fits best.
         before: Those of the picture before, of a film: they are aligned faster.
-        near: Search only where those were, unless one of them is not there any more.
+        near: Search only where those were, unless one of them is not there any more; and where nothing is found,
+            not for what is blurred most, which costs as much again.
     """
     known = {marker.number: marker.look for marker in before}
     corners, numbers = _again(gray, before) if near and before else ([], None)
     if numbers is None:
         corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
     if numbers is None:
-        corners, numbers = _second_try(gray, dictionary)
+        corners, numbers = _further_tries(gray, dictionary, 1 if near else 2)
     found: list[SeenMarker] = []
     if numbers is None:
         return ()
@@ -131,15 +133,28 @@ def _again(gray: NDArray[np.uint8], before: Sequence[SeenMarker]) -> tuple[Any, 
     return corners, np.array(numbers)
 
 
-def _second_try(gray: NDArray[np.uint8], dictionary: str) -> tuple[Any, Any]:
-    """Corners and numbers of what is too faint, too blurred or too small at first: in an enlarged, evened picture."""
+def _further_tries(gray: NDArray[np.uint8], dictionary: str, tries: int) -> tuple[Any, Any]:
+    """Corners and numbers of what is too faint, too blurred or too small at first: in an enlarged, evened picture.
+
+    The second of these tries sharpens the picture, in which faint markers drown in noise and blurred ones appear.
+    """
     large = cv2.resize(gray, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC).astype(np.float32)
-    calm = cv2.GaussianBlur(large, (0, 0), _CALM)
-    around = cv2.boxFilter(calm, -1, (_AROUND, _AROUND))
-    spread = np.sqrt(np.maximum(cv2.boxFilter(calm * calm, -1, (_AROUND, _AROUND)) - around * around, _FAINT**2))
-    even = np.clip(128.0 + _CONTRAST * (calm - around) / spread, 0.0, 255.0).astype(np.uint8)
-    corners, numbers, _ = _detector(dictionary).detectMarkers(even)
+    corners, numbers = [], None
+    for number in range(tries):
+        calm = cv2.GaussianBlur(large, (0, 0), _CALM[number])
+        if number > 0:
+            calm = calm + _SHARPENED * (calm - cv2.GaussianBlur(calm, (0, 0), _EDGE))
+        corners, numbers, _ = _detector(dictionary).detectMarkers(_evened(calm))
+        if numbers is not None:
+            break
     return [(each + 0.5) / _ENLARGED - 0.5 for each in corners], numbers
+
+
+def _evened(picture: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    """The same light and contrast everywhere."""
+    around = cv2.boxFilter(picture, -1, (_AROUND, _AROUND))
+    spread = np.sqrt(np.maximum(cv2.boxFilter(picture * picture, -1, (_AROUND, _AROUND)) - around * around, _FAINT**2))
+    return np.clip(128.0 + _CONTRAST * (picture - around) / spread, 0.0, 255.0).astype(np.uint8)
 
 
 def dictionaries_seen(gray: NDArray[np.uint8]) -> tuple[str, ...]:

@@ -1,0 +1,87 @@
+"""A rig of cameras <-> its YAML file, and the pictures that its cameras took at the same time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
+from typing import Annotated
+
+import numpy as np
+import pinocchio as pin
+from pydantic import Field
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.sections import Name, NotNegative, Section, Version, parse
+from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.problem_files.scene import PoseEntry
+from rrtik_ompl.sensing.cameras.camera_file import load_camera
+from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
+from rrtik_ompl.sensing.rig import Rig
+
+MAX_APART = 0.02  # [s] between pictures of one moment; a thing at 0.1 m/s goes 2 mm in that time
+
+
+class RigCameraEntry(Section):
+    """A camera of a rig."""
+
+    file: Name = Field(description="its camera file, relative to this one")
+    pose: PoseEntry | None = Field(None, description="in the frame of the first camera; left out for that one")
+
+    def build(self) -> pin.SE3:
+        """Its pose."""
+        return pin.SE3.Identity() if self.pose is None else self.pose.build()
+
+
+class RigFile(Section):
+    """A file with cameras that are fixed to each other."""
+
+    version: Version
+    cameras: Annotated[list[RigCameraEntry], Field(min_length=2)]
+    position_sigma: NotNegative = Field(0.0, description="standard deviation of where the others are [m]")
+    rotation_sigma_deg: NotNegative = Field(0.0, description="of how they are turned [deg]")
+
+
+def load_rig(path: str | os.PathLike[str]) -> Rig:
+    """Read a rig and the camera files that it names.
+
+    Raises:
+        InputError: If a file cannot be used; one line with file, line, key, what was found and the remedy.
+    """
+    document = read_yaml(path)
+    entry = parse(document, RigFile)
+    cameras, poses = [], []
+    for k, each in enumerate(entry.cameras):
+        with document.at(("cameras", k)):
+            if k > 0 and each.pose is None:
+                raise InputError("needs a pose in the frame of the first camera")
+            poses.append(each.build())
+        with document.at(("cameras", k, "file")):
+            cameras.append(load_camera(document.path.parent / each.file))
+    with document.at(("cameras",)):
+        turn = float(np.deg2rad(entry.rotation_sigma_deg))
+        return Rig(tuple(cameras), tuple(poses), entry.position_sigma, turn)
+
+
+def pictures_together(sources: Sequence[str]) -> Iterator[tuple[Picture, ...]]:
+    """One picture of each source at a time, as `pictures_from` gives them: folders by order, films by their times.
+
+    Camera devices are read one after the other; only cameras that are triggered together see the same moment.
+
+    Raises:
+        InputError: If a source ends before the others, or its pictures are of other times.
+    """
+    films = not any(source.isdecimal() for source in sources)
+    for taken in zip_longest(*(pictures_from(source) for source in sources)):
+        if None in taken:
+            number = taken.index(None)
+            others = next(each.name for each in taken if each is not None)
+            raise InputError(f"{sources[number]}: has no picture to {others}; give as many of each camera")
+        times = [each.time for each in taken]
+        if films and max(times) - min(times) > MAX_APART:
+            late = int(np.argmax(times))
+            raise InputError(
+                f"{taken[late].name}: {max(times) - min(times):.2f} s later than the other camera's picture; give "
+                "films of the same rate that begin together"
+            )
+        yield taken
