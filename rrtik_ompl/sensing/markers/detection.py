@@ -139,9 +139,10 @@ def _further_tries(gray: NDArray[np.uint8], dictionary: str, tries: int) -> tupl
     The second of these tries sharpens the picture, in which faint markers drown in noise and blurred ones appear.
     """
     large = cv2.resize(gray, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC).astype(np.float32)
-    corners, numbers = [], None
+    corners: Any = []
+    numbers: Any = None
     for number in range(tries):
-        calm = cv2.GaussianBlur(large, (0, 0), _CALM[number])
+        calm: Any = cv2.GaussianBlur(large, (0, 0), _CALM[number])
         if number > 0:
             calm = calm + _SHARPENED * (calm - cv2.GaussianBlur(calm, (0, 0), _EDGE))
         corners, numbers, _ = _detector(dictionary).detectMarkers(_evened(calm))
