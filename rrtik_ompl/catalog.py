@@ -16,7 +16,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -237,14 +237,14 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
 
 
 @cache
-def _offers(group: str) -> dict[str, EntryPoint]:
+def _offers(group: str) -> dict[str, Any]:
     return {entry.name: entry for entry in _entry_points().select(group=f"rrtik_ompl.{group}")}
 
 
 @cache
 def _entry_points() -> Any:
-    """Those of all groups: looking through the installed packages takes most of the time."""
-    return entry_points()
+    """Those of all groups: looking through the installed packages takes most of the time, loading this 2 MB."""
+    return import_module("importlib.metadata").entry_points()
 
 
 @cache

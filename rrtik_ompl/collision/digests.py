@@ -6,7 +6,6 @@ one word why a certificate does not belong to a world; what it proves is compute
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any
@@ -19,6 +18,7 @@ from rrtik_ompl.collision.bodies import Body, link_bodies
 from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.shape_table import sizes_of
 from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.robot import Robot
 
 DIGITS = 16  # of a digest, in hexadecimal
@@ -81,7 +81,7 @@ def _numbers(values: ArrayLike) -> bytes:
 
 
 def _hash(parts: Iterable[bytes]) -> str:
-    found = hashlib.sha256()
+    found = sha256()
     for part in parts:
         found.update(len(part).to_bytes(8, "big") + part)
     return found.hexdigest()[:DIGITS]

@@ -6,7 +6,6 @@ that come along.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.covers.shipped import shipped_cover
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.cache import cache_folder, nobody_else_s, write_whole
+from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.notice import COVERING, tell_once
 
@@ -91,7 +91,7 @@ def cover_key(geometry: coal.CollisionGeometry, parameters: str) -> str | None:
     if data is None:
         return None
     head = f"layout {LAYOUT} algorithm {ALGORITHM} {parameters}\0".encode()
-    return hashlib.sha256(head + data).hexdigest()
+    return sha256(head + data).hexdigest()
 
 
 def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[], Matrix]) -> Matrix:
@@ -130,7 +130,7 @@ def _read(file: Path, key: str) -> Matrix | None:
 
 
 def _check(spheres: Matrix) -> str:
-    return hashlib.sha256(np.ascontiguousarray(spheres).tobytes()).hexdigest()
+    return sha256(np.ascontiguousarray(spheres).tobytes()).hexdigest()
 
 
 def _write(file: Path, key: str, spheres: Matrix) -> None:

@@ -6,7 +6,6 @@ Importing this module teaches pickle (and what builds on it: multiprocessing, jo
 from __future__ import annotations
 
 import copyreg
-import hashlib
 import pickle
 import threading
 from collections import OrderedDict
@@ -21,6 +20,7 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.solids import bvh, is_mesh, mesh_arrays
 from rrtik_ompl.copies import packed, unpacked
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.robot import Robot
 
 LIMITS = tuple(f"{end}{what}Limit" for what in ("Position", "Velocity", "Effort") for end in ("lower", "upper"))
@@ -36,13 +36,13 @@ def reduce_robot(robot: Robot) -> tuple[Any, ...]:
         InputError: If its own inverse kinematics cannot be pickled.
     """
     data = _bytes_of(robot)
-    _remember(hashlib.sha256(data).digest(), robot)
+    _remember(sha256(data).digest(), robot)
     return robot_from_bytes, (data,)
 
 
 def robot_from_bytes(data: bytes) -> Robot:
     """The robot that :func:`reduce_robot` took apart; the same object for the same bytes, so that tables are shared."""
-    key = hashlib.sha256(data).digest()
+    key = sha256(data).digest()
     with _lock:
         if key in _known:
             return _known[key]

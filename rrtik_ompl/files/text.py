@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import stat
 from difflib import get_close_matches
 from errno import EDQUOT, EFBIG, ENOSPC
@@ -98,7 +97,7 @@ def _replace(target: Path, data: bytes) -> None:
         mode = None
     if mode is not None and (not mode & 0o222 or not os.access(target, os.W_OK)):
         raise PermissionError(None, "it is write-protected; choose another name")
-    temporary = target.with_name(f".{secrets.token_hex(8)}.tmp")
+    temporary = target.with_name(f".{os.urandom(8).hex()}.tmp")
     try:
         if not _appears_whole(temporary, data):
             with open(temporary, "xb") as file:

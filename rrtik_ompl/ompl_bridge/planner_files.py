@@ -7,7 +7,6 @@ import inspect
 import os
 import sys
 from functools import lru_cache
-from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 from ompl import base as ob
 
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 
 MARK = ".py:"

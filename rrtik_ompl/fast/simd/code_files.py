@@ -10,12 +10,12 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from hashlib import sha256
 from pathlib import Path
 
 from rrtik_ompl.fast.simd.processor import WIDTH, processor_identity
 from rrtik_ompl.fast.simd.targets import Target
 from rrtik_ompl.files.cache import nobody_else_s, one_at_a_time, write_whole
+from rrtik_ompl.files.digest import sha256
 
 LAYOUT = 3
 CHECK_BYTES = 32
