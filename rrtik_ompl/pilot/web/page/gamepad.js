@@ -3,7 +3,7 @@
 
 const PAD_PERIOD_MS = 40, DEAD_ZONE = 0.15;
 const ENABLE = 4, STOP_BUTTON = 1;
-const PAD_HELD = new Map([[0, () => ["next", {}]], [5, () => ["go", {}]]]);
+const PAD_HELD = new Map([[0, () => ["next", {}]], [5, () => ["go", {}]], [7, () => ["servo", {}]]]);
 const PAD_TAPPED = new Map([
   [2, () => send("plan")], [3, () => send("accept")], [8, () => send("reject")], [9, () => nextObject()],
   [6, () => chooseGrasp(1, 0)], [7, () => chooseGrasp(0, 1)], [12, () => neighbourJoint(-1)],
@@ -11,7 +11,8 @@ const PAD_TAPPED = new Map([
 ]);
 const PAD_ENABLED = new Map([[10, () => toggleGripper()]]);  // only while the shoulder button is held, too
 const PAD_WORDS = "gamepad: LB held enables · left stick drives the joint · A held: next move · B: STOP · X plan · Y accept · "
-  + "D-pad: joint, speed · LT type · RT level · left stick pressed: gripper · right stick pressed: lift";
+  + "RB held: joint to its value · RT held with LB: the last centimetres by sight · D-pad: joint, speed · LT type · "
+  + "RT without LB: level · left stick pressed: gripper · right stick pressed: lift";
 let padBefore = [], padWasThere = false;
 
 const firstPad = () => [...(navigator.getGamepads?.() ?? [])].find((pad) => pad && pad.connected && pad.mapping === "standard");
@@ -32,7 +33,7 @@ function readPad() {
     if (tapped(number) && now[ENABLE]) hold(`pad ${number}`, () => isDown(firstPad(), ENABLE) && isDown(firstPad(), number) ? make() : null);
     if (!now[number]) letGo(`pad ${number}`);
   }
-  for (const [number, act] of PAD_TAPPED) if (tapped(number) && state) { letGo(); act(); }
+  for (const [number, act] of PAD_TAPPED) if (tapped(number) && state && !(now[ENABLE] && PAD_HELD.has(number))) { letGo(); act(); }
   for (const [number, act] of PAD_ENABLED) if (tapped(number) && now[ENABLE] && state) { letGo(); act(); }
   if (stick()) hold("stick", stick); else letGo("stick");
   padBefore = now;

@@ -1,0 +1,96 @@
+"""The last centimetres by sight on the page in a browser, by a key and by a gamepad: to where the target is seen now."""
+
+import time
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.pilot.setup import SessionOptions
+from rrtik_ompl.poses import apart, pose
+from rrtik_tests.browser import Running
+from rrtik_tests.pilot_hands import ENABLE, HANDS, faster, follow
+
+TRIGGER = 7
+
+
+CHOOSE_GREEN = """
+(({type, level}) => send("grasp", {type, level}))(state.lamps.find((lamp) => lamp.color === "green"))
+"""
+
+
+def hold_key(browser, until):
+    browser.hold("f", until)
+
+
+def hold_trigger(browser, until):
+    def let_go():
+        browser.ask(f"push({TRIGGER}, false)")
+        browser.wait(f"held === null && !padBefore[{TRIGGER}]")
+
+    browser.keep(lambda: browser.ask(f"push({TRIGGER}, true)"), let_go, until)
+
+
+HOLDS = {"keyboard": hold_key, "gamepad": hold_trigger}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", sorted(HOLDS))
+def test_a_target_that_has_moved_is_reached_by_sight_and_a_lost_one_is_not(browser, kind):
+    with Running(SessionOptions("titan4_sdu", seed=1)) as running:
+        session, places = running.opened.engine.session, running.opened.engine.perception.source.camera.places
+        browser.open(running.server.url)
+        browser.wait("state && state.lamps.length === 6 && role.role === 'pilot'", 90.0)
+        faster(running)
+        hands, hold = HANDS[kind](browser), HOLDS[kind]
+        browser.ask(CHOOSE_GREEN)
+        browser.wait("state.choice !== null")
+        if kind == "keyboard":
+            browser.press("f")
+        else:
+            hold_trigger(browser, "state.message.includes('cm')")
+        browser.wait("state.message.includes('the last 15 cm')")
+        assert not session.driving
+        follow(browser, hands, "plan", lambda: None)
+
+        there = places["valve"]
+        places["valve"] = there * pose([0.004, -0.003, 0.002])
+        browser.wait("state.aim && state.aim.distance > 0.003")
+        hold(browser, "state.message.startsWith('at the grasp')")
+        away, turned = apart(session.robot.fk(session.arm.read()), seen_grasp(session))
+        assert away <= 1e-3
+        assert turned <= np.radians(0.2)
+
+        places["valve"] = there * pose([0.01, 0.0, 0.0])
+        browser.wait("state.aim && state.aim.distance > 0.004")
+        places["valve"] = pose([-5.0, 0.0, 0.0]) * there  # behind the camera
+        wait_until_unseen(session)
+        before = session.arm.read()
+        hold(browser, "state.message.includes('not in view')")
+        assert session.arm.read() == pytest.approx(before, abs=np.radians(0.1))
+        hands.away()
+
+
+def seen_grasp(session):
+    return session.surroundings.named("valve").grasp_pose(*session.choice)
+
+
+def wait_until_unseen(session):
+    end = time.monotonic() + 30.0
+    while session.unseen("valve") == 0.0:
+        assert time.monotonic() < end, "still in view"
+        time.sleep(0.05)
+
+
+def test_the_trigger_without_the_shoulder_button_chooses_a_level_and_moves_nothing(browser):
+    with Running(SessionOptions("titan4_sdu", seed=1)) as running:
+        browser.open(running.server.url)
+        browser.wait("state && state.lamps.length === 6 && role.role === 'pilot'", 90.0)
+        hands = HANDS["gamepad"](browser)
+        hands.tap("type", "state.choice !== null")
+        before = browser.ask("state.choice.level")
+        browser.ask(f"push({ENABLE}, false)")
+        browser.ask(f"push({TRIGGER}, true)")
+        browser.wait(f"state.choice.level !== {before}")
+        assert not running.opened.engine.session.driving
+        browser.ask(f"push({TRIGGER}, false)")
+        hands.away()
