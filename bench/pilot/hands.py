@@ -17,10 +17,19 @@ HASTY_RADIANS = np.deg2rad(1.0)
 
 
 class Followed(NamedTuple):
-    """Where the links were after each press, shape (n, dof), and how often the route was planned anew."""
+    """What became of a route.
+
+    Attributes:
+        rows: Where the links were after each press, shape (n, dof).
+        plans: How often the route was planned anew.
+        presses: How often "next" was pressed.
+        moving: For how long the links moved [s].
+    """
 
     rows: Matrix
     plans: int
+    presses: int
+    moving: float
 
 
 def follow_route(session: Session, arm: WrongArm, *, hasty: bool = False) -> Followed:
@@ -31,21 +40,20 @@ def follow_route(session: Session, arm: WrongArm, *, hasty: bool = False) -> Fol
         arm: Its arm.
         hasty: Each move is let go a degree before its end once, and made to its end by a second press.
     """
-    rows, plans = [arm.links()], 0
+    rows, plans, press, moving = [arm.links()], 0, 0, 0.0
     _plan(session, "plan")
-    for press in range(PRESSES):
-        if session.follower is None or session.mode != "following":
-            break
-        hold_next(session, arm, press, early=hasty and press % 2 == 0)
+    while press < PRESSES and session.follower is not None and session.mode == "following":
+        moving += hold_next(session, arm, press, early=hasty and press % 2 == 0)
+        press += 1
         rows.append(arm.links())
         if "off the route" in session.message or session.guide.withdrawn:
             plans += 1
             _plan(session, "replan")
-    return Followed(np.array(rows), plans)
+    return Followed(np.array(rows), plans, press, moving)
 
 
-def hold_next(session: Session, arm: WrongArm, press: int, *, early: bool = False) -> None:
-    """Hold "next" until its move is made, or the arm is at rest; let go, and wait.
+def hold_next(session: Session, arm: WrongArm, press: int, *, early: bool = False) -> float:
+    """Hold "next" until its move is made, or the arm is at rest; let go, and wait. For how long its links moved [s].
 
     Args:
         session: That follows a route.
@@ -53,22 +61,23 @@ def hold_next(session: Session, arm: WrongArm, press: int, *, early: bool = Fals
         press: Number of the press.
         early: Let go a degree before the end.
     """
-    still, end = 0, session.time + HOLD_SECONDS
+    still, end, moving = 0, session.time + HOLD_SECONDS, 0
     while still < STILL and session.time < end and not (early and _near(session)):
-        before = arm.links()
         session.command("next", session.time, press=press)
         if session.held.over:
             break
-        _pass(session, arm)
-        still = still + 1 if np.array_equal(before, arm.links()) else 0
+        moved = _pass(session, arm)
+        still, moving = (0 if moved else still + 1), moving + moved
     session.command("release", session.time)
-    for _ in range(REST):
-        _pass(session, arm)
+    return STEP * (moving + sum(_pass(session, arm) for _ in range(REST)))
 
 
-def _pass(session: Session, arm: WrongArm) -> None:
+def _pass(session: Session, arm: WrongArm) -> bool:
+    """A step of time; whether the links moved."""
+    before = arm.links()
     arm.advance(STEP)
     session.tick(session.time + STEP)
+    return not np.array_equal(before, arm.links())
 
 
 def _near(session: Session) -> bool:

@@ -86,10 +86,10 @@ def write_pilot(report: Report, part: int) -> None:
                found.tool.touching <= 0.1 * found.naive.touching)  # fmt: skip
     report.note(
         "Simulated pilot",
-        f"From the bay to the button. Reaction {REACTION_SECONDS} s a move, overshoot N(0, 1 deg) at its end, usual "
-        "rates. "
-        "With the tool the pilot makes the next move of the list, corrects it while it is short of its end, and plans "
-        "anew where the tool says that the arm is off the route or the rest of it blocked: "
+        f"From the bay to the button, usual rates. Reaction {REACTION_SECONDS} s a move or press. In naive order and "
+        "by the bare list each move ends with an error of N(0, 1 deg). With the tool the pilot holds each move to its "
+        "end, lets go a degree too early at every second press and has to press again, and at each of its stops the "
+        "arm goes on by |N(0, 1 deg)|, drawn for each joint; a route is planned anew where the tool asks for it: "
         f"{found.plans:.1f} times on the mean, {REPLANNING:g} s each. The bare list, never checked on the way, takes "
         f"{found.bare.seconds:.0f} s, and {100 * found.bare.touching:.0f} % of its executions touch something.",
     )

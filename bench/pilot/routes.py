@@ -8,10 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import rrtik_ompl as rrtik
+from bench.pilot.hands import follow_route
 from bench.pilot.scene import NAME, PROBLEM, ROBOT, WORLD, green_grasps
 from bench.shared.problems import goal_joints
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.pilot.devices.arm import SimulatedArm, joint_rates
+from rrtik_ompl.pilot.devices.arm import joint_rates
+from rrtik_ompl.pilot.devices.wrong_arm import Faults, WrongArm
 from rrtik_ompl.pilot.routes.clearance import executions, free_rows
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route, route_to
@@ -108,37 +110,15 @@ def simulated_pilot(count: int) -> SimulatedPilot:
 def _guided(seed: int, rates: Any, rng: np.random.Generator) -> tuple[float, float, float]:
     """One execution with the tool: seconds, whether something was touched, and how often a route was planned anew.
 
-    It ends where the arm stands in something.
+    The pilot holds each move; every second press is let go a degree early, and the arm goes on by some error.
     """
-    arm = SimulatedArm(ROBOT, PROBLEM.start, rates)
+    faults = Faults(overshoot=abs(rng.normal(0.0, OVERSHOOT, ROBOT.dof)))
+    arm = WrongArm(ROBOT, PROBLEM.start, faults, rates)
     session = Session(PROBLEM, arm, seed=seed, past=True)
-    session.command("plan", 0.0)
-    session.command("accept", 0.0)
-    seconds, touched, plans = 0.0, False, 0
-    for press in range(200):
-        if session.mode == "manoeuvre" and session.message == "all moves are done":
-            break
-        if "replan" in session.message:
-            plans, seconds = plans + 1, seconds + REPLANNING
-            session.command("replan", seconds)
-            session.command("accept", seconds)
-            if session.route is None:
-                break
-        session.command("next", seconds, press=press)
-        if arm.moving is None:
-            continue
-        before, after = arm.read(), session.desired.copy()
-        joint = arm.moving
-        after[joint] = session.held.drive.goal
-        after[joint] += rng.normal(0.0, OVERSHOOT)
-        after = ROBOT.clamp(after)
-        touched |= not WORLD.motion_valid(before, after)
-        seconds += REACTION_SECONDS + abs(after[joint] - before[joint]) / rates[joint]
-        arm.move(joint, float(after[joint]))
-        arm.advance(1e3)
-        session.command("release", seconds)
-        session.tick(seconds)
-    return seconds, float(touched), float(plans)
+    made = follow_route(session, arm, hasty=True)
+    touched = not WORLD.motion_valid_batch(made.rows[:-1], made.rows[1:]).all()
+    seconds = made.moving + REACTION_SECONDS * made.presses + REPLANNING * made.plans
+    return (seconds if session.message.startswith("all moves are") else np.inf), float(touched), float(made.plans)
 
 
 def _naive(path: JointPath) -> JointPath:

@@ -60,12 +60,13 @@ def driven(amounts: Mapping[str, float], seed: int, hasty: bool = False) -> Driv
     """One route from the bay to the button; see `INTRO`."""
     arm = WrongArm(ROBOT, PROBLEM.start, Faults(**amounts))
     session = Session(PROBLEM, arm, seed=seed, past=True)
-    rows, plans = follow_route(session, arm, hasty=hasty)
+    followed = follow_route(session, arm, hasty=hasty)
+    rows = followed.rows
     done = session.message.startswith("all moves are")
     touched = not WORLD.motion_valid_batch(rows[:-1], rows[1:]).all()
     end = PROBLEM.start if session.route is None else session.route.path.end
     away = float(np.linalg.norm(ROBOT.fk(arm.links()).translation - ROBOT.fk(end).translation))
-    return Driven(done, session.message, plans, touched, away if done else np.nan)
+    return Driven(done, session.message, followed.plans, touched, away if done else np.nan)
 
 
 def row(kind: str, hasty: bool, count: int) -> list[str]:

@@ -1,4 +1,4 @@
-"""The last centimetres by sight on the page in a browser, by a key and by a gamepad: to where the target is seen now."""
+"""The last centimetres by sight on the page in a browser, by a key and by a gamepad: where the target is seen now."""
 
 import time
 
