@@ -44,12 +44,14 @@ class Knowledge:
         picture_age: Of the last picture [s]; inf if there was none.
         past: Pictures are photographs or a film, and the arm is a simulated one: no picture is of now, none is stale.
         arm_off: Why joints and pictures contradict each other; "" if they do not.
+        unusable: Why the last photograph or picture of a film could not be used; "" if it could.
     """
 
     arm_lost: str
     picture_age: float
     past: bool = False
     arm_off: str = ""
+    unusable: str = ""
 
     @property
     def trouble(self) -> str:
@@ -57,7 +59,7 @@ class Knowledge:
         if self.arm_lost or self.arm_off:
             return self.arm_lost or self.arm_off
         if self.past or self.picture_age <= STALE_SECONDS:
-            return ""
+            return self.unusable if self.past else ""
         return "there is no picture yet" if self.picture_age == float("inf") else "the picture is stale"
 
 

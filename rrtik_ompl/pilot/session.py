@@ -72,7 +72,7 @@ class Session:
         self.q: Vector = frozen(arm.read())
         self.desired: Vector = self.q
         self.time = 0.0
-        self.picture_time = -np.inf
+        self.picture_time, self.unusable = -np.inf, ""  # of the last picture, and why it could not be used
         self.feasibility = FeasibilityCache(self.surroundings)
         self.guide = Guide(self)
         self.held, self.hand = Held(self), Hand(self)
@@ -94,7 +94,7 @@ class Session:
 
     def see(self, objects: Sequence[SeenObject], time: float) -> None:
         """Update the surroundings by the objects of a picture."""
-        self.time, self.picture_time = max(self.time, time), time
+        self.time, self.picture_time, self.unusable = max(self.time, time), time, ""
         self._seen_at |= {each.object.name: time for each in objects}
         if self.surroundings.see(objects):
             self._record.write("seen", time, objects=self.surroundings.places())
@@ -155,7 +155,7 @@ class Session:
     @property
     def known(self) -> Knowledge:
         """What is known now of the arm and of the picture."""
-        return Knowledge(self.arm.lost, self.time - self.picture_time, self._past, self._check.off)
+        return Knowledge(self.arm.lost, self.time - self.picture_time, self._past, self._check.off, self.unusable)
 
     @property
     def driving(self) -> bool:

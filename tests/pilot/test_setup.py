@@ -153,6 +153,34 @@ def test_a_folder_of_images_drives_a_session(tmp_path):
         open_session(SessionOptions("titan4_sdu", source=tmp_path / "none", **files))
 
 
+@pytest.mark.parametrize(("spoil", "said"), [
+    (lambda file: file.write_bytes(b""), "b.png: is not an image that can be read"),
+    (lambda file: cv2.imwrite(str(file), np.zeros((240, 320, 3), dtype=np.uint8)), "b.png: 320 x 240 pixels"),
+])  # fmt: skip
+def test_an_arm_stands_still_after_a_picture_that_cannot_be_used(tmp_path, spoil, said):
+    simulated = open_session(SessionOptions("titan4_sdu")).engine
+    simulated.update(0.0)
+    cv2.imwrite(str(tmp_path / "a.png"), simulated.perception.picture)
+    spoil(tmp_path / "b.png")
+    files = {"camera_file": FOLDER / "camera_640.yaml", "map_file": FOLDER / "titan4_panel_markers.yaml"}
+    opened = open_session(SessionOptions("titan4_sdu", source=tmp_path, **files))
+    engine, session = opened.engine, opened.engine.session
+    engine.update(0.0)
+    engine.execute({"name": "jog", "direction": 1.0, "press": 1}, 0.01)
+    assert session.driving
+    until(lambda: engine.update(0.02) or said in session.unusable)
+    engine.update(0.03)
+    assert not session.driving
+    assert said in session.message
+    before = session.arm.read()
+    engine.execute({"name": "jog", "direction": 1.0, "press": 2}, 0.04)
+    engine.update(0.5)
+    assert said in session.message
+    assert "\n" not in session.message
+    assert np.array_equal(session.arm.read(), before)
+    opened.close()
+
+
 def test_pictures_that_the_camera_cannot_have_taken_are_refused_before_anything_is_shown(tmp_path):
     cv2.imwrite(str(tmp_path / "a.png"), np.zeros((240, 320, 3), dtype=np.uint8))
     with pytest.raises(InputError, match="320 x 240 pixels"):

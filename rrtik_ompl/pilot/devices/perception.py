@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.devices.base_motion import BaseMotion
-from rrtik_ompl.pilot.devices.camera_feed import Feed, PictureSource
+from rrtik_ompl.pilot.devices.camera_feed import ENDED, Feed, PictureSource
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
 from rrtik_ompl.pilot.session import Session
@@ -75,6 +75,8 @@ class LivePerception:
             view = self._sensor.view(Picture(taken.pixels, taken.name, time))
         except RrtikError as error:
             self.lost = str(error)
+            if self.lost != ENDED:  # the last picture of a film was a good one
+                session.unusable = self.lost
             return
         self.lost, self.picture = "", taken.pixels
         session.see(view.placed, time)
