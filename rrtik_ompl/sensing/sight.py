@@ -27,6 +27,7 @@ from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, Mount
 
 MIN_SIDE_PIXELS = 12.0  # two a cell of the coarsest dictionaries
 MAX_REPROJECTION_ERROR = 2.0  # [pixels] of a corner; a larger one means a wrong map or a wrong number
+MAX_BENT = 0.04  # the same as a share of a single marker's side: sheets that are bent deviate by as much, and say so
 
 MAX_CONTRADICTION = 5.0  # `surprise` of markers together; wrong sides by 0.5 % make 6 to 40, right ones 0.2 to 1
 
@@ -177,7 +178,7 @@ def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
     likeness = max(marker.likeness for marker in markers)
     if likeness < MIN_LIKENESS:
         return f"covered or blurred: {likeness:.2f} like the marker, {MIN_LIKENESS:g} is needed; free it, hold still"
-    if pose.error > MAX_REPROJECTION_ERROR:
+    if pose.error > max(MAX_REPROJECTION_ERROR, MAX_BENT * side if len(markers) == 1 else 0.0):
         return f"corners lie {pose.error:.1f} pixels off: check the marker map, the side of the markers and the camera"
     if len(markers) > 1 and pose.surprise > MAX_CONTRADICTION:
         return (

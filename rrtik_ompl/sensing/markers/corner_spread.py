@@ -16,13 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.sensing.markers.lighting import CUT_OFF
 
 Pixels = NDArray[np.float32]
 
 FLOOR = 0.02  # [pixels]; of a picture without any noise: sampling, rounding, shape of the blur
+CUT_SHIFT = 0.12  # [pixels] by which a marker as a whole may lie off, times the share of it that is cut off at white
 _FEW = 48  # samples along a side that are enough
 _TINY = 1e-6  # of the squares: what a marker cannot tell, such as a bend along its view, stays 0
 _BLOCKS = 4  # along a side
+_ALIKE = np.kron(np.ones((4, 4)), np.eye(2))  # of the corners' eight numbers, moved together
 _BENDS = slice(14, 18)  # of the columns
 _STEP = 0.05  # of a corner, by which slopes are measured [pixels]
 
@@ -49,7 +52,8 @@ def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) 
     variance = repeated * float(rest @ rest) / max(len(light) - len(normal), 1)
     left_out = _left_out(shape, columns, rest, normal)
     bent = float(found[_BENDS] @ found[_BENDS]) * _area(corners) / _area(square)  # by as much corners may lie off
-    spread = left_out + variance * whole[:8, :8] + (bent + FLOOR**2) * np.eye(8)
+    cut = CUT_SHIFT * float((light >= CUT_OFF).mean())  # blocks err alike there, which the jackknife does not see
+    spread = left_out + variance * whole[:8, :8] + (bent + FLOOR**2) * np.eye(8) + cut**2 * _ALIKE
     return corners + found[:8].reshape(4, 2), frozen(spread)
 
 
