@@ -7,11 +7,25 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import bits, first_bit, highest, lanes_at, lowest, set_int
+from rrtik_ompl.fast.simd.lanes import (
+    bits,
+    first_bit,
+    float_at,
+    highest,
+    lanes_at,
+    larger,
+    lowest,
+    set_int,
+    spread,
+)
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.accessors import block_boxes_of, block_count_of, boxes_of, padded_count_of
 from rrtik_ompl.fast.tables.layout import LaneArray, PrimitiveList, PrimitiveTable
+
+ZERO = np.float32(0.0)
 
 
 @inlined
@@ -34,6 +48,19 @@ def listed(found: PrimitiveList, count: int, first: int, left: int) -> int:
     return count
 
 
+@inlined
+def block_in_reach(boxes: LaneArray, run: int, block: int, x: Any, y: Any, z: Any, radius: Any) -> bool:
+    """Whether a ball meets the box around a block of primitives in any lane."""
+    place, side = block, run * WIDTH
+    square = spread(ZERO)
+    for p in (x, y, z):
+        beyond = larger(float_at(boxes, place) - p, p - float_at(boxes, place + side))
+        square = square + larger(beyond, ZERO) * larger(beyond, ZERO)
+        place += 2 * side
+    near: bool = bits(square < radius * radius) != 0
+    return near
+
+
 @kernel
 def primitives_in_reach(primitives: PrimitiveTable, x: Any, y: Any, z: Any, radius: float, found: PrimitiveList) -> int:
     """List the primitives whose bounding box meets the box around a ball in all lanes; returns their number.
@@ -51,8 +78,11 @@ def primitives_in_reach(primitives: PrimitiveTable, x: Any, y: Any, z: Any, radi
     for k in range(blocks):
         left = boxes_that_meet(block_boxes_of(primitives), blocks, k, low, high)
         while left != 0:
-            block = (k * WIDTH + first_bit(left)) * (layout.BLOCK // WIDTH)
+            block = k * WIDTH + first_bit(left)
             left &= left - 1
+            if not block_in_reach(block_boxes_of(primitives), blocks, block, x, y, z, radius):
+                continue
+            block *= layout.BLOCK // WIDTH
             for part in range(block, block + layout.BLOCK // WIDTH):
                 count = listed(found, count, part * WIDTH, boxes_that_meet(boxes, run, part, low, high))
     return count

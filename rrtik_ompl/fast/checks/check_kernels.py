@@ -23,6 +23,7 @@ from rrtik_ompl.fast.simd.lanes import (
     double_at,
     int_at,
     lane_numbers,
+    larger,
     set_double,
     set_int,
     set_wide_lanes,
@@ -61,6 +62,8 @@ from rrtik_ompl.fast.tables.layout import (
     Watch,
     WorldTable,
 )
+
+TO_WHOLE = 1.5 * 2.0**52  # added and taken away again it leaves whole numbers
 
 
 @kernel
@@ -184,11 +187,18 @@ def place(world: WorldTable, start: JointValues, end: JointValues, share: Any, j
 
 
 @inlined
-def block_of(number: int, middle: int) -> int:
-    """Which block of a motion is checked after so many others: the one in the middle first, then from the start on."""
+def places_in(number: int, blocks: int, middle: int) -> Any:
+    """The configurations of a motion that a block of lanes checks, in wide lanes.
+
+    Those of the first block lie ``blocks`` apart; the others take what is between, neighbours together, so that a few
+    primitives are near all lanes.
+    """
     if number == 0:
-        return middle
-    return number - 1 if number <= middle else number
+        return lane_numbers() * float(blocks) + float(middle)
+    among, between = lane_numbers() + float((number - 1) * WIDTH), float(blocks - 1)
+    gap = ((among + 0.5) * (1.0 / between) - 0.5 + TO_WHOLE) - TO_WHOLE  # rounded down
+    rest = among - gap * between
+    return gap * float(blocks) + rest + smaller(larger(rest - float(middle - 1), 0.0), 1.0)
 
 
 @kernel
@@ -208,17 +218,15 @@ def check_part(
 ) -> int:
     """Check ``count`` configurations of a motion between two rows of joint values: those at k / last, k = first, ...
 
-    The lanes are spread over the whole part, so that a collision anywhere shows early; what keeps its distance in the
-    first block, which lies in the middle between others, is watched no more. Without ``resolve`` the outer balls alone
-    decide.
+    The lanes of the first block are spread over the whole part, so that a collision anywhere shows early; what keeps
+    its distance there from all that lies between is watched no more. Without ``resolve`` the outer balls alone decide.
     """
     scratch, joints = scratch_of(world), joint_count_of(arm_of(world))
     blocks = (count + WIDTH - 1) // WIDTH
     every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
     answer, middle, watch, left = FREE, blocks // 2, NO_WATCH, joints
     for number in range(blocks):
-        block = block_of(number, middle)
-        places = smaller(lane_numbers() * float(blocks) + float(block), float(count - 1)) + float(first)
+        places = smaller(places_in(number, blocks, middle), float(count - 1)) + float(first)
         share = places / float(last)
         place(world, start, end, share, left)
         if number == 0:

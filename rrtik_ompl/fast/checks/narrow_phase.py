@@ -21,11 +21,12 @@ from rrtik_ompl.fast.checks.gjk import (
     scaled,
     slack_between,
 )
-from rrtik_ompl.fast.checks.obstacle_kernels import primitive_gap
+from rrtik_ompl.fast.checks.obstacle_kernels import ZERO, primitive_gap
 from rrtik_ompl.fast.checks.self_kernels import self_collision
 from rrtik_ompl.fast.checks.sphere_kernels import prepare, scene_collision
+from rrtik_ompl.fast.simd.access import nonzero_ints
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import first_bit, float_at, int_at, lowest, set_int
+from rrtik_ompl.fast.simd.lanes import first_bit, float_at, int_at, lowest, set_int, set_lanes, spread
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.accessors import (
     arm_of,
@@ -218,11 +219,29 @@ def mark(world: WorldTable, wanted: int) -> int:
     marks = marks_of(scratch)
     crossing = body_count_of(balls) * standing_count_of(primitives)
     total = crossing + pair_count_of(balls)
-    for k in range(total):
-        set_int(marks, k, 0)
+    for block in range((total + WIDTH - 1) // WIDTH):  # a scene of ten thousand bodies has as many for each link
+        set_lanes(marks, block, spread(ZERO))
     scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, outer_likely_of(scratch), NO_WATCH)
     self_collision(balls, scratch, wanted, marks_row(marks, crossing, 1), wanted < 0, NO_WATCH)
     return total
+
+
+@kernel
+def compare_pair(world: WorldTable, number: int, wanted: int) -> Any:
+    """Lanes among ``wanted`` in which a marked pair is not proven apart, and those in which it is proven to overlap."""
+    scratch, balls, mine = scratch_of(world), outer_balls_of(world), moving_solids_of(world)
+    standing = standing_count_of(outer_primitives_of(world))
+    crossing = body_count_of(balls) * standing
+    if number >= crossing:
+        pair = pair_at(pairs_of(balls), number - crossing)
+        return compare_bodies(scratch, mine, one_body_of(pair), wider_solids_of(world), other_body_of(pair), wanted)
+    first, second, others = number // standing, number % standing, standing_solids_of(world)
+    if is_cloud(others, second):
+        return compare_cloud(world, first, second, wanted)
+    left, hit = compare_bodies(scratch, mine, first, others, second, wanted)
+    if left != hit:
+        hit |= corners_inside(world, first, second, left & ~hit)
+    return left, hit
 
 
 @kernel
@@ -235,27 +254,18 @@ def narrow_phase(world: WorldTable, wanted: int) -> Any:
         Lanes in which something remains open, and lanes that are colliding.
     """
     total = mark(world, wanted)
-    scratch, balls, mine = scratch_of(world), outer_balls_of(world), moving_solids_of(world)
-    standing = standing_count_of(outer_primitives_of(world))
-    crossing = body_count_of(balls) * standing
-    marks, pairs = marks_of(scratch), pairs_of(balls)
+    marks = marks_of(scratch_of(world))
     open_, colliding = 0, 0
-    for k in range(total):
-        marked = int_at(marks, k) & ~colliding
-        if marked == 0:
-            continue
-        if k < crossing:
-            first, second, others = k // standing, k % standing, standing_solids_of(world)
-        else:
-            pair = pair_at(pairs, k - crossing)
-            first, second, others = one_body_of(pair), other_body_of(pair), wider_solids_of(world)
-        if k < crossing and is_cloud(others, second):
-            left, hit = compare_cloud(world, first, second, marked)
-        else:
-            left, hit = compare_bodies(scratch, mine, first, others, second, marked)
-            if k < crossing and left != hit:
-                hit |= corners_inside(world, first, second, left & ~hit)
-        set_int(marks, k, left | int_at(marks, k) & colliding)
-        open_ |= left
-        colliding |= hit
+    for block in range((total + WIDTH - 1) // WIDTH):
+        marked = nonzero_ints(marks, block)
+        while marked != 0:
+            k = block * WIDTH + first_bit(marked)
+            marked &= marked - 1
+            lanes = int_at(marks, k) & ~colliding
+            if lanes == 0:
+                continue
+            left, hit = compare_pair(world, k, lanes)
+            set_int(marks, k, left | int_at(marks, k) & colliding)
+            open_ |= left
+            colliding |= hit
     return open_ & ~colliding, colliding

@@ -73,6 +73,8 @@ from rrtik_ompl.fast.tables.layout import (
     Watch,
 )
 
+FEW = 16  # primitives in reach of a group, up to which all of its clusters choose among these
+
 
 @inlined
 def carried(frame: Frame, row: int, x: float, y: float, z: float) -> Any:
@@ -195,9 +197,55 @@ def cluster_meets(
 
 
 @inlined
+def cluster_reaches(
+    balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, number: int, slack: Any
+) -> int:
+    """List the primitives in reach of a cluster that is wider by ``slack``; returns their number."""
+    frame = frame_at(frames_of(scratch), frame_of_cluster(cluster_of(balls, number)))
+    x, y, z = placed_centre(frame, cluster_balls_of(balls), number)
+    return primitives_in_reach(
+        primitives, x, y, z, radius_at(cluster_balls_of(balls), number) + slack, found_of(scratch)
+    )
+
+
+@inlined
 def open_lanes(lanes: int, meeting: int, marks: Marks) -> int:
     """Lanes that are still asked for: all of them where each pair is marked, else those that meet nothing yet."""
     return lanes if marks != NO_MARKS else lanes & ~meeting
+
+
+@kernel
+def group_meets(
+    balls: BallTable,
+    primitives: PrimitiveTable,
+    scratch: ScratchTable,
+    number: int,
+    count: int,
+    wanted: int,
+    marks: Marks,
+    one: bool,
+    likely: LikelyBalls,
+    slack: float,
+) -> Any:
+    """Lanes in which a ball of a group meets one of the first ``count`` primitives found; see ``cluster_meets``."""
+    close, each, found = wanted, count > FEW, found_of(scratch)
+    if not each:
+        x, y, z = stored_centre(group_centres_of(scratch), number)
+        radius = radius_at(group_balls_of(balls), number) + slack
+        close, count = meets_primitives(primitives, x, y, z, radius, True, wanted, found, count, found, NO_MARKS)
+        if close == 0:
+            return 0, False
+    group, meeting, near = group_at(groups_of(balls), number), 0, False
+    for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
+        left = open_lanes(close, meeting, marks)
+        if each:
+            count = cluster_reaches(balls, primitives, scratch, cluster, slack)
+        lanes, by = cluster_meets(balls, primitives, scratch, cluster, count, left, marks, one, likely, slack)
+        meeting |= lanes
+        near |= by
+        if one and meeting != 0 and marks == NO_MARKS:
+            break
+    return meeting, near
 
 
 @kernel
@@ -219,7 +267,7 @@ def scene_collision(
     """
     if primitive_count_of(primitives) == 0 and watch == NO_WATCH:
         return 0
-    groups, around, found = groups_of(balls), group_balls_of(balls), found_of(scratch)
+    around, found = group_balls_of(balls), found_of(scratch)
     meeting = 0
     for number in range(group_count_of(balls)):
         slack = slack_at(watch, number)
@@ -233,18 +281,10 @@ def scene_collision(
         count = primitives_in_reach(primitives, x, y, z, radius, found)
         if count == 0:
             continue
-        close, count = meets_primitives(primitives, x, y, z, radius, True, still, found, count, found, NO_MARKS)
-        if close == 0:
-            continue
-        group = group_at(groups, number)
-        for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
-            left = open_lanes(close, meeting, marks)
-            lanes, near = cluster_meets(balls, primitives, scratch, cluster, count, left, marks, one, likely, slack)
-            meeting |= lanes
-            if near:
-                set_clear(watch, number, False)
-            if one and meeting != 0 and marks == NO_MARKS:
-                return meeting
-        if meeting == wanted and marks == NO_MARKS:
+        lanes, near = group_meets(balls, primitives, scratch, number, count, still, marks, one, likely, slack)
+        meeting |= lanes
+        if near:
+            set_clear(watch, number, False)
+        if meeting != 0 and (one or meeting == wanted) and marks == NO_MARKS:
             break
     return meeting

@@ -26,7 +26,7 @@ FIRST_CAPACITY = 64 * WIDTH  # vertices
 FIRST_ROOTS = 16
 FIRST_PATH = 64  # rows
 FIRST_BUDGET, MIN_BUDGET, MAX_BUDGET = 256, 16, 1 << 20  # motions in one call of the kernel
-CALL_SECONDS = 1e-3  # of the processor, what a call should take
+CALL_SECONDS = 1e-3  # that a call should take; the processor's own clock takes up to half of it to read
 
 
 class ConnectSearch:
@@ -198,9 +198,9 @@ class ConnectSearch:
                 self._answer(ask)
             elif status == connect_layout.FULL:
                 self._grow()
-            begin = time.thread_time()
+            begin = time.perf_counter()
             status = self._kernels.resume(self._search.address, budget)
-            elapsed = time.thread_time() - begin
+            elapsed = time.perf_counter() - begin
             if status == connect_layout.RUNNING:
                 budget = min(2 * budget, MAX_BUDGET) if elapsed < 0.5 * CALL_SECONDS else budget
                 budget = max(budget // 2, MIN_BUDGET) if elapsed > 2.0 * CALL_SECONDS else budget

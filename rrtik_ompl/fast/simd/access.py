@@ -7,15 +7,16 @@ has the place built in, so that a kernel names what it reads, and Python gives i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from rrtik_ompl.fast.simd.compiled import inlined
+from rrtik_ompl.fast.simd.compiled import WIDTH, inlined
 from rrtik_ompl.fast.simd.lanes import DOUBLE, INDEX, LANES, SINGLE, WHOLE, field, pointer, set_field
-from rrtik_ompl.fast.tables.layout import DOUBLE_BYTES, INT_BYTES
+from rrtik_ompl.fast.tables.layout import ALIGNMENT, DOUBLE_BYTES, INT_BYTES
 
 _FIELD_BYTES = 8
 
@@ -148,3 +149,17 @@ def _emit_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 
 lane_at = intrinsic(lambda typingctx, lanes, number: (types.float32(LANES, types.int64), _emit_lane))  # of lanes
+
+
+def _nonzero_ints() -> Any:
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = ir.VectorType(INDEX, WIDTH)
+        numbers = builder.load(pointer(builder, kind, *args), align=ALIGNMENT // 2)
+        mask = builder.icmp_signed("!=", numbers, ir.Constant(kind, None))
+        return builder.zext(builder.bitcast(mask, ir.IntType(WIDTH)), WHOLE)
+
+    return intrinsic(lambda typingctx, address, index: (types.int64(types.int64, types.int64), emit))
+
+
+# Which of a block of ``WIDTH`` whole numbers of 32 bits are not 0, as an integer, the first in the lowest bit.
+nonzero_ints: Callable[[int, int], int] = _nonzero_ints()

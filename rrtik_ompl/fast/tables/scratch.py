@@ -6,7 +6,7 @@ import numpy as np
 
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables.memory import Table, table
+from rrtik_ompl.fast.tables.memory import Table, table, whole_lanes
 
 
 def scratch_table(arm: Table, balls: tuple[Table, ...], bounds: Table, primitives: tuple[Table, ...]) -> Table:
@@ -35,7 +35,7 @@ def scratch_table(arm: Table, balls: tuple[Table, ...], bounds: Table, primitive
             layout.INNER_LIKELY: np.full((layout.LIKELY_COUNT, layout.LIKELY_INTS), -1, dtype=np.int32),
             layout.NOTE: np.zeros(WIDTH, dtype=np.float32),
             layout.WATCH: np.zeros(int(bounds.header[layout.BOUND_BLOCKS]) * WIDTH, dtype=np.float32),
-            layout.MARKS: np.zeros(crossing + most(balls, layout.PAIR_COUNT), dtype=np.int32),
+            layout.MARKS: whole_lanes(np.zeros(crossing + most(balls, layout.PAIR_COUNT), dtype=np.int32)),
         }
     )
 

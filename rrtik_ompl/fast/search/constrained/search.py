@@ -23,7 +23,7 @@ from rrtik_ompl.fast.tables.memory import Table, aligned, is_intact, table, whol
 
 FIRST_CAPACITY = 128 * WIDTH  # vertices
 FIRST_BUDGET, MAX_BUDGET = 4, 1 << 14  # samples in one call of the kernel
-CALL_SECONDS = 1e-3  # of the processor, what a call should take
+CALL_SECONDS = 1e-3  # that a call should take; the processor's own clock takes up to half of it to read
 SHORTEST_STEP = 0.01  # [unit of the box]
 
 
@@ -122,9 +122,9 @@ class ConstrainedSearch:
                     grow(tree)
             if stop is not None and stop():
                 break
-            begin = time.thread_time()
+            begin = time.perf_counter()
             status = self._kernels.resume(self._search.address, budget)
-            elapsed = time.thread_time() - begin
+            elapsed = time.perf_counter() - begin
             budget = min(2 * budget, MAX_BUDGET) if elapsed < 0.5 * CALL_SECONDS else max(budget // 2, 1)
         return None
 
