@@ -187,7 +187,10 @@ class JointPath:
             InputError: If the path is another robot's, there is no world, or the clearance is negative or infinite.
         """
         require(world, World, "world of a path's proof")
-        proof = world.prove(self.waypoints, clearance=clearance, seconds=seconds)
+        return self.with_proof(world.prove(self.waypoints, clearance=clearance, seconds=seconds))
+
+    def with_proof(self, proof: Proof) -> JointPath:
+        """The same path with what somebody else has proven of its motions."""
         known = self.waypoints, self.joint_names, self.prismatic, self.robot_name, self.continuous
         return _fill(object.__new__(type(self)), *known, proof)
 

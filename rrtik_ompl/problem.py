@@ -126,6 +126,14 @@ class Problem:
         return bool(self.goal.satisfied(self.world.robot, self.world.robot.configuration(q)[None])[0])
 
 
+def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Problem:
+    """A problem whose start, shape (dof,), and goal somebody has checked already; no joint may be continuous."""
+    problem: Problem = object.__new__(Problem)
+    problem.world, problem.name, problem.planner, problem.constraints = world, "problem", None, ()
+    problem.start, problem.goal = frozen(start), goal if isinstance(goal, JointGoal) else JointGoal(goal)
+    return problem
+
+
 def densely_checked(problem: Problem) -> Problem:
     """The same problem, its motions checked as densely as by the second check of a path."""
     return problem.with_resolution(verification_resolution(problem.world))

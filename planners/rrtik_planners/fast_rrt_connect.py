@@ -33,6 +33,7 @@ class FastRRTConnect(SafePlanner):
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
     supports_iteration_limit: ClassVar[bool] = True
     proof_iterations: ClassVar[int] = 20_000
+    reseeded: ClassVar[bool] = True
     portfolio_turn: ClassVar[int] = 1
 
     def __init__(

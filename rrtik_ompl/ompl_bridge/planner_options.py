@@ -59,6 +59,12 @@ def safe_planner(
         raise InputError(f"planner {name}: {error}") from None
 
 
+def reseed(planner: SafePlanner, seed: int) -> None:
+    """Give a planner another seed, as one made with it would have; for planners with the trait ``reseeded``."""
+    planner.seed = seed
+    planner.__dict__.pop("rng", None)  # made anew when it is first used
+
+
 def other_planner(
     factory: PlannerFactory,
     name: str,

@@ -10,19 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, whole_number
+from rrtik_ompl.arrays import Vector, finite_array, positive, whole_number
 from rrtik_ompl.choices import ProofMode
 from rrtik_ompl.errors import InputError, ProblemError, require
 from rrtik_ompl.fast.threads import in_threads
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_options import is_safe
-from rrtik_ompl.planning import plan
+from rrtik_ompl.planning import RESTARTS, plan
+from rrtik_ompl.planning.batches import Query, plans_together
 from rrtik_ompl.planning.outcome import Plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.world import World
 
 Ends = ArrayLike | Sequence[Goal]
+TOGETHER = 32  # queries at a time, whatever the number of threads
 
 
 def plan_many(
@@ -74,9 +76,11 @@ def plan_many(
         raise InputError(f"plan_many: as many starts as goals are needed, got {len(rows)} and {len(wanted)}")
     seeds = np.random.SeedSequence(whole_number(seed, "seed")).generate_state(max(len(rows), 1), np.uint32).tolist()
     options = {"seconds": seconds, "parameters": parameters, "proof": proof}
-    ask = partial(_planned, world, planner, options)
+    queries = list(zip(rows, wanted, seeds[: len(rows)], strict=True))
     alone = planner is not None and not is_auto(planner) and not is_safe(find_planner(planner))
-    return in_threads(ask, zip(rows, wanted, seeds, strict=False), 1 if alone else threads)
+    batches = [queries[first : first + TOGETHER] for first in range(0, len(queries), TOGETHER)]
+    made = in_threads(partial(_batch, world, planner, options), batches, 1 if alone else threads)
+    return [each for batch in made for each in batch]
 
 
 def _goals(given: Ends, dof: int) -> list[Goal]:
@@ -85,6 +89,20 @@ def _goals(given: Ends, dof: int) -> list[Goal]:
         return [goal for goal in given if isinstance(goal, Goal)]
     rows: Any = given
     return [JointGoal(row) for row in finite_array(rows, (None, dof), "goals")]
+
+
+def _batch(
+    world: World, planner: str | None, options: Mapping[str, Any], queries: Sequence[tuple[Vector, Goal, int]]
+) -> list[Plan]:
+    """The plans of some queries: together as far as that goes, the others one after the other."""
+    known: dict[int, Plan | None] = {}
+    if planner is not None and not is_auto(planner) and options["proof"] != "off":
+        limit, parameters = positive(options["seconds"], "seconds"), options["parameters"] or {}
+        joints = {k: Query(q, goal, seed) for k, (q, goal, seed) in enumerate(queries) if isinstance(goal, JointGoal)}
+        given = find_planner(planner), planner, list(joints.values())
+        found = plans_together(world, *given, seconds=limit, restarts=RESTARTS, parameters=parameters)
+        known = dict(zip(joints, found, strict=True))
+    return [known.get(k) or _planned(world, planner, options, query) for k, query in enumerate(queries)]
 
 
 def _planned(world: World, planner: str | None, options: Mapping[str, Any], query: tuple[Vector, Goal, int]) -> Plan:

@@ -7,6 +7,7 @@ from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, not_negative
 from rrtik_ompl.errors import InputError
@@ -38,12 +39,33 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
         ends: Where a path begins and ends.
         clearance: Wanted [m]; None for a millimetre, or less if the ends have less.
     """
+    for room in _rooms(clearance):
+        if world.motions_proven(ends, ends, clearance=room.searched).all():
+            return room
+    return None
+
+
+def rooms_between(world: World, ends: NDArray[np.float64], clearance: float | None) -> list[Room | None]:
+    """:func:`room_between` for several pairs of configurations, shape (m, 2, dof), in a few calls."""
+    found: list[Room | None] = [None] * len(ends)
+    open_ = np.arange(len(ends))
+    for room in _rooms(clearance):
+        if len(open_) == 0:
+            break
+        rows = ends[open_].reshape(-1, ends.shape[2])
+        kept = world.motions_proven(rows, rows, clearance=room.searched).reshape(-1, 2).all(axis=1)
+        for k in open_[kept].tolist():
+            found[k] = room
+        open_ = open_[~kept]
+    return found
+
+
+def _rooms(clearance: float | None) -> Iterator[Room]:
+    """What may be kept, the most first."""
     wanted = CLEARANCE if clearance is None else clearance
     less = (wanted * 0.5**k for k in range(HALVINGS))
     for searched in chain((wanted + min(wanted, SPARE),), less, (0.0,)):
-        if world.motions_proven(ends, ends, clearance=searched).all():
-            return Room(min(wanted, searched), searched)
-    return None
+        yield Room(min(wanted, searched), searched)
 
 
 def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> float | None:

@@ -55,7 +55,7 @@ def test_threads_get_the_answers_of_one(world):
         assert [str(each) for each in pool.map(ask, range(8))] == [str(each) for each in alone]
         tables = list(pool.map(lambda _: (world.fast, world.prover), range(8)))
     assert world.fast.intact()
-    assert all(fast.intact() and own._packed.table.intact() for fast, own in tables)
+    assert all(fast.intact() and own._tables.packed.table.intact() for fast, own in tables)
 
 
 def test_each_thread_has_its_own_memory_and_takes_the_proofs_of_others(world):
@@ -66,6 +66,35 @@ def test_each_thread_has_its_own_memory_and_takes_the_proofs_of_others(world):
     assert there[1].address != world.motions.address
     assert world.prover.made(there[2])
     assert not rrtik.World(world.robot, world.scene).prover.made(there[2])
+
+
+@pytest.mark.parametrize("proof", ["preferred", "required", "off"])
+def test_many_plans_are_those_of_single_calls(proof):
+    robot, rng = rrtik.load_robot("ur5"), np.random.default_rng(7)
+    places = [[0.5, 0.0, 0.3], [-0.4, 0.3, 0.5], [0.0, -0.6, 0.2]]
+    boxes = (rrtik.Obstacle(f"{k}", rrtik.Box([0.2, 0.3, 0.1]), rrtik.pose(p)) for k, p in enumerate(places))
+    world = rrtik.World(robot, rrtik.Scene(tuple(boxes)))
+    rows = rng.uniform(*world.robot.finite_range(), (400, world.robot.dof))
+    free, taken = rows[world.valid_batch(rows)], rows[~world.valid_batch(rows)]
+    starts, goals = free[:40], free[-40:].copy()
+    goals[3], goals[5], goals[7, 0] = taken[0], starts[5], 99.0
+    plans = rrtik.plan_many(world, starts, goals, "fastrrtconnect", seed=2, proof=proof)
+    together = rrtik.plan_many(world, starts, goals, "fastrrtconnect", seed=2, proof=proof, threads=3)
+    assert sum(each.found for each in plans) > 30
+    for start, goal, each, other in zip(starts, goals, plans, together, strict=True):
+        assert str(each.path) == str(other.path)
+        if each.problem is None:
+            with pytest.raises(rrtik.ProblemError) as refused:
+                rrtik.Problem(world, start, goal)
+            assert each.reason == str(refused.value)
+            continue
+        alone = rrtik.plan(rrtik.Problem(world, start, goal), "fastrrtconnect", seed=each.seed, proof=proof)
+        assert (alone.found, alone.reason, alone.statistics) == (each.found, each.reason, each.statistics)
+        assert (alone.path is None) == (each.path is None)
+        if alone.path is not None:
+            assert np.array_equal(alone.path.waypoints, each.path.waypoints)
+            assert str(alone.path.proof) == str(each.path.proof)
+        assert np.array_equal(each.problem.start, start)
 
 
 @pytest.mark.parametrize("planner", [None, "fastrrtconnect", "RRTConnect"])

@@ -1,0 +1,160 @@
+"""Several queries of one world at a time, as far as nothing goes wrong: what `plan()` does first, in a few calls.
+
+For each query `plan()` makes a brief attempt on what kernels prove, and accepts its path if all of it is proven with
+the clearance that its ends have. Here the ends, and then the paths, of all queries go to the kernels together. A query
+that takes any other turn gets no plan here; `plan()` then does all of it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, ITERATION_LIMIT
+from rrtik_ompl.ompl_bridge.planner_options import is_safe, reseed, safe_planner
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
+from rrtik_ompl.ompl_bridge.setup import shared_space
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.planning.outcome import Plan
+from rrtik_ompl.problem import Problem, known_problem
+from rrtik_ompl.world import World
+from rrtik_ompl.world.kept_clearance import Room, rooms_between
+from rrtik_ompl.world.proof import PROOF_KERNELS, Proof
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Query:
+    """What is asked: a start, shape (dof,), a goal, and the seed of everything random."""
+
+    start: Matrix
+    goal: JointGoal
+    seed: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """A path that a search has found, and its counts."""
+
+    query: Query
+    path: JointPath
+    counts: Mapping[str, int | float]
+
+
+def plans_together(
+    world: World,
+    factory: PlannerFactory,
+    name: str,
+    queries: Sequence[Query],
+    *,
+    seconds: float,
+    restarts: int,
+    parameters: Mapping[str, Any],
+) -> list[Plan | None]:
+    """The plans of queries by one planner; None for each that is to be planned alone.
+
+    Args:
+        world: Where they are.
+        factory: Of the planner.
+        name: Of the planner.
+        queries: Configurations inside the limits, or not.
+        seconds: Limit of wall time for each [s].
+        restarts: As for `plan()`.
+        parameters: Options of the planner.
+    """
+    plans: list[Plan | None] = [None] * len(queries)
+    if not (queries and serves(world, factory)):
+        return plans
+    begin = time.perf_counter()
+    for kernels in (*traits_of(factory).kernels, PROOF_KERNELS):
+        library(kernels)
+    ends = np.array([[each.start, each.goal.q] for each in queries])
+    free = _usable(world, ends)
+    rooms = dict(zip(np.flatnonzero(free).tolist(), rooms_between(world, ends[free], None), strict=True))
+    searcher = _Searcher(world, factory, name, known_problem(world, *ends[0]), parameters, seconds)
+    tried = {k: searcher.path(queries[k], restarts) for k, room in rooms.items() if room is not None}
+    found = {k: each for k, each in tried.items() if each is not None}
+    proofs = _proofs(world, {k: (each.path.waypoints, rooms[k]) for k, each in found.items()})
+    taken = (time.perf_counter() - begin) / len(queries)
+    for k, proof in proofs.items():
+        query, path = found[k].query, found[k].path.with_proof(proof)
+        counts = MappingProxyType({"attempts": 1, "rejected": 0, **found[k].counts} | {"rejected": 0})
+        problem = known_problem(world, path.start, query.goal)
+        plans[k] = Plan(True, path, "", taken, name, query.seed, counts, problem=problem)
+    return plans
+
+
+def serves(world: World, factory: PlannerFactory) -> bool:
+    """Whether queries may be planned together: by a planner of ours in an exact world whose kernels suffice."""
+    robot = world.robot
+    plain = type(world) is World and world.accuracy == "exact" and world.fast is not None
+    bounded = bool(np.isfinite([robot.lower, robot.upper]).all()) and not robot.continuous.any()
+    return plain and bounded and not robot.joint_weights and traits_of(factory).reseeded and is_safe(factory)
+
+
+def _usable(world: World, ends: Matrix) -> Mask:
+    """Which starts and goals, shape (m, 2, dof), are two configurations inside the limits that kernels prove free."""
+    rows = ends.reshape(-1, world.robot.dof)
+    inside: Mask = np.logical_and.reduce((rows >= world.robot.lower) & (rows <= world.robot.upper), axis=1)
+    free: Mask = world.with_accuracy("conservative").valid_batch(np.where(inside[:, None], rows, 0.0)) & inside
+    ready: Mask = free[::2] & free[1::2] & np.logical_or.reduce(ends[:, 0] != ends[:, 1], axis=1)
+    return ready
+
+
+class _Searcher:
+    """One planner that searches for one query after the other."""
+
+    def __init__(
+        self,
+        world: World,
+        factory: PlannerFactory,
+        name: str,
+        problem: Problem,
+        parameters: Mapping[str, Any],
+        seconds: float,
+    ) -> None:
+        self._robot, self._seconds = world.robot, seconds
+        self._bounds = world.robot.lower, world.robot.upper
+        options = {ITERATION_LIMIT: EFFORT_ITERATIONS, **parameters}
+        brief = problem.with_accuracy("conservative")
+        assert is_safe(factory)
+        self._planner: SafePlanner = safe_planner(factory, name, shared_space(*self._bounds), brief, 0, options)
+
+    def path(self, query: Query, restarts: int) -> _Found | None:
+        """What the first attempt of `plan()` finds."""
+        seeds = np.random.SeedSequence(query.seed).generate_state(restarts + 1, np.uint32)
+        reseed(self._planner, int(seeds[0]))
+        end, goal = time.perf_counter() + self._seconds, query.goal.q
+        ends = query.start[None], goal[None]
+        _, rows = self._planner.solve_rows(*ends, self._bounds, lambda: time.perf_counter() > end, checked=True)
+        if rows is None:
+            return None
+        path = JointPath.of(self._robot, rows)
+        if len(path.waypoints) < 2 or (path.start != query.start).any() or (path.end != goal).any():
+            return None
+        return _Found(query, path, self._planner.statistics)
+
+
+def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Room | None]]) -> dict[int, Proof]:
+    """Proofs of those routes that are proven to keep what their ends do, by their numbers."""
+    made: dict[int, Proof] = {}
+    for kept in sorted({room.kept for _, room in routes.values() if room is not None}):
+        own = {k: rows for k, (rows, room) in routes.items() if room is not None and room.kept == kept}
+        proven = world.motions_proven(
+            np.concatenate([rows[:-1] for rows in own.values()]),
+            np.concatenate([rows[1:] for rows in own.values()]),
+            clearance=kept,
+        )
+        ends = np.cumsum([len(rows) - 1 for rows in own.values()])
+        for (k, rows), each in zip(own.items(), np.split(proven, ends[:-1]), strict=True):
+            if each.all():
+                made[k] = Proof(len(rows) - 1, kept, (), world.prover.margin, _prover=world.prover)
+    return made
