@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar, overload
@@ -17,8 +18,10 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Thing = TypeVar("Thing")
+Kind = TypeVar("Kind")
 Kept = TypeVar("Kept", bound="ForThread")
 MOST_SHOWN = 8  # numbers of an array, or items of a tuple, in one line
+MOST_CHANGES = 32  # of items, until all are written anew
 LONGEST_TEXT = 100  # letters of an item in one line
 
 
@@ -46,6 +49,74 @@ class _ReadOnlyArray(NamedTuple):
 
 class _ReadOnlyMapping(NamedTuple):
     values: dict[Any, Any]
+
+
+class Once(Generic[Kind]):
+    """What a function makes, once it is asked for; cheaper to set up than ``functools.cache``.
+
+    Example:
+        >>> made = Once(list, "ab")
+        >>> made() is made()
+        True
+    """
+
+    __slots__ = ("_given", "_made", "_make")
+
+    def __init__(self, make: Callable[..., Kind], *given: object) -> None:
+        self._make, self._given = make, given
+
+    def __call__(self) -> Kind:
+        """It."""
+        if not hasattr(self, "_made"):
+            self._made = self._make(*self._given)
+        return self._made
+
+
+class Items(Sequence[Kind]):
+    """Items of which single ones are exchanged; what that costs does not grow with their number.
+
+    Args:
+        whole: The items.
+        changes: Others in the place of some, by their numbers.
+
+    Example:
+        >>> tuple(Items((1, 2, 3)).with_(1, 5))
+        (1, 5, 3)
+    """
+
+    def __init__(self, whole: tuple[Kind, ...], changes: Mapping[int, Kind] = MappingProxyType({})) -> None:
+        self._whole, self._changes = whole, changes
+
+    @property
+    def whole(self) -> tuple[Kind, ...]:
+        """All of them."""
+        if self._changes:
+            every = list(self._whole)
+            for number, item in self._changes.items():
+                every[number] = item
+            self._whole, self._changes = tuple(every), {}
+        return self._whole
+
+    def with_(self, number: int, item: Kind) -> Items[Kind]:
+        """The same items but for one."""
+        known = self._whole if len(self._changes) < MOST_CHANGES else self.whole
+        return Items(known, {**self._changes, number: item})
+
+    @overload
+    def __getitem__(self, number: int) -> Kind: ...
+    @overload
+    def __getitem__(self, number: slice) -> tuple[Kind, ...]: ...
+    def __getitem__(self, number: int | slice) -> Kind | tuple[Kind, ...]:
+        """One of them, or some."""
+        if isinstance(number, slice):
+            return self.whole[number]
+        return self._changes[number] if number in self._changes else self._whole[number]
+
+    def __len__(self) -> int:
+        return len(self._whole)
+
+    def __iter__(self) -> Iterator[Kind]:
+        return iter(self.whole)
 
 
 def as_value(thing: object) -> tuple[Any, ...]:

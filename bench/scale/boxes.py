@@ -4,31 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from rrtik_ompl import Box, Obstacle, Problem, Scene, World, load_robot, plan, pose
-from rrtik_ompl.world.moving_world import MovingWorld
 
 PLANNER, BUSY = "fastrrtconnect", 20.0  # [s]: no clock ends a search on a busy machine
 EDGE, ROOM = 0.02, 1.5  # [m] of a box; radius of the ball that they fill
 MANY = 1000  # boxes, from which on as much of the room is full
-PLANS, FEWEST, ROWS, WORLDS, MOVES = 8, 3, 8000, 2, 3  # FEWEST plans among the most boxes
+PLANS, FEWEST, ROWS, WORLDS, MOVES = 8, 3, 8000, 2, 200  # FEWEST plans among the most boxes
 
 
 @dataclass(frozen=True)
 class Among:
     """Processor times among so many boxes: a world [us a box], a configuration, a move of one box [us], plans [ms].
 
-    ``motions``: that each plan checked; ``free``: share of the configurations.
+    ``moved``: a move with the check of a configuration; ``motions``: that each plan checked; ``free``: share of the
+    configurations.
     """
 
     world: float
     check: float
     move: float
+    moved: float
     plans: list[float]
     motions: list[int]
     found: int
@@ -63,11 +64,12 @@ def among_boxes(count: int) -> Among:
     problems = [Problem(world, a, b) for a, b in zip(free[: 2 * plans : 2], free[1::2], strict=False)]
     ask = [partial(plan, problem, PLANNER, seed=1, seconds=BUSY) for problem in problems]
     ask[0]()
-    runs = [spent(call) for call in ask]
+    runs, moves = [spent(call) for call in ask], _move(world)
     return Among(
         world=1e6 * min(taken for taken, _ in made) / count,
         check=1e6 * check,
-        move=1e6 * _move(world),
+        move=1e6 * moves[0],
+        moved=1e6 * moves[1],
         plans=[1e3 * taken for taken, _ in runs],
         motions=[int(found.statistics.get("motions", 0)) for _, found in runs],
         found=sum(found.found for _, found in runs),
@@ -75,10 +77,20 @@ def among_boxes(count: int) -> Among:
     )
 
 
-def _move(world: World) -> float:
-    """Processor time of moving one box of a world where boxes may be moved [s]."""
-    moving, first = MovingWorld(world), world.scene.obstacles
-    other = replace(first[0], pose=pose(first[0].pose.translation + np.array([0.0, 0.0, 0.01])))
-    scenes = [replace(world.scene, obstacles=(each, *first[1:])) for each in (other, first[0])]
-    moving.move(scenes[0])
-    return min(spent(partial(moving.move, scenes[k % 2]))[0] for k in range(1, MOVES))
+def _move(world: World) -> tuple[float, float]:
+    """Processor time of moving one box, and of that with a check of a configuration behind it [s]."""
+    poses = [pose([0.6, 0.3, 0.01 * k]) for k in range(MOVES)]
+    q = np.zeros(world.robot.dof)
+    name = world.scene.obstacles[0].name
+    taken = []
+    for asked in (False, True):
+        moved = world.with_scene(world.scene).moved(name, poses[0])
+
+        def walk(moved: World = moved, asked: bool = asked) -> None:
+            for each in poses:
+                moved = moved.moved(name, each)
+                if asked:
+                    moved.valid(q)
+
+        taken.append(min(spent(walk)[0] for _ in range(3)) / MOVES)
+    return taken[0], taken[1]

@@ -28,14 +28,14 @@ MANY, MOST = 100_000, 1_000_000  # points
 
 def boxes(report: Report, found: dict[int, Among]) -> None:
     """How time grows with the number of boxes."""
-    heads = ["boxes", "`World()`, a box [us]", "a configuration [us]", "moving one box [us]"]
+    heads = ["boxes", "`World()`, a box [us]", "a configuration [us]", "moving one box [us]", "and a check"]
     heads += ["free", "`plan()`, median [ms]", "95 % [ms]", "motions, median", "a motion [us]", "found"]
     rows = []
     for n, a in found.items():
         plans = np.array(a.plans)
         motion = 1e3 * plans.sum() / sum(a.motions)
         whole = (np.median(plans), np.quantile(plans, 0.95), np.median(a.motions), motion)
-        times = [f"{number:.3g}" for number in (a.world, a.check, a.move)]
+        times = [f"{number:.3g}" for number in (a.world, a.check, a.move, a.moved)]
         numbers = [f"{number:.4g}" for number in whole]
         rows.append([f"{n:,}", *times, f"{100 * a.free:.0f} %", *numbers, f"{a.found} of {len(plans)}"])
     text = "Boxes of 2 cm at most, drawn in a ball of 1.5 m. From 1,000 on they fill as much of it, and the arm finds "

@@ -75,7 +75,7 @@ def _made(prover: Prover, rows: Matrix, kept: float) -> Certificate | None:
     told = prover.logged(np.vstack([rows, rows]) if len(rows) == 1 else rows, clearance=kept)
     if told is None:
         return None
-    digests = robot_digest(prover.robot), scene_digest(prover.bodies, prover.pairs)
+    digests = robot_digest(prover.robot), scene_digest(tuple(prover.bodies), prover.pairs)
     motions = tuple(_entries(*each) for each in told)
     return Certificate(prover.robot.name, *digests, kept, prover.self_margin, frozen(rows), motions)
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain, compress
+from operator import not_
 from typing import Any, TypeAlias
 
 import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.collision.shape_table import Piece, pieces
@@ -125,9 +128,14 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
 
 def by_motion(bodies: Sequence[Body], pairs: Pairs) -> tuple[Pairs, Pairs]:
     """The pairs of which a body moves, and those that both stand still."""
-    moves = [body.joint > 0 for body in bodies]
-    moving = tuple((i, j) for i, j in pairs if moves[i] or moves[j])
-    return moving, tuple((i, j) for i, j in pairs if not (moves[i] or moves[j]))
+    moves = np.array([body.joint > 0 for body in bodies], dtype=bool)
+    some: list[bool] = np.logical_or(*moves[pair_array(pairs).T]).tolist()
+    return tuple(compress(pairs, some)), tuple(compress(pairs, map(not_, some)))
+
+
+def pair_array(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+    """Pairs as an array, shape (n, 2); made of many tuples it takes numpy itself five times as long."""
+    return np.fromiter(chain.from_iterable(pairs), np.int64, 2 * len(pairs)).reshape(-1, 2)
 
 
 def _may_meet(first: Body, second: Body, parent: dict[int, int], checked_links: frozenset[frozenset[str]]) -> bool:

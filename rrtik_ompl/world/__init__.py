@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import warnings
 from dataclasses import replace
-from functools import cache, partial
 from typing import get_args
 
 import numpy as np
@@ -18,7 +17,7 @@ from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights
-from rrtik_ompl.copies import KeptHere, ThreadOwn, in_notebook, shallow_copy
+from rrtik_ompl.copies import Items, KeptHere, Once, in_notebook, shallow_copy
 from rrtik_ompl.errors import InputError, MeshWarning, Renamed, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
@@ -28,14 +27,14 @@ from rrtik_ompl.world.exact_checks import ExactChecker, one_way
 from rrtik_ompl.world.proof import Gap as Gap
 from rrtik_ompl.world.proof import Proof as Proof
 from rrtik_ompl.world.proof import Prover
-from rrtik_ompl.world.rebuild import hollow_solids, reduce_world
+from rrtik_ompl.world.rebuild import Rebuilt, hollow_solids
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
 
 
-class World:
+class World(Rebuilt):
     """Exact collision checks of a robot in a scene; several threads may ask one world, each in memory of its own.
 
     Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
@@ -67,10 +66,6 @@ class World:
         UnknownNameError: If there is no such accuracy.
     """
 
-    prover: ThreadOwn[Prover] = ThreadOwn()
-    _checks: ThreadOwn[ExactChecker] = ThreadOwn()
-    _motions: ThreadOwn[KeptHere] = ThreadOwn()
-
     def __init__(
         self,
         robot: Robot,
@@ -80,27 +75,28 @@ class World:
         accuracy: Accuracy = "exact",
         self_margin: float = 0.0,
     ) -> None:
-        self.robot, self.scene = robot, Scene() if scene is None else scene
+        self.robot, self._scene = robot, Scene() if scene is None else scene
         require(robot, Robot, "robot of a world", "use load_robot(name or file)")
-        require(self.scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
+        require(self._scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
+        self._obstacles = Items(self._scene.obstacles)
         self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))
         if self.motion_resolution < FINEST_RESOLUTION:
             raise InputError(f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {motion_resolution}")
         for doubt in hollow_solids(robot, self.scene):
             warnings.warn(doubt, MeshWarning, stacklevel=2)
         self.self_margin = own = not_negative(self_margin, "self_margin")
-        self.bodies = link_bodies(robot, own) + scene_bodies(robot, self.scene.at(0.0), own)
+        self._bodies = Items(link_bodies(robot, own) + scene_bodies(robot, self.scene.at(0.0), own))
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
         self.pairs = pairs = colliding_pairs(robot, self.scene, self.bodies)
         moving, standing = by_motion(self.bodies, pairs)
         self.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
-        self._certificate = cache(partial(Certificate, robot, self.bodies, pairs))
+        self._certificate = Once(Certificate, robot, self.bodies, pairs)
         self._motions = KeptHere()
         self._proven_clearance: float | None = None
         self._room = 0.0  # kept on top of the margins of obstacles
-        self._checks = ExactChecker(robot, self.bodies, moving, conservative=accuracy == "conservative")
+        self._checks = ExactChecker(robot, self._bodies, moving, conservative=accuracy == "conservative")
         self._always_colliding = always = fixed_contact(robot, self.bodies, standing) is not None
-        self.prover = Prover(robot, self.bodies, moving, self_margin=own, always_colliding=always)
+        self.prover = Prover(robot, self._bodies, moving, self_margin=own, always_colliding=always)
 
     resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
 
@@ -145,7 +141,7 @@ class World:
         return other
 
     refined = Renamed("with_resolution")
-    __copy__, __reduce__, _repr_html_ = shallow_copy, reduce_world, in_notebook
+    __copy__, _repr_html_ = shallow_copy, in_notebook
 
     def with_clearance(self, clearance: float) -> World:
         """The same world for searches that leave room: its checks keep a distance [m] on top of obstacles' margins.

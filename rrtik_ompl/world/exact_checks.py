@@ -9,7 +9,8 @@ last support points and have been seen to miss overlaps.
 from __future__ import annotations
 
 import copy
-from functools import cache
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import coal
@@ -25,10 +26,11 @@ from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.solids import around
-from rrtik_ompl.copies import shallow_copy
-from rrtik_ompl.fast import FREE, UNDECIDED
+from rrtik_ompl.copies import Items, Once, shallow_copy
+from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
+from rrtik_ompl.fast.taken_tables import TakenTables
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world.arm_cache import Pairs, arm_cache
+from rrtik_ompl.world.arm_cache import Pairs, Spheres, arm_cache
 
 
 class ExactChecker:
@@ -36,6 +38,7 @@ class ExactChecker:
 
     Attributes:
         fast: The same pairs for the kernels.
+        bodies: As given.
         conservative: Whether nothing falls back to coal: what kernels leave undecided then counts as colliding.
 
     Args:
@@ -46,18 +49,23 @@ class ExactChecker:
     """
 
     @collector_waits
-    def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: Pairs, *, conservative: bool = False) -> None:
+    def __init__(self, robot: Robot, bodies: Items[Body], pairs: Pairs, *, conservative: bool = False) -> None:
         self.conservative = conservative
         arm = arm_cache(robot)
-        covers = arm.covers_of(bodies)
-        self.fast = arm.pack(bodies, pairs, covers)
-        self._robot, self._bodies = robot, bodies
+        covers = arm.covers_of(bodies.whole)
+        self._tables = TakenTables(arm.pack(bodies.whole, pairs, covers))
+        self._robot, self.bodies = robot, bodies
         self._pairs, self._covers = pairs, covers
         self._data = robot.model.createData()
-        self._approaches = cache(lambda: dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True)))
-        self._containment = cache(lambda: Containment(bodies, pairs, [outer for outer, _ in covers]))
+        self._approaches = Once(lambda: dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True)))
+        self._containment = Once(_containment_of, bodies, pairs, covers)
 
     __copy__ = shallow_copy
+
+    @property
+    def fast(self) -> FastWorld:
+        """See the class; made anew where another checker has taken the tables over."""
+        return self._tables.get(self._packed)
 
     def as_conservative(self, conservative: bool) -> ExactChecker:
         """The same checker, conservative or not; shares the tables."""
@@ -68,15 +76,32 @@ class ExactChecker:
     def for_thread(self) -> ExactChecker:
         """The same checker for another thread."""
         other = copy.copy(self)
-        other.fast, other._data = self.fast.for_thread(), self._robot.model.createData()
+        other._tables, other._data = self._tables.for_thread(self._packed), self._robot.model.createData()
+        return other
+
+    def moved(self, number: int, placement: pin.SE3) -> ExactChecker | None:
+        """The same checker with one standing body elsewhere, which takes over the tables; None where it cannot.
+
+        This one makes its tables anew should it be asked again.
+        """
+        body = replace(self.bodies[number], placement=placement)
+        taken = self._tables.take(number, body, self._covers[number])
+        if taken is None:
+            return None
+        other = copy.copy(self)
+        other._tables, other.bodies = taken, self.bodies.with_(number, body)
+        other._containment = Once(_containment_of, other.bodies, self._pairs, self._covers)
         return other
 
     def with_bodies(self, bodies: tuple[Body, ...]) -> ExactChecker:
         """The same checker of the same bodies with other margins."""
         other = copy.copy(self)
-        other._bodies = bodies
-        other.fast = arm_cache(self._robot).pack(bodies, self._pairs, self._covers)
+        other.bodies = Items(bodies)
+        other._tables = TakenTables(other._packed())
         return other
+
+    def _packed(self) -> FastWorld:
+        return arm_cache(self._robot).pack(self.bodies.whole, self._pairs, self._covers)
 
     def free(self, rows: Matrix) -> Mask:
         """Which rows, shape (m, dof), are free of collision. Shape (m,)."""
@@ -143,8 +168,8 @@ class ExactChecker:
             for k in (i, j):
                 if k not in transforms:
                     transforms[k] = self._transform(k)
-            ends = (self._bodies[i].geometry, transforms[i], self._bodies[j].geometry, transforms[j])
-            gap = distance(*ends, kept_apart(self._bodies[i], self._bodies[j]))
+            ends = (self.bodies[i].geometry, transforms[i], self.bodies[j].geometry, transforms[j])
+            gap = distance(*ends, kept_apart(self.bodies[i], self.bodies[j]))
             if gap is None:
                 return None
             gaps.append(gap)
@@ -152,9 +177,13 @@ class ExactChecker:
 
     def _transform(self, number: int) -> Any:
         """Coal's pose of a body in the world."""
-        body = self._bodies[number]
+        body = self.bodies[number]
         pose = self._data.oMi[body.joint] * body.placement
         return coal.Transform3s(pose.rotation, pose.translation)
+
+
+def _containment_of(bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres]) -> Containment:
+    return Containment(tuple(bodies), pairs, [outer for outer, _ in covers])
 
 
 def distance(first: Any, first_pose: Any, second: Any, second_pose: Any, margin: float = 0.0) -> float | None:

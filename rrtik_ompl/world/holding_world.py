@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Matrix
@@ -99,8 +100,15 @@ class HoldingWorld(World):
 
     def with_scene(self, scene: Scene) -> HoldingWorld:
         """A world of the same robot in another scene, with the same constraints."""
+        return self._holding(super().with_scene(scene))
+
+    def moved(self, name: str, pose: ArrayLike | pin.SE3) -> HoldingWorld:
+        """The world in which an obstacle stands elsewhere; see :meth:`World.moved`."""
+        return self._holding(self.unheld.moved(name, pose))
+
+    def _holding(self, world: World) -> HoldingWorld:
         regions = [each.region for each in self.constraints.regions]
-        return HoldingWorld(super().with_scene(scene), held_regions(self.robot, scene, regions, None))
+        return HoldingWorld(world, held_regions(self.robot, world.scene, regions, None))
 
     def explain(self, q: ArrayLike) -> str:
         """A line that says why q is not valid: see :meth:`World.explain`; or the constraint that it breaks."""

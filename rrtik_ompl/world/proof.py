@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeAlias
@@ -22,6 +22,7 @@ from rrtik_ompl.collision.solids import of_each
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.proof.layout import WAYS, ProofTable
 from rrtik_ompl.fast.proof.packing import ProofPairs, proof_pairs
+from rrtik_ompl.fast.proof.taken_proof import TakenProof
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
 from rrtik_ompl.robot import Robot
@@ -121,34 +122,33 @@ class Prover:
     """
 
     _fixed = True  # whether obstacles stay where they are
+    _coal: CoalProof | None = None
 
     def __init__(
         self,
         robot: Robot,
-        bodies: tuple[Body, ...],
+        bodies: Sequence[Body],
         pairs: Pairs,
         *,
         self_margin: float = 0.0,
         always_colliding: bool = False,
     ) -> None:
         self.robot, self.bodies, self.pairs, self.self_margin = robot, bodies, pairs, self_margin
-        self._always_colliding, self._kin = always_colliding, object()
+        self._always_colliding, self._kin, self._tables = always_colliding, object(), TakenProof()
         self._gain, self._offset = np.ascontiguousarray(robot.chain.gain.T), robot.chain.offset
         ends = np.stack([robot.lower, robot.upper])
         self._bounded = bool(np.isfinite(ends).all() and np.abs(robot.joint_values(ends)).max() < 0.5 * LARGEST_VALUE)
-        self._packed: ProofPairs | None = None
-        self._coal: CoalProof | None = None
 
     def for_thread(self) -> Prover:
         """The same prover for another thread; each takes the other's proofs for its own."""
         other = copy.copy(self)
-        other._packed, other._coal = None if self._packed is None else self._packed.for_thread(), None
+        other._tables, other._coal = self._tables.for_thread(self.bodies), None
         return other
 
     @property
     def digest(self) -> str:
         """See :attr:`Proof.digest`."""
-        return world_digest(self.robot, self.bodies, self.pairs)
+        return world_digest(self.robot, tuple(self.bodies), self.pairs)
 
     @cached_property
     def margin(self) -> float:
@@ -182,8 +182,7 @@ class Prover:
         values, kernels = self._joint_values(rows), library(PROOF_KERNELS)
         if kernels is None or not self.route(rows, clearance=clearance).proven:
             return None
-        packed, told = self._packed_for(clearance, SPARE), list[Told]()
-        coal = CoalProof(self.robot, self.bodies, packed)
+        told, coal = list[Told](), CoalProof(self.robot, self.bodies, packed := self._packed_for(clearance, SPARE))
         pair, place = np.zeros(1, dtype=np.int32), np.zeros(1)
         for k in range(len(rows) - 1):
             at = (values[k].ctypes.data, values[k + 1].ctypes.data, 1, pair.ctypes.data, place.ctypes.data)
@@ -195,8 +194,7 @@ class Prover:
 
     def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0) -> Mask:
         """Which of the motions starts[k] -> ends[k], shapes (m, dof), are proven free. Shape (m,)."""
-        mask = np.ones(len(starts), dtype=bool)
-        if len(starts) == 0:
+        if len(mask := np.ones(len(starts), dtype=bool)) == 0:
             return mask
         rows = np.concatenate([starts, ends])
         values = self._joint_values(rows)
@@ -224,7 +222,7 @@ class Prover:
 
         Of a few none is, as long as the table is not made: that takes longer than coal needs for them.
         """
-        mask = np.full(len(rows), self._packed is not None or len(rows) > FEW)
+        mask = np.full(len(rows), self._tables.packed is not None or len(rows) > FEW)
         if mask.any():
             mask[[gap.motion for gap in self.still_gaps(rows, clearance=0.0)]] = False
         return mask
@@ -287,12 +285,14 @@ class Prover:
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
         """The table, with a clearance and a slack to keep."""
-        if self._packed is None:
-            solids = of_each((body.geometry for body in self.bodies), convex_solids)
-            arm = self.robot.chain, self.bodies, self.pairs
-            self._packed = proof_pairs(*arm, solids, strokes(self.robot), fixed=self._fixed)
-        self._packed.keep(clearance, slack)
-        return self._packed
+        packed = self._tables.get(self.bodies, self._made)
+        packed.keep(clearance, slack)
+        return packed
+
+    def _made(self) -> ProofPairs:
+        self._coal, bodies = None, tuple(self.bodies)
+        solids = of_each((body.geometry for body in bodies), convex_solids)
+        return proof_pairs(self.robot.chain, bodies, self.pairs, solids, strokes(self.robot), fixed=self._fixed)
 
     def _gap(self, packed: ProofPairs, motion: int, pair: int, place: float) -> Gap:
         if pair < 0:

@@ -1,24 +1,179 @@
-"""Worlds for other processes: what they are made of goes there, and their tables are made anew. What they doubt."""
+"""Worlds made from worlds: for other processes, all made anew, and with an obstacle elsewhere. What they doubt."""
 
 from __future__ import annotations
 
+import copy
+import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from operator import attrgetter
-from typing import Any
+from typing import Any, TypeVar, cast
 
-from rrtik_ompl.errors import MeshWarning
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.collision.bodies import Body, Pairs
+from rrtik_ompl.collision.certificate import Certificate, fixed_contact
+from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE
+from rrtik_ompl.collision.shape_table import pieces
+from rrtik_ompl.copies import Items, KeptHere, Once, ThreadOwn
+from rrtik_ompl.errors import MeshWarning, UnknownNameError, require
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Mesh
+from rrtik_ompl.world.exact_checks import ExactChecker
+from rrtik_ompl.world.proof import Prover
 
 _PARTS = attrgetter("robot", "scene")
 _SETTINGS = attrgetter("accuracy", "self_margin", "motion_resolution", "_room", "_proven_clearance")
 
+Kind = TypeVar("Kind", bound="Rebuilt")
 
-def reduce_world(world: object) -> tuple[Any, ...]:
-    """``World.__reduce__``: a copy answers as the world does, and may be used in another thread or process."""
-    return _rebuilt, (type(world), *_PARTS(world), _SETTINGS(world))
+
+class Rebuilt:
+    """A world of which others are made."""
+
+    robot: Robot
+    pairs: Pairs
+    _scene: Scene
+    _obstacles: Items[Obstacle]
+    _bodies: Items[Body]
+    prover: ThreadOwn[Prover] = ThreadOwn()
+    _checks: ThreadOwn[ExactChecker] = ThreadOwn()
+    _motions: ThreadOwn[KeptHere] = ThreadOwn()
+    _always_colliding: bool
+    _certificate: Callable[[], Certificate]
+    _numbers: _Numbers | None = None
+
+    @property
+    def scene(self) -> Scene:
+        """The surroundings."""
+        if (obstacles := self._obstacles.whole) is not self._scene.obstacles:
+            self._scene = copy.copy(self._scene)  # nothing else is checked again
+            object.__setattr__(self._scene, "obstacles", obstacles)
+        return self._scene
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The solids of the robot and the scene."""
+        return self._bodies.whole
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy answers as the world does, and may be used in another thread or process."""
+        return _rebuilt, (type(self), *_PARTS(self), _SETTINGS(self))
+
+    def moved(self: Kind, name: str, pose: ArrayLike | pin.SE3) -> Kind:
+        """The world in which an obstacle stands elsewhere; what that costs does not grow with their number.
+
+        The new world takes over the tables of this one and writes a few rows of them. This one is as it was; should it
+        be asked again, it makes its tables anew, as it does for other threads.
+
+        Args:
+            name: Of the obstacle.
+            pose: T_world_obstacle, in any form that :func:`rrtik_ompl.poses.rigid` takes.
+
+        Raises:
+            UnknownNameError: If there is no obstacle of that name.
+            InputError: If the pose is none.
+
+        Example:
+            >>> ball = rrtik.Obstacle("ball", rrtik.Sphere(0.1), rrtik.pose([0.4, 0.0, 0.4]))
+            >>> world = rrtik.World(rrtik.load_robot("ur5"), rrtik.Scene([ball]))
+            >>> world = world.moved("ball", [0.4, 0.3, 0.4])
+            >>> world.scene.obstacle("ball").pose.translation.tolist()
+            [0.4, 0.3, 0.4]
+        """
+        require(name, str, "name of an obstacle")
+        self._numbers = numbers = self._numbers or _Numbers.of(self)
+        if name not in numbers.obstacles:
+            raise UnknownNameError("obstacle", name, numbers.obstacles)
+        obstacle = replace(self._obstacles[numbers.obstacles[name]], pose=pose)
+        placements = numbers.placements(obstacle)
+        other, checks = copy.copy(self), self._checks
+        other._obstacles = self._obstacles.with_(numbers.obstacles[name], obstacle)
+        for number, placement in placements.items():
+            moved = checks.moved(number, placement)
+            if moved is None:
+                return self._anew(other.scene)
+            if checks.bodies is other._bodies:
+                other._bodies = moved.bodies
+            else:  # there they have other margins
+                other._bodies = other._bodies.with_(number, replace(other._bodies[number], placement=placement))
+            checks = moved
+        other._checks, other._motions = checks, self._motions
+        self._motions = KeptHere()
+        other._certificate = Once(_certificate, self.robot, other._bodies, self.pairs)
+        still = numbers.standing(None if self._always_colliding else placements)
+        other._always_colliding = _touching(self.robot, other._bodies, still)
+        other.prover = _taking_over(self.prover, other, tuple(placements))
+        return other
+
+    def _anew(self: Kind, scene: Scene) -> Kind:
+        return cast(Kind, _rebuilt(type(self), self.robot, scene, _SETTINGS(self)))
+
+
+@dataclass(slots=True, eq=False)
+class _Numbers:
+    """Where the obstacles of a scene stand among its obstacles and bodies; the same for all worlds moved from one."""
+
+    obstacles: dict[str, int]
+    bodies: dict[str, list[int]]
+    fixed: dict[int, list[tuple[int, int]]]  # pairs of each body that both never move
+
+    @classmethod
+    def of(cls, world: Rebuilt) -> _Numbers:
+        """Those of a world."""
+        bodies: dict[str, list[int]] = {}
+        for k, body in enumerate(world.bodies):
+            if body.kind == "obstacle":
+                bodies.setdefault(body.name, []).append(k)
+        fixed: dict[int, list[tuple[int, int]]] = {}
+        for pair in world.pairs:
+            if all(world.bodies[k].joint == 0 for k in pair):
+                for k in pair:
+                    fixed.setdefault(k, []).append(pair)
+        return cls({each.name: k for k, each in enumerate(world.scene.obstacles)}, bodies, fixed)
+
+    def placements(self, obstacle: Obstacle) -> dict[int, pin.SE3]:
+        """Where the bodies of an obstacle are, by their numbers."""
+        here = obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, 0.0)
+        return {
+            number: here * part.placement
+            for number, part in zip(self.bodies[obstacle.name], pieces(obstacle.shape), strict=True)
+        }
+
+    def standing(self, moved: Iterable[int] | None) -> Pairs:
+        """Of the pairs that never move those of some bodies; all of them where nobody names bodies."""
+        if moved is None:
+            return tuple(dict.fromkeys(pair for own in self.fixed.values() for pair in own))
+        return tuple(pair for k in moved for pair in self.fixed.get(k, ()))
+
+
+def _certificate(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> Certificate:
+    return Certificate(robot, tuple(bodies), pairs)
+
+
+def _touching(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> bool:
+    """Whether one of some pairs of bodies that never move touches; most are told apart by the balls around them."""
+    near = [(bodies[i], bodies[j]) for i, j in pairs if not _far(bodies[i], bodies[j])]
+    return any(fixed_contact(robot, both, ((0, 1),)) is not None for both in near)
+
+
+def _far(first: Body, second: Body) -> bool:
+    (one, other) = (body.placement.act(body.geometry.aabb_center).tolist() for body in (first, second))
+    reach = first.geometry.aabb_radius + second.geometry.aabb_radius + DISTANCE_TOLERANCE
+    return bool(math.dist(one, other) > reach)  # no number where one of them has no end
+
+
+def _taking_over(prover: Prover, world: Rebuilt, moved: tuple[int, ...]) -> Prover:
+    """The prover of a world in which some bodies stand elsewhere; it takes over the table of another one."""
+    other = copy.copy(prover)
+    other.bodies, other._always_colliding, other._kin = world._bodies, world._always_colliding, object()
+    other._tables = prover._tables.take(moved)
+    if other._tables.packed is None:
+        other._coal = None
+    return other
 
 
 def _rebuilt(kind: Callable[..., Any], robot: Robot, scene: Scene, settings: tuple[Any, ...]) -> object:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.bodies import Body, by_motion, pair_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.checks import inputs, reference_distances
 from rrtik_ompl.fast.checks.clearance import Clearance, rounded
@@ -54,6 +54,7 @@ class FastWorld:
         address: Of the tables in memory, for other kernels; 0 without kernels. Valid as long as this object lives.
         table: What is there; none without kernels.
         moving, standing: Numbers of the bodies that move, in sets that count as one, and of those that stand still.
+        pinned: Whether a search keeps the address beyond a call, so that nobody may change the tables.
 
     Args:
         chain: The tree of joints.
@@ -88,11 +89,10 @@ class FastWorld:
         self._joints = len(chain.parent)
         self._limits = inputs.joint_limits(chain, strokes)
         self._smallest_limit = float(self._limits.min(initial=inputs.LARGEST_ANGLE))
-        moves = [body.joint > 0 for body in bodies]
-        kept = [(i, j) for i, j in pairs if moves[i] or moves[j]]
+        kept = by_motion(bodies, tuple(pairs))[0]
         clear = partners(bodies, kept)
         moving = alike(bodies, clear)
-        standing = [k for k in np.unique(np.array(kept, dtype=np.int64)).tolist() if not moves[k]]
+        standing = [k for k in np.unique(pair_array(kept)).tolist() if bodies[k].joint == 0]
         self._pairs = kept
         solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
         same = like._arm if like is not None and like._joints == self._joints else None
@@ -105,8 +105,7 @@ class FastWorld:
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._kernels = library("checks.check_kernels") if compiled else None
         self._probe: Table | None = None
-        self._moved = False
-        self.address = 0
+        self._moved, self.pinned, self.address = False, False, 0
         if self._kernels is not None:
             self._solids = standing_solids(bodies, standing, solids)
             self._take_memory()

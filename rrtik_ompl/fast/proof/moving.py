@@ -11,10 +11,11 @@ from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.cloud_frames import cloud_bodies, cloud_poses
-from rrtik_ompl.fast.proof.packing import ProofPairs, sizes_of
+from rrtik_ompl.fast.proof.packing import NOTHING, ProofPairs, sizes_of, solid_kind
 from rrtik_ompl.fast.tables.cloud_tables import cloud_table
-from rrtik_ompl.fast.tables.solid_tables import convex_solids, placed_bodies
+from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, convex_solids, placed_bodies
 
+NO_LIMIT = 1 << 62
 _BALL = slice(layout.BALL_CENTRE, layout.BALL_CENTRE + 3)
 _AXES = slice(layout.BOX_AXES, layout.BOX_AXES + 9)
 _MIDDLE = slice(layout.BOX_MIDDLE, layout.BOX_MIDDLE + 3)
@@ -90,6 +91,65 @@ class MovedObstacles:
         around = placed_bodies([convex_solids(bodies[k].geometry) for k in numbers], np.array(places))
         turns = np.array([place[:3, :3] for place in places])
         sizes[np.flatnonzero(kinds >= layout.CLOUD)] = sizes_of([solids.around for solids in around], turns)
+
+
+class MovedSolids:
+    """Standing bodies of a table, put elsewhere in place one after the other; no other body is packed again.
+
+    Args:
+        packed: The table.
+    """
+
+    def __init__(self, packed: ProofPairs) -> None:
+        self._packed, table = packed, packed.table
+        self._records = table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)
+        self._sizes = table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)
+        self._corners = table[layout.CORNERS].reshape(-1, 3)
+        self._left = len(packed.firsts) if packed.groups else NO_LIMIT  # moves until neighbours are better found anew
+        self._groups: dict[int, list[int]] = {}
+        for group, members in enumerate(packed.groups):
+            for member in members:
+                self._groups.setdefault(member, []).append(group)
+
+    def put(self, number: int, body: Body) -> bool:
+        """Put a body elsewhere; whether it was done. If not, all has to be packed anew.
+
+        Args:
+            number: Of the body.
+            body: Where it is now.
+        """
+        pose = np.asarray(body.placement.homogeneous)[None]
+        own = placed_bodies([convex_solids(body.geometry)], pose)[0].around or (NOTHING,)
+        first, end = self._packed.firsts[number], self._packed.firsts[number + 1]
+        parts = self._parts(number)
+        kinds = [solid_kind(body, solid) for solid in own]
+        if self._left == 0 or kinds != self._records[parts, layout.SOLID_KIND].tolist() or layout.CLOUD in kinds:
+            return False
+        self._left -= 1
+        whole = [own] if end - first > len(own) else []
+        groups = [*whole, *((solid,) for solid in own)]
+        self._sizes[first:end] = sizes_of(groups, pose[:, :3, :3].repeat(len(groups), axis=0))
+        corners = slice(self._records[parts[0], layout.FIRST_CORNER], self._records[parts[-1], layout.END_CORNER])
+        self._corners[corners] = np.concatenate([solid.corners for solid in own])
+        for group in self._groups.get(number, ()):
+            solids = [self._solid(k) for member in self._packed.groups[group] for k in self._parts(member)]
+            self._sizes[self._packed.firsts[-1] + group] = sizes_of([solids], np.eye(3)[None])
+        return True
+
+    def _parts(self, number: int) -> range:
+        """The solids of a body, without the one that stands for all of them."""
+        first, end = self._packed.firsts[number], self._packed.firsts[number + 1]
+        return range(first + (end - first > 1), end)
+
+    def _solid(self, number: int) -> ConvexSolid:
+        """A solid as it stands in the table."""
+        record, sizes = self._records[number], self._sizes[number]
+        return ConvexSolid(
+            self._corners[record[layout.FIRST_CORNER] : record[layout.END_CORNER]],
+            disc=float(sizes[layout.DISC]),
+            axis=sizes[_DISC_AXIS],
+            radius=float(sizes[layout.ROUND]),
+        )
 
 
 def _turned(turns: NDArray[np.float64], a: Matrix) -> Matrix:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -41,6 +41,8 @@ class ProofPairs:
             (n, 4); part -1 is a body of several parts as a whole.
         margins: How far each must stay apart [m], shape (n,).
         beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
+        firsts: The first solid of each body, and the end of them.
+        groups: Bodies that are one solid together; these solids come last.
         kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, nan before the first
             :meth:`keep`, and what they keep between all bodies for rounding and slack.
     """
@@ -50,6 +52,8 @@ class ProofPairs:
     sides: NDArray[np.int64]
     margins: Vector
     beside_obstacle: NDArray[np.bool_]
+    firsts: Sequence[int]
+    groups: Sequence[Members]
     kept: tuple[float, float] = (float("nan"), ROOM)
 
     def keep(self, clearance: float, slack: float = 0.0) -> None:
@@ -63,7 +67,7 @@ class ProofPairs:
         own = {place: np.zeros_like(self.table[place]) for place in COMPUTED}
         if self.table.parts:  # of a cloud, points that are compared stand among the solids
             own |= {place: self.table[place] for place in (layout.SOLIDS, layout.CORNERS)}
-        return ProofPairs(with_own(self.table, own), self.bodies, self.sides, self.margins, self.beside_obstacle)
+        return replace(self, table=with_own(self.table, own), kept=(float("nan"), ROOM))
 
 
 @collector_waits
@@ -87,7 +91,7 @@ def proof_pairs(
         fixed: Whether obstacles stay where they are; neighbours among many are compared as one then.
     """
     joints = len(chain.parent)
-    parts = [own.around or (_NOTHING,) for own in placed_bodies(solids, body_arrays(bodies).placements)]
+    parts = [own.around or (NOTHING,) for own in placed_bodies(solids, body_arrays(bodies).placements)]
     reached = [
         _reaches(chain, body.joint, own, np.broadcast_to(strokes, joints))
         for body, own in zip(bodies, parts, strict=True)
@@ -164,13 +168,13 @@ def proof_pairs(
     margins = arrays.kept_apart(named)
     spans = [slice(*row[layout.PARTS_FIRST : layout.PARTS_END + 1]) for row in of_groups]
     margins[len(whole) + len(of_parts) :] = [margins[span].max() for span in spans]
-    return ProofPairs(made, named, sides, margins, beside)
+    return ProofPairs(made, named, sides, margins, beside, ends, list(together))
 
 
-_NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)
+NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)
 
 
-def _kind(body: Body, solid: ConvexSolid) -> int:
+def solid_kind(body: Body, solid: ConvexSolid) -> int:
     """What the kernels take a solid for; a half-space that moves is not known to them."""
     kind = KINDS.get(solid.kind, UNKNOWN)
     return UNKNOWN if kind == HALF_SPACE and body.joint > 0 else kind
@@ -270,7 +274,7 @@ def _solid_arrays(
             numbers.append((body.joint, 0, 0, WHOLE_BODY if known else UNKNOWN))
             solids.append(own)
         for solid in own:
-            numbers.append((body.joint, count, count + len(solid.corners), _kind(body, solid)))
+            numbers.append((body.joint, count, count + len(solid.corners), solid_kind(body, solid)))
             solids.append((solid,))
             corners.append(solid.corners)
             count += len(solid.corners)

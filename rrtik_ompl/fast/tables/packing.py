@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Vector
-from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.bodies import Body, pair_array
 from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.fast.tables.layout import PAIR_INTS, PAIR_ONE, PAIR_OTHER, PAIRS
 from rrtik_ompl.fast.tables.memory import Table
@@ -70,7 +70,7 @@ class ArmTables:
 
 def partners(bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> dict[int, Mask]:
     """For each moving body that a pair names the bodies that it must not touch, shape (bodies,)."""
-    listed = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    listed = pair_array(pairs)
     named = [k for k in np.unique(listed).tolist() if bodies[k].joint > 0]
     row = np.full(len(bodies), -1)
     row[named] = np.arange(len(named))
@@ -106,7 +106,9 @@ def arm_tables(
 ) -> ArmTables:
     """Tables of the moving bodies (see :func:`alike`); those of ``like`` if they are the same."""
     place = {body: k for k, members in enumerate(moving) for body in members}
-    own = tuple(dict.fromkeys((place[i], place[j]) for i, j in map(sorted, pairs) if i in place and j in place))
+    listed = pair_array(pairs)
+    both = np.sort(listed[np.isin(listed, list(place)).all(axis=1)], axis=1).tolist()
+    own = tuple(dict.fromkeys((place[i], place[j]) for i, j in both))
     carried, sizes = tuple(bodies[k] for members in moving for k in members), tuple(map(len, moving))
     covers = tuple(np.asarray(s[k], dtype=np.float64) for members in moving for k in members for s in (outer, inner))
     solids_of = tuple(solids[k] for members in moving for k in members)

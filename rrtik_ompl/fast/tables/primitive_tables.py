@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.tables.layout import (
     BLOCK,
@@ -51,6 +51,7 @@ MANY = 64  # primitives, from which on those that are near each other are looked
 UNBOUNDED_COORDINATE = 1e30  # [m]
 
 Detail: TypeAlias = Matrix | Table | None
+Grow: TypeAlias = float | Vector  # 1: a little larger, -1: smaller; a number or one for each
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +113,9 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table
     unknown = sorted(set(primitives.kinds.tolist()) - set(KINDS))
     if unknown:
         raise InputError(f"primitives for kernels: unknown kind {unknown[0]}; have {KINDS.start} to {KINDS.stop - 1}")
-    ordered = primitives.only(_order(primitives))
+    order = _order(primitives)
+    ordered, place = primitives.only(order), np.empty_like(order)
+    place[order] = np.arange(len(order))
     heads = np.zeros((len(ordered), HEAD_INTS), dtype=np.int32)
     planes = [detail for detail in ordered.details if isinstance(detail, np.ndarray)]
     clouds = [detail for detail in ordered.details if isinstance(detail, Table)]
@@ -121,7 +124,8 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table
     heads[:, FIRST_PLANE], heads[:, END_PLANE] = ends[:-1], ends[1:]
     heads[ordered.kinds == CLOUD, FIRST_PLANE] = np.arange(len(clouds))
     own = np.full(checked.shape[1], -1, dtype=np.int32)
-    own[ordered.bodies] = np.arange(len(ordered))  # the last one of a body remains
+    by_kind = np.argsort(primitives.kinds, kind="stable")  # whatever stands near, the same one of a body's balls
+    own[primitives.bodies[by_kind]] = place[by_kind]  # the last one of a body remains
     boxes = _bounding_boxes(ordered.lows, ordered.highs)
     blocks = _blocks(ordered)
     return table(
@@ -150,9 +154,18 @@ def _bounding_boxes(lows: Matrix, highs: Matrix) -> NDArray[np.float32]:
     boxes = np.empty((len(BOX_RUNS), padded), dtype=np.float32)
     low, high = boxes[LOW_X : HIGH_Z + 1 : 2], boxes[HIGH_X : HIGH_Z + 1 : 2]
     low[:], high[:] = UNBOUNDED_COORDINATE, -UNBOUNDED_COORDINATE
-    low[:, : len(lows)] = np.nextafter(lows.T.astype(np.float32), np.float32(-np.inf))
-    high[:, : len(highs)] = np.nextafter(highs.T.astype(np.float32), np.float32(np.inf))
+    low[:, : len(lows)], high[:, : len(highs)] = below(lows.T), above(highs.T)
     return boxes
+
+
+def below(numbers: Matrix) -> NDArray[np.float32]:
+    """Numbers of half the precision that are smaller."""
+    return np.nextafter(numbers.astype(np.float32), np.float32(-np.inf))
+
+
+def above(numbers: Matrix) -> NDArray[np.float32]:
+    """Numbers of half the precision that are larger."""
+    return np.nextafter(numbers.astype(np.float32), np.float32(np.inf))
 
 
 def _blocks(primitives: Primitives) -> NDArray[np.float32]:

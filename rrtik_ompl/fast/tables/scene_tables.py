@@ -50,7 +50,7 @@ from rrtik_ompl.fast.tables.layout import (
     SHAPE_FLOATS,
 )
 from rrtik_ompl.fast.tables.memory import record
-from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE, Detail, Primitives, joined
+from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE, Detail, Grow, Primitives, joined
 from rrtik_ompl.fast.tables.robot_tables import Spheres, usable_cover
 
 UNBOUNDED_LENGTH = 1e12  # [m] what is larger or farther away counts as being everywhere
@@ -75,7 +75,7 @@ def outer_primitives(
     places = _byprimitive_kind(bodies)
     rest = [(k, usable_cover(bodies[k].geometry, covers[k])) for k in places.pop(None, ())]
     made = joined([*_exact(bodies, places, 1.0, beside), _balls(bodies, rest, 1.0, beside)])
-    endless = ~_fits(made)
+    endless = ~fits(made)
     if not endless.any():
         return made
     made.kinds[endless], made.numbers[endless] = BALL, 0.0
@@ -88,12 +88,11 @@ def inner_primitives(bodies: Sequence[Body], inner: Sequence[Spheres]) -> Primit
     """Primitives that lie within the margins around standing bodies, or inside these."""
     margins = _kept(bodies)
     places = _byprimitive_kind(bodies)
-    rounded = [k for kind in (BALL, CAPSULE, HALF_SPACE, CLOUD) for k in places.get(kind, ())]
-    beside = np.zeros(len(bodies))
-    beside[rounded] = margins[rounded]  # what has corners does not keep its kind when it grows
+    rounded = [k for kind in ROUNDED for k in places.get(kind, ())]
+    beside = np.where(np.isin(np.arange(len(bodies)), rounded), margins, 0.0)
     rest = [(k, np.asarray(inner[k]).reshape(-1, 4)) for k in (*places.pop(None, ()), *places.get(CONVEX, ()))]
     made = joined([*_exact(bodies, places, -1.0, beside), _balls(bodies, rest, -1.0, margins)])
-    return made.only(_fits(made))
+    return made.only(fits(made))
 
 
 def _kept(bodies: Sequence[Body]) -> Vector:
@@ -101,7 +100,7 @@ def _kept(bodies: Sequence[Body]) -> Vector:
     return np.array([body.margin + body.padding for body in bodies])
 
 
-def _fits(primitives: Primitives) -> Mask:
+def fits(primitives: Primitives) -> Mask:
     """The primitives whose numbers the kernels can square, shape (n,)."""
     fits: Mask = np.abs(primitives.numbers).max(axis=1, initial=0.0) < UNBOUNDED_LENGTH
     for k, detail in enumerate(primitives.details):
@@ -160,12 +159,12 @@ def _exact(
         elif kind is not None:
             poses = np.array([bodies[k].placement.homogeneous for k in chosen])
             cores = [cast(Core, core) for core in of_each((bodies[k].geometry for k in chosen), core_of)]
-            made.append(_MAKERS[kind](own, poses, cores, grow, beside[own]))
+            made.append(MAKERS[kind](own, poses, cores, grow, beside[own]))
     return made
 
 
 def _boxes(
-    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: float, beside: Vector
+    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: Grow, beside: Vector
 ) -> Primitives:
     centres, turns = poses[:, :3, 3], poses[:, :3, :3]
     halves = np.array([core.half_sides for core in cores])
@@ -177,7 +176,7 @@ def _boxes(
 
 
 def _capsules(
-    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: float, beside: Vector
+    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: Grow, beside: Vector
 ) -> Primitives:
     centres, z = poses[:, :3, 3], poses[:, :3, 2]
     lengths, radii = (np.array([getattr(core, name) for core in cores]) for name in ("half_length", "radius"))
@@ -191,7 +190,7 @@ def _capsules(
 
 
 def _cylinders(
-    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: float, beside: Vector
+    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: Grow, beside: Vector
 ) -> Primitives:
     centres, z = poses[:, :3, 3], poses[:, :3, 2]
     lengths, radii = (np.array([getattr(core, name) for core in cores]) for name in ("half_length", "disc"))
@@ -205,15 +204,16 @@ def _cylinders(
 
 
 def _spheres(
-    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: float, beside: Vector
+    own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: Grow, beside: Vector
 ) -> Primitives:
     return _round(own, poses[:, :3, 3], np.array([core.radius for core in cores]), grow, beside)
 
 
-_MAKERS = {BALL: _spheres, CAPSULE: _capsules, BOX: _boxes, CYLINDER: _cylinders}
+ROUNDED = (BALL, CAPSULE, HALF_SPACE, CLOUD)  # keep their kind when they grow
+MAKERS = {BALL: _spheres, CAPSULE: _capsules, BOX: _boxes, CYLINDER: _cylinders}
 
 
-def _round(own: NDArray[np.int64], centres: Matrix, radii: Vector, grow: float, beside: Vector) -> Primitives:
+def _round(own: NDArray[np.int64], centres: Matrix, radii: Vector, grow: Grow, beside: Vector) -> Primitives:
     """Balls that stand for bodies ``own``."""
     radii = radii + grow * _slack(centres, radii) + beside
     numbers = {SHAPE_CENTRE: centres, BALL_RADIUS: radii[:, None]}

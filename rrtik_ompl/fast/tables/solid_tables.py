@@ -220,13 +220,13 @@ def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:
         {
             SPANS: records,
             SOLIDS: numbers,
-            SIZES: _sizes(solids),
-            CORNERS: _blocks(solids).astype(np.float32),
+            SIZES: solid_sizes(solids),
+            CORNERS: corner_blocks(solids).astype(np.float32),
         }
     )
 
 
-def _sizes(solids: Sequence[ConvexSolid]) -> Matrix:
+def solid_sizes(solids: Sequence[ConvexSolid]) -> Matrix:
     """Numbers for the kernels, see the layout, shape (n, SIZE_COUNT)."""
     made = np.zeros((len(solids), SIZE_COUNT))
     if solids:
@@ -242,7 +242,7 @@ def _sizes(solids: Sequence[ConvexSolid]) -> Matrix:
     return made
 
 
-def _blocks(solids: Sequence[ConvexSolid]) -> NDArray[np.float64]:
+def corner_blocks(solids: Sequence[ConvexSolid]) -> NDArray[np.float64]:
     """Corners ``WIDTH`` at a time, shape (blocks, 3, WIDTH); the first one of a solid fills up its last block."""
     counts = np.array([len(solid.corners) for solid in solids], dtype=np.int64)
     owner, _ = _runs((-(-counts // WIDTH) * WIDTH).tolist())

@@ -54,7 +54,7 @@ class KernelGraph:
         if kernels is None:
             raise InputError("roadmap in kernels: there are none; install numba")
         self._kernels, self._motions, self._ask, self._near = kernels, motions, ask, near
-        self._dof = motions.dof
+        self._dof, motions.fast.pinned = motions.dof, True
         box = finite_array(lower, (self._dof,), "lower bounds"), finite_array(upper, (self._dof,), "upper bounds")
         motions.require_covered(*box)
         joints = 0 if motions.identity else motions.joints
