@@ -106,7 +106,7 @@ def page(
         meshcat=_packed_engine(),
         story=story.replace("<", "\\u003c"),  # so that no name can end the element that holds it
         commands=packed(json.dumps([base64.b64encode(each).decode("ascii") for each in recording.commands]).encode()),
-        script="\n".join(asset(name) for name in SCRIPTS + (PLANNING if told["plan"] else ())),
+        script=_packed_scripts(SCRIPTS + (PLANNING if told["plan"] else ())),
         start="\n".join(asset(name) for name in STARTING),
     )
 
@@ -134,6 +134,11 @@ def _title(subject: Subject) -> str:
 def asset(name: str) -> str:
     """The text of one of the page's own files."""
     return files("rrtik_ompl.viewer").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+@cache
+def _packed_scripts(names: tuple[str, ...]) -> str:
+    return packed("\n".join(['"use strict";', *map(asset, names)]).encode("utf-8"))
 
 
 @cache

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from rrtik_ompl.collision.bodies import Body, by_motion
 from rrtik_ompl.fast.tables.layout import CONVEX_SOLID
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
 from rrtik_ompl.world import World
+
+DIGITS = 6  # of a metre, of corners; solids are so much larger for it
 
 
 def standing_parts(world: World) -> list[dict[str, Any]] | None:
@@ -34,10 +38,10 @@ def _solids(body: Body) -> list[dict[str, Any]] | None:
         return None
     return [
         {
-            "corners": (solid.corners @ placement.rotation.T + placement.translation).tolist(),
+            "corners": np.round(solid.corners @ placement.rotation.T + placement.translation, DIGITS).tolist(),
             "axis": (placement.rotation @ solid.axis).tolist(),
             "disc": solid.disc,
-            "radius": solid.radius + body.padding,
+            "radius": solid.radius + body.padding + 2.0 * 10.0**-DIGITS,
         }
         for solid in around
     ]

@@ -231,7 +231,7 @@ def test_what_cannot_plan_is_a_still_page():
     assert '"plan":null' in page(moving, still=True)
     assert '"plan":null' in page(moving.robot)
     assert "wasm-unsafe-eval" in page(moving, still=True)
-    assert "placeObstacle" not in page(moving, still=True)
+    assert len(page(moving, still=True)) < 0.75 * len(page(moving))
 
 
 FRAMES = "(async () => { for (let k = 0; k < 30; k += 1) await new Promise((r) => requestAnimationFrame(r)); })()"
