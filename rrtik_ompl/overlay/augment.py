@@ -18,7 +18,7 @@ from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.canvas import NEAREST_DRAWN, Canvas
 from rrtik_ompl.overlay.figure import Figure, figure_of, placed, tinted
-from rrtik_ompl.overlay.surfaces import ROBOT_TRIANGLES, obstacle_surfaces, robot_surfaces
+from rrtik_ompl.overlay.surfaces import ROBOT_TRIANGLES, ShapeSurfaces, obstacle_surfaces, robot_surfaces
 from rrtik_ompl.poses import rigid
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle
@@ -104,6 +104,7 @@ class Augmenter:
         self._ghost = figure_of(thin)
         self._gripper = figure_of([each for each in thin if each.frame == self._tip.parentJoint])
         self._figures: dict[Hashable, tuple[tuple[Obstacle, ...], Figure]] = {}
+        self._shapes = ShapeSurfaces()
         self._last: Layer | None = None
 
     def draw(
@@ -242,7 +243,7 @@ class Augmenter:
             if len(self._figures) >= MAX_FIGURES:
                 self._figures.pop(next(iter(self._figures)))
             kept = tuple(obstacles)  # so that no other shape gets the identity of one that is gone
-            self._figures[key] = (kept, figure_of(obstacle_surfaces(kept)))
+            self._figures[key] = (kept, figure_of(obstacle_surfaces(kept, self._shapes)))
         return self._figures[key][1]
 
     def _pixels(

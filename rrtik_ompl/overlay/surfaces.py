@@ -21,6 +21,7 @@ from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out
 
 ROBOT_TRIANGLES = 20_000
 OBSTACLE_TRIANGLES = 5_000
+MAX_SHAPES = 4_000  # whose surfaces are kept
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,13 +59,31 @@ def robot_surfaces(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> tuple[Surf
     return drawn or _link_surfaces(robot.collision.geometryObjects, triangles)
 
 
-def obstacle_surfaces(obstacles: Sequence[Obstacle], color: str = palette.OBSTACLE) -> tuple[Surface, ...]:
-    """Bounded obstacles in the frame of the world; half-spaces are left out."""
-    found = []
-    for each in obstacles:
-        if each.shape.bounded:
-            found.append(moved(surface_of_shape(each.shape, color), each.pose.rotation, each.pose.translation))
-    return tuple(found)
+class ShapeSurfaces:
+    """Surfaces of obstacles' shapes, each made once: what moves from picture to picture keeps its shape."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._made: dict[int, tuple[Shape, Surface]] = {}  # with the shape, so that no other gets its identity
+
+    def of(self, shape: Shape) -> Surface:
+        """The surface of a bounded shape in the colour of obstacles."""
+        found = self._made.get(id(shape))
+        if found is None:
+            if len(self._made) >= MAX_SHAPES:
+                self._made.clear()
+            found = self._made[id(shape)] = (
+                shape,
+                surface_of_shape(shape, palette.OBSTACLE),
+            )
+        return found[1]
+
+
+def obstacle_surfaces(obstacles: Sequence[Obstacle], made: ShapeSurfaces | None = None) -> tuple[Surface, ...]:
+    """Bounded obstacles in the frame of the world, by surfaces that may be made already; half-spaces are left out."""
+    known = ShapeSurfaces() if made is None else made
+    bounded = [each for each in obstacles if each.shape.bounded]
+    return tuple(moved(known.of(each.shape), each.pose.rotation, each.pose.translation) for each in bounded)
 
 
 def moved(surface: Surface, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> Surface:
