@@ -95,7 +95,7 @@ def measured(wrong: int, markers: str, stated: bool, count: int) -> Row:
         surprises += [each.pose.surprise for each in seen]
     accepted = [each for each in outcomes if each.accepted]
     shares = 100.0 * len(accepted) / count, 100.0 * refused / count
-    within = 100.0 * float(np.mean([each.within for each in accepted] or [1.0]))
+    within = 100.0 * float(np.mean([each.within for each in accepted] or [True]))
     error = 1e3 * float(np.median([each.error for each in accepted] or [np.nan]))
     cells = [case.name, "yes" if stated else "no", markers, f"{shares[0]:.0f}", f"{shares[1]:.0f}", f"{error:.2f}",
              f"{within:.0f}", f"{np.median(surprises or [np.nan]):.1f}" if len(places) > 1 else "-"]  # fmt: skip
