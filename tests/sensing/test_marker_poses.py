@@ -58,6 +58,18 @@ def test_the_stated_uncertainty_is_neither_boast_nor_panic():
     assert 0.3 < np.sqrt(np.mean(np.square(away))) / np.mean(sigma) < 3.0
 
 
+def test_near_markers_lie_where_they_are_within_what_is_said():
+    for k, distance in enumerate((0.26, 0.3, 0.34, 0.38, 0.42)):
+        T = facing([0.3 + 0.05 * k, -0.3, 0.2 * k], [0.01 * k - 0.02, -0.01, distance])
+        (marker,) = find_markers(picture_of([(7, T)], k), "4x4_50")
+        true = CAMERA.project(square_corners(SIDE) @ T.rotation.T + T.translation)
+        middle = (marker.corners - true).mean(axis=0)  # all corners together: what alignment did not see
+        spread = np.kron(np.ones(4) / 4.0, np.eye(2)) @ marker.spread @ np.kron(np.ones(4) / 4.0, np.eye(2)).T
+        assert middle @ np.linalg.solve(spread, middle) < 16.0
+        found = pose_of_square(CAMERA, marker.corners, SIDE, spread=marker.spread)
+        assert np.linalg.norm(found.T_camera_object.translation - T.translation) < 4.0 * found.position_sigma
+
+
 def test_a_marker_seen_from_the_front_is_ambiguous_and_a_tilted_one_is_not():
     for tilt, doubt in ((0.03, True), (0.6, False)):
         T = facing([tilt, 0.0, 0.0], [0.0, 0.0, 1.8])

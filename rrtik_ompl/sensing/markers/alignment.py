@@ -24,7 +24,7 @@ Pixels = NDArray[np.float32]
 
 MIN_LIKENESS = 0.9  # below it the marker is partly covered or the picture is not sharp
 _MAX_CORNER_SHIFT = 0.25  # of a side; inner edges are sometimes found in place of outer ones
-_CELL_PIXELS = (3, 16)  # of a cell in the ideal picture; near its size in the camera's
+_CELL_PIXELS = (3, 26)  # of a cell in the ideal picture; near its size in the camera's: coarser samples lie off
 _RIM_CELLS = 0.5  # width of the white rim that is used; farther out blur mixes in the background
 _DEFAULT_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]
 _SPOTS = _DEFAULT_SPOT * 1.5 ** np.arange(-2, 5)  # that are tried
