@@ -9,6 +9,7 @@ of rounding corners is that of [20].
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.memory import table
+from rrtik_ompl.fast.tables.memory import PlannedTable, TablePlan
 from rrtik_ompl.fast.timing import layout, reference
 from rrtik_ompl.trajectory.cubics import even_parts
 
@@ -89,20 +90,17 @@ class Curve:
         if kernels is None:
             values = reference.sample_curve(self.vertices, self.along, self.directions, self.radii, places)
         else:
-            task = table(
-                {
-                    layout.VERTICES: self.vertices,
-                    layout.ALONG: self.along,
-                    layout.DIRECTIONS: self.directions,
-                    layout.RADII: self.radii,
-                    layout.AT: places,
-                    layout.VALUES: np.empty((len(places), 3 * n)),
-                    layout.WIDEST: np.array([self.radii.max()]),
-                    layout.DOF: n,
-                    layout.COUNT: len(self.along),
-                    layout.PLACES: len(places),
-                }
-            )
+            task = PlannedTable(_plan(len(self.along), n, len(places)))
+            given = {
+                layout.VERTICES: self.vertices.ravel(),
+                layout.ALONG: self.along,
+                layout.DIRECTIONS: self.directions.ravel(),
+                layout.RADII: self.radii,
+                layout.AT: places,
+                layout.WIDEST: self.radii.max(),
+            }
+            for place, numbers in given.items():
+                task[place][:] = numbers
             kernels.sample_curve(task.address)
             values = task[layout.VALUES].reshape(-1, 3 * n)
         return Samples(values)
@@ -145,3 +143,18 @@ class Curve:
         pieces, shares = even_parts(counts)
         places = np.append(knots[pieces] + shares * widths[pieces], self.length)
         return places, np.append(tightest[pieces], np.inf)
+
+
+@lru_cache(maxsize=64)
+def _plan(vertices: int, n: int, places: int) -> TablePlan:
+    """Where a curve of n coordinates and places on it lie in memory."""
+    arrays = {
+        layout.VERTICES: vertices * n,
+        layout.ALONG: vertices,
+        layout.DIRECTIONS: (vertices - 1) * n,
+        layout.RADII: vertices,
+        layout.AT: places,
+        layout.VALUES: 3 * n * places,
+        layout.WIDEST: 1,
+    }
+    return TablePlan(arrays, {layout.DOF: n, layout.COUNT: vertices, layout.PLACES: places})

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.memory import table
+from rrtik_ompl.fast.tables.memory import PlannedTable, TablePlan
 from rrtik_ompl.fast.timing import layout, reference
 from rrtik_ompl.fast.timing.reference import Rows
 from rrtik_ompl.trajectory.curve import Samples
@@ -93,27 +94,38 @@ def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) 
         rows, cap = reference.all_rows(samples.values, limits.velocity, limits.acceleration, bounds.rows, bounds.cap)
         squares = reference.find_squares(rows, cap, grid)
     else:
-        task = table(
-            dict(zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), bounds.rows, strict=True))
-            | {
-                layout.SHAPE: samples.values,
-                layout.VELOCITY: limits.velocity,
-                layout.ACCELERATION: limits.acceleration,
-                layout.CAP: bounds.cap,
-                layout.GRID: grid,
-                layout.SQUARES: np.zeros(len(grid)),
-                layout.REACHED: np.zeros(len(grid)),
-                layout.LINES: np.zeros(
-                    layout.LINE * layout.line_count(len(limits.velocity), bounds.rows.first.shape[1])
-                ),
-                layout.JOINTS: len(limits.velocity),
-                layout.ROWS: bounds.rows.first.shape[1],
-                layout.POINTS: len(grid),
-            }
-        )
+        task = PlannedTable(_plan(len(grid), len(limits.velocity), bounds.rows.first.shape[1]))
+        given = {
+            layout.SHAPE: samples.values.ravel(),
+            layout.VELOCITY: limits.velocity,
+            layout.ACCELERATION: limits.acceleration,
+            layout.CAP: bounds.cap,
+            layout.GRID: grid,
+        }
+        for place, values in given.items():
+            task[place][:] = values
+        for place, rows in zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), bounds.rows, strict=True):
+            task[place][:] = rows.ravel()
         kernels.find_squares(task.address)
         squares = task[layout.SQUARES].copy()
     speeds = np.sqrt(squares)
     with np.errstate(divide="ignore"):
         steps = 2.0 * (grid[1:] - grid[:-1]) / (speeds[1:] + speeds[:-1])
     return PathTiming(grid, squares, np.concatenate([np.zeros(1), np.cumsum(steps)]))
+
+
+@lru_cache(maxsize=64)
+def _plan(points: int, joints: int, rows: int) -> TablePlan:
+    """Where the search for a grid of so many points lies in memory."""
+    arrays = {
+        layout.SHAPE: 3 * joints * points,
+        layout.VELOCITY: joints,
+        layout.ACCELERATION: joints,
+        layout.CAP: points,
+        layout.GRID: points,
+        layout.SQUARES: points,
+        layout.REACHED: points,
+        layout.LINES: layout.LINE * layout.line_count(joints, rows),
+    }
+    arrays |= dict.fromkeys((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), rows * points)
+    return TablePlan(arrays, {layout.JOINTS: joints, layout.ROWS: rows, layout.POINTS: points})
