@@ -13,7 +13,7 @@ from rrtik_ompl.errors import require
 from rrtik_ompl.files.text import known_ending, write_bytes
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory import RateLimits, Trajectory
-from rrtik_ompl.trajectory.motion import JUMP_SHARE
+from rrtik_ompl.trajectory.cubics import JUMP_SHARE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from typing import Any
 
+import numpy as np
+
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, in_file, require
 from rrtik_ompl.files.text import known_ending, read_text
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.trajectory.cubics import are_set_points, in_thirds
 from rrtik_ompl.trajectory.motion import Trajectory
 from rrtik_ompl.trajectory.text import FORMATS, loads
 
@@ -16,8 +19,10 @@ from rrtik_ompl.trajectory.text import FORMATS, loads
 def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
     """Read a motion written by :meth:`Trajectory.save`, or a JointTrajectory message as JSON or YAML.
 
-    Accelerations that lead elsewhere than to the next point (other programs join their points by other curves) are
-    left out: then the motion is the cubic through positions and velocities.
+    Points at a control rate (even steps of 20 ms or less, what ``Trajectory.save(file, rate=...)`` writes) stay what
+    they are, with their velocities and accelerations, and limits are judged at them, as a drive does: ``set_points`` of
+    the motion. Where accelerations lead elsewhere than to the next point (other programs join their points by other
+    curves), three cubics lead there, so that the acceleration does not jump.
 
     Args:
         file: A .json, .yaml or .csv file.
@@ -55,7 +60,16 @@ def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
     if document["accelerations"] is None:
         return plain
     bends = finite_array(document["accelerations"], plain.positions.shape, "trajectory accelerations")
+    points = (plain.times, plain.positions, plain.velocities, bends)
+    dense = are_set_points(*points)
+    if not dense:
+        try:
+            return Trajectory(*points, **names)
+        except InputError:
+            pass
+    clock, *rows = in_thirds(*points)
     try:
-        return Trajectory(plain.times, plain.positions, plain.velocities, bends, **names)
-    except InputError:
+        smooth = Trajectory(clock[:, 0], *rows, **names)
+    except InputError:  # numbers do not suffice
         return plain
+    return smooth.at_set_points(np.arange(0, len(clock), 3)) if dense else smooth

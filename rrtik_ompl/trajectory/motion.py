@@ -16,15 +16,22 @@ from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.files.text import write_text
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory.chords import proof_by_chords
-from rrtik_ompl.trajectory.cubics import ends_of, even_parts, hermite_accelerations, jerks_of
+from rrtik_ompl.trajectory.cubics import (
+    cubic_peaks,
+    ends_of,
+    even_parts,
+    hermite_accelerations,
+    jerks_of,
+    set_point_peaks,
+)
 from rrtik_ompl.trajectory.messages import write_mcap
 from rrtik_ompl.trajectory.text import dumps, written_ending
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import Proof, World
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
 
+END_ERROR = 1e-6  # [s] before the end; a tick there is the end, for no drive takes two points at once
 FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it
-JUMP_SHARE = 1e-6  # of the largest acceleration; a larger difference between two pieces is a jump, its jerk infinite
 
 
 class State(NamedTuple):
@@ -61,6 +68,8 @@ class Trajectory:
         joint_names: Names of the n joints.
         prismatic: Which joints slide, shape (n,).
         robot_name: Name of the robot it is for, or "".
+        set_points: Numbers of the knots that a file had at a control rate, see :func:`load_trajectory`; None if the
+            motion is known between its knots too.
     """
 
     times: Vector
@@ -70,6 +79,7 @@ class Trajectory:
     joint_names: tuple[str, ...]
     prismatic: Mask
     robot_name: str = ""
+    set_points: NDArray[np.int64] | None = None
 
     __reduce__, _repr_html_ = as_value, in_notebook
 
@@ -113,6 +123,7 @@ class Trajectory:
             object.__setattr__(self, name, frozen(value))
         for name in ("joint_names", "prismatic", "robot_name"):
             object.__setattr__(self, name, getattr(path, name))
+        object.__setattr__(self, "set_points", None)
 
     def __repr__(self) -> str:
         return f"Trajectory({len(self.joint_names)} joints, {len(self.times)} knots, {self.duration:.3g} s)"
@@ -149,30 +160,12 @@ class Trajectory:
         return jerks_of(self.times, self.velocities, self.accelerations)
 
     def peaks(self) -> Peaks:
-        """The largest velocity, acceleration and jerk of each joint: exact, not sampled, for every piece is a cubic."""
-        # joints in rows: numpy looks for the largest number along a row much faster than down a column
-        h = self.times[1:] - self.times[:-1]
-        v, a, j = (np.ascontiguousarray(rows.T) for rows in (self.velocities, self.accelerations, self.jerks))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turn = -a[:, :-1] / j
-            between = np.where((turn > 0.0) & (turn < h), v[:, :-1] + 0.5 * turn * a[:, :-1], 0.0)
-        velocity = np.maximum(np.abs(v).max(axis=1), np.abs(between).max(axis=1))
-        ends = a[:, :-1] + h * j
-        apart = np.abs(ends - a[:, 1:])
-        smooth = apart <= self._noise(h)
-        acceleration = np.maximum(np.abs(a).max(axis=1), np.abs(np.where(smooth, 0.0, ends)).max(axis=1))
-        jump = JUMP_SHARE * acceleration.max()
-        rest = np.abs(a[:, [0, -1]]) <= jump  # before its beginning and after its end the arm does not move
-        smooth |= apart <= jump
-        steady = smooth.all(axis=1) & rest.all(axis=1)
-        jerk = np.where(steady, np.abs((a[:, 1:] - a[:, :-1]) / h).max(axis=1), np.inf)
-        return Peaks(velocity, acceleration, jerk)
+        """The largest velocity, acceleration and jerk of each joint: exact, not sampled, for every piece is a cubic.
 
-    def _noise(self, h: Vector) -> Vector:
-        """What rounding of times and velocities does to the acceleration at the end of pieces of durations ``h``."""
-        speed, push = np.abs(self.velocities).max(), np.abs(self.accelerations).max()
-        noise: Vector = 8.0 * np.finfo(np.float64).eps * (speed + self.duration * push) / h
-        return noise
+        With ``set_points``: at these, the jerk by their differences.
+        """
+        at, found = (slice(None), cubic_peaks) if self.set_points is None else (self.set_points, set_point_peaks)
+        return Peaks(*found(self.times[at], self.velocities[at], self.accelerations[at]))
 
     def slowed(self, factor: float) -> Trajectory:
         """The same motion, ``factor`` times as long.
@@ -184,7 +177,14 @@ class Trajectory:
         if not 1e-6 <= k <= 1e6:
             raise InputError(f"factor of a trajectory: expected 1e-6 to 1e6, got {k:g}")
         rates = (self.velocities / k, self.accelerations / k**2)
-        return Trajectory(self.times * k, self.positions, *rates, **self._names())
+        slow = Trajectory(self.times * k, self.positions, *rates, **self._names())
+        return slow if self.set_points is None else slow.at_set_points(self.set_points)
+
+    def at_set_points(self, knots: NDArray[np.int64]) -> Trajectory:
+        """The same motion, known at these knots alone: limits are judged there."""
+        found = Trajectory(self.times, self.positions, self.velocities, self.accelerations, **self._names())
+        object.__setattr__(found, "set_points", frozen(knots, np.int64))
+        return found
 
     def path(self) -> JointPath:
         """The knots as waypoints of a path."""
@@ -244,7 +244,7 @@ class Trajectory:
         """
         step = 1.0 / positive(rate, "control rate of a trajectory")
         at_most(self.duration / step, MOST_ROWS, "times of a trajectory at that rate")
-        clock = np.append(np.arange(0.0, self.duration - 1e-9 * step, step), self.duration)
+        clock = np.append(np.arange(0.0, self.duration - min(END_ERROR, 1e-3 * step), step), self.duration)
         return clock, self(clock)
 
     def save(self, file: str | os.PathLike[str], *, rate: float | None = None, accelerations: bool = True) -> None:
@@ -264,8 +264,9 @@ class Trajectory:
             InputError: If the ending is another one or the file cannot be written.
         """
         ending = written_ending(file)
-        state = State(self.positions, self.velocities, self.accelerations)
-        clock, state = (self.times, state) if rate is None else self.sampled(rate)
+        at = slice(None) if self.set_points is None else self.set_points
+        state = State(self.positions[at], self.velocities[at], self.accelerations[at])
+        clock, state = (self.times[at], state) if rate is None else self.sampled(rate)
         columns = [(column + 0.0).tolist() for column in (clock, *state)]
         if ending == ".mcap":
             write_mcap(file, self.robot_name, self.joint_names, columns)

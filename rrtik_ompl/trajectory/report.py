@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.copies import in_one_line
 from rrtik_ompl.errors import require
+from rrtik_ompl.trajectory.cubics import JUMP_SHARE
 from rrtik_ompl.trajectory.limits import RateLimits
-from rrtik_ompl.trajectory.motion import JUMP_SHARE, Trajectory
+from rrtik_ompl.trajectory.motion import Trajectory
 from rrtik_ompl.units import shown_unit
 
 QUIET_SHARE = 0.02  # of a joint's largest acceleration; what is less is no push
@@ -98,9 +99,11 @@ def motion_report(motion: Trajectory, limits: RateLimits) -> MotionReport:
 
 def switches(motion: Trajectory) -> Vector:
     """How often the acceleration of each joint changes its sign, shape (n,)."""
-    h = np.diff(motion.times)[:, None]
-    ends = motion.accelerations[:-1] + h * motion.jerks
-    both = np.stack([motion.accelerations[:-1], ends], axis=1).reshape(-1, ends.shape[1])
+    if motion.set_points is not None:
+        both = motion.accelerations[motion.set_points]
+    else:
+        ends = motion.accelerations[:-1] + np.diff(motion.times)[:, None] * motion.jerks
+        both = np.stack([motion.accelerations[:-1], ends], axis=1).reshape(-1, ends.shape[1])
     loud = np.abs(both) > QUIET_SHARE * np.abs(both).max(axis=0)
     return np.array(
         [np.count_nonzero(np.diff(np.sign(column[used]))) for column, used in zip(both.T, loud.T, strict=True)],

@@ -15,6 +15,8 @@ from rrtik_ompl.trajectory import RateLimits, Trajectory, load_trajectory, motio
 from rrtik_ompl.viewer import view
 
 LIMITS = RateLimits([1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [20.0, 20.0, 20.0])
+ODD = RateLimits([1.07] * 3, [2.3] * 3, [19.0] * 3)  # with them phases of a motion end between two ticks of a drive
+ROWS = [[0.0, 0.0, 0.0], [0.97, -0.53, 0.21], [0.3, 0.4, 0.0]]
 
 
 @pytest.fixture(scope="module")
@@ -126,3 +128,56 @@ def test_a_timed_motion_is_played_in_real_time(tmp_path, robot, motion):
 def test_a_factor_that_is_none_is_refused(factor):
     with pytest.raises(InputError, match="factor of a trajectory"):
         Trajectory([0.0, 1.0], [[0.0], [1.0]], [[0.0], [0.0]]).slowed(factor)
+
+
+@pytest.mark.parametrize("rate", [50.0, 125.0, 300.0, 1000.0])
+@pytest.mark.parametrize("ending", [".json", ".csv", ".yaml", ".ros.json"])
+def test_set_points_stay_what_they_are_and_keep_the_limits_of_their_motion(tmp_path, robot, ending, rate):
+    motion = time_parameterize(JointPath.of(robot, ROWS), ODD)
+    file, again = tmp_path / f"motion{ending}", tmp_path / f"again{ending}"
+    motion.save(file, rate=rate)
+    found = load_trajectory(file, robot)
+    clock, state = motion.sampled(rate)
+    at = found.set_points
+    np.testing.assert_allclose(found.times[at], clock, rtol=0.0, atol=1e-9)
+    for rows, wanted in zip((found.positions, found.velocities, found.accelerations), state, strict=True):
+        np.testing.assert_array_equal(rows[at], wanted)
+    np.testing.assert_allclose(found(clock).positions, state.positions, rtol=0.0, atol=2e-9)
+    dense = np.linspace(0.0, motion.duration, 5000)
+    assert np.abs(found(dense).positions - motion(dense).positions).max() < 20.0 / rate**3
+    report = motion_report(found, ODD)
+    assert report.kept
+    assert not report.jump.any()
+    assert not motion_report(found, RateLimits(ODD.velocity, ODD.acceleration, 0.9 * ODD.jerk)).kept
+    found.save(again)
+    assert again.read_text() == file.read_text()
+    assert found.slowed(2.0).peaks().velocity == pytest.approx(0.5 * found.peaks().velocity)
+
+
+def test_points_that_are_far_from_each_other_are_no_set_points(tmp_path, robot):
+    motion = time_parameterize(JointPath.of(robot, ROWS), ODD)
+    motion.save(tmp_path / "sparse.json", rate=10.0)
+    sparse = load_trajectory(tmp_path / "sparse.json")
+    clock, state = motion.sampled(10.0)
+    assert sparse.set_points is None
+    for found, wanted in zip(sparse(clock), state, strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-9)
+    assert not sparse.jumps().max() > 1e-6
+    assert not motion_report(sparse, ODD).kept
+
+
+def test_set_points_of_a_motion_that_jumps_exceed_a_jerk_limit(tmp_path, robot):
+    hard = time_parameterize(JointPath.of(robot, ROWS), RateLimits(1.07, 2.3))
+    hard.save(tmp_path / "hard.csv", rate=100.0)
+    found = load_trajectory(tmp_path / "hard.csv")
+    assert found.set_points is not None
+    assert motion_report(found, RateLimits(1.07, 2.3)).kept
+    assert not motion_report(found, ODD).kept
+
+
+def test_a_tick_just_before_the_end_is_the_end(tmp_path, robot):
+    motion = time_parameterize(JointPath.of(robot, ROWS), LIMITS)
+    assert 3.1 < motion.duration < 3.1 + 1e-9
+    assert np.diff(motion.sampled(1000.0)[0]).min() > 0.9e-3
+    motion.save(tmp_path / "motion.yaml", rate=1000.0)
+    assert load_trajectory(tmp_path / "motion.yaml").duration == pytest.approx(3.1)
