@@ -168,7 +168,8 @@ class Follower:
         """Follow to the end, or to a stop; Ctrl-C stops within limits.
 
         After a tick that came late the motion goes on where it was, a few periods at most further: it falls behind the
-        clock, and the arm is not told to jump.
+        clock, and the arm is not told to jump. An arm that is not where it was told to be, or whose link cannot say
+        where it is, is stopped within limits; what ``command`` raises ends following at once.
 
         Args:
             clock: Tells the time [s].
@@ -180,8 +181,8 @@ class Follower:
                 sleep(max(0.0, before + self._step - clock()))
                 told = self._motion(self._pace.place).positions
                 now = clock()
-                if away := self._away(self._link.positions(), told):
-                    self.stop(f"{away} away from where it was told to be")
+                if fault := self._fault(told):
+                    self.stop(fault)
                 passed, before = max(now - before, 1e-6), now
                 due = min(passed, MOST_PERIODS * self._step)
                 self._late += passed - due
@@ -206,6 +207,18 @@ class Follower:
             raise InputError(f"the arm has {here.size} joints, the trajectory moves {told.size}: it is another robot's")
         if away := self._away(here, told):
             raise InputError(f"the trajectory begins elsewhere: {away} rad or m away; move the arm there first")
+
+    def _fault(self, told: Vector) -> str:
+        """Why an arm that was told to be at ``told`` has to stop; "" if it need not.
+
+        Whatever a link raises here, the arm is brought to rest by the set points that it may still take.
+        """
+        try:
+            here = finite_array(self._link.positions(), told.shape, "positions of the arm")
+        except Exception as error:
+            return f"where the arm is cannot be read: {' '.join(str(error).split()) or type(error).__name__}"
+        away = self._away(here, told)
+        return away and f"{away} away from where it was told to be"
 
     def _away(self, here: Vector, told: Vector) -> str:
         """Which joint is farthest from where it was told to be, and how far; "" if all are near enough."""

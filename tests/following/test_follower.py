@@ -116,6 +116,38 @@ def test_run_keeps_time_and_stops_an_arm_that_does_not_follow():
     assert "\n" not in found.reason
 
 
+@pytest.mark.parametrize(
+    ("told", "words"),
+    [
+        (ConnectionError("cable\nout"), "cable out"),
+        (TimeoutError(), "TimeoutError"),
+        (np.zeros(2), "shape"),
+        (None, "positions"),
+        ([np.nan, 0.0, 0.0], "finite"),
+    ],
+)
+def test_an_arm_that_cannot_say_where_it_is_comes_to_rest_within_limits(told, words):
+    class Mute(SimulatedLink):
+        def positions(self):
+            if len(self.sent) < 30:
+                return super().positions()
+            if isinstance(told, Exception):
+                raise told
+            return told
+
+    now, link = [0.0], Mute(ROBOT, PATH.start)
+    follower = Follower(MOTION, link, limits=LIMITS, rate=1.0 / TICK)
+    found = follower.run(clock=lambda: now[0], sleep=lambda seconds: now.__setitem__(0, now[0] + max(seconds, 1e-4)))
+    assert follower.ended
+    assert found.place < MOTION.duration
+    assert "cannot be read" in found.reason
+    assert words in found.reason
+    assert "\n" not in found.reason
+    rows = np.vstack([PATH.start, *(q for _, q in link.sent)])
+    assert_within_limits(rows)
+    assert np.abs(rows[-1] - rows[-2]).max() <= 1e-6
+
+
 def test_limits_that_the_trajectory_exceeds_are_refused():
     """No change of pace would keep them, so a stop would never begin."""
     for share, what in ((0.3, "velocity"), (1.0 - 1e-5, "velocity")):
