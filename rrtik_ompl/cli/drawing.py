@@ -33,7 +33,9 @@ def show(
             help="A shipped problem (rrtik list problems), a YAML file, or a robot.", autocompletion=shown_names
         ),
     ],
-    path: Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")] = None,
+    path: Annotated[
+        Path | None, typer.Argument(help="A path file: .json, .csv or .txt. Or a timed motion: it plays in real time.")
+    ] = None,
     scene: Annotated[Path | None, typer.Option(help="What stands around a robot: a YAML file.")] = None,
     before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
@@ -53,10 +55,11 @@ def show(
     check_target(html, (".html", ".htm"))
     check_target(film, (".gif", ".mp4", ".png"))
     from rrtik_ompl import load_path
+    from rrtik_ompl.trajectory.load import load_motion_or_path
     from rrtik_ompl.viewer import view
 
     question, robot, fault = _subject(problem, scene)
-    route = None if path is None else load_path(path, robot)
+    route = None if path is None else load_motion_or_path(path, robot)
     earlier = None if before is None else load_path(before, robot)
     title = fault or None
     if film is not None:

@@ -61,7 +61,9 @@ def checked_object(document: object, kind: str, key: str) -> dict[str, Any]:
         InputError: If it is something else; the message names the key.
     """
     if not isinstance(document, dict) or key not in document:
-        raise InputError(f"expected an object with the key '{key}'; {_asked(kind)}")
+        timed = key == "waypoints" and isinstance(document, dict) and "points" in document
+        remedy = "this is a timed motion: load_trajectory() reads it, rrtik show draws it" if timed else _asked(kind)
+        raise InputError(f"expected an object with the key '{key}'; {remedy}")
     _check_heads(document, kind)
     return document
 

@@ -10,10 +10,12 @@ import numpy as np
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, in_file, require
 from rrtik_ompl.files.text import known_ending, read_text
+from rrtik_ompl.path import FORMATS as PATH_FORMATS
+from rrtik_ompl.path import JointPath, load_path
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.cubics import are_set_points, in_thirds
 from rrtik_ompl.trajectory.motion import Trajectory
-from rrtik_ompl.trajectory.text import FORMATS, loads
+from rrtik_ompl.trajectory.text import FORMATS, holds_motion, loads
 
 
 def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
@@ -48,6 +50,17 @@ def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) ->
         return found
     except InputError as error:
         raise in_file(file, error) from None
+
+
+def load_motion_or_path(file: str | os.PathLike[str], robot: Robot) -> Trajectory | JointPath:
+    """A timed motion or a path, whichever the file holds.
+
+    Raises:
+        InputError: If it holds neither, or what does not fit the robot.
+    """
+    ending = known_ending(file, (*PATH_FORMATS, ".yaml"), "path or trajectory")
+    is_motion = ending == ".yaml" or (ending != ".txt" and holds_motion(read_text(file), ending))
+    return load_trajectory(file, robot) if is_motion else load_path(file, robot)
 
 
 def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:

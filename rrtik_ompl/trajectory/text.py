@@ -62,6 +62,13 @@ def loads(text: str, ending: str) -> dict[str, Any]:
     return _from_message(json_object(text, KIND, "points") if ending == ".json" else from_yaml(text))
 
 
+def holds_motion(text: str, ending: str) -> bool:
+    """Whether the text of a .json or .csv file is a trajectory, well formed or not, rather than a path."""
+    if ending == ".csv":
+        return text.startswith("time,") and " velocity" in text.partition("\n")[0]
+    return '"points"' in text and '"waypoints"' not in text
+
+
 def _header(names: Iterable[str]) -> list[str]:
     own = list(names)
     return ["time", *own, *(f"{name} velocity" for name in own), *(f"{name} acceleration" for name in own)]
