@@ -104,8 +104,8 @@ def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) 
         }
         for place, values in given.items():
             task[place][:] = values
-        for place, rows in zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), bounds.rows, strict=True):
-            task[place][:] = rows.ravel()
+        for place, further in zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), bounds.rows, strict=True):
+            task[place][:] = further.ravel()
         kernels.find_squares(task.address)
         squares = task[layout.SQUARES].copy()
     speeds = np.sqrt(squares)

@@ -9,8 +9,8 @@ import numpy as np
 
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.errors import InputError, in_file, require
+from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import known_ending, read_text
-from rrtik_ompl.path import FORMATS as PATH_FORMATS
 from rrtik_ompl.path import JointPath, load_path
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.cubics import are_set_points, in_thirds
