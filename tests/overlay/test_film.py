@@ -148,7 +148,7 @@ def test_what_cannot_be_drawn_is_one_line(capsys, tmp_path, monkeypatch, change,
 @pytest.mark.slow
 def test_the_commands_of_the_page_on_sensing_lead_from_photographs_to_a_film(capsys, tmp_path, monkeypatch):
     page = (ROOT / "docs" / "sensing.md").read_text()
-    (block,) = (b for b in page.split("```")[1::2] if "rrtik markers sense" in b)
+    (block,) = (b for b in page.split("```")[1::2] if "rrtik overlay" in b)
     lines = [line for line in block.replace("\\\n", " ").splitlines() if line.startswith("rrtik ")]
     monkeypatch.chdir(tmp_path)
     for line in lines:
