@@ -129,12 +129,13 @@ def _one_joint(problem: rrtik.Problem, world: rrtik.World) -> Callable[[int], Ma
 
 @dataclass(frozen=True)
 class Answers:
-    """How many configurations and motions were asked about, and how many answers differ."""
+    """How many configurations and motions were asked about, how many answers differ, and of these say "free"."""
 
     configurations: int
     motions: int
     free: int
     differ: int
+    rash: int
 
 
 def answers_of(robot: rrtik.Robot, configurations: int, rng: np.random.Generator) -> Answers:
@@ -169,12 +170,9 @@ def answers_of(robot: rrtik.Robot, configurations: int, rng: np.random.Generator
     found = in_node(plan, moves=moves)
     got, got_motions = ("".join(found[key]) for key in ("free", "motions"))
     free, motions = np.concatenate(wanted), np.concatenate(wanted_motions)
-    differ = _differing(got, free) + _differing(got_motions, motions)
-    return Answers(len(free), len(motions), int(free.sum()), differ)
-
-
-def _differing(digits: str, wanted: Mask) -> int:
-    return int((np.array(list(digits)) != np.where(wanted, "1", "0")).sum())
+    said = np.array(list(got + got_motions)) == "1"
+    wrong = said != np.concatenate([free, motions])
+    return Answers(len(free), len(motions), int(free.sum()), int(wrong.sum()), int((wrong & said).sum()))
 
 
 def _rounds(shapes: dict[str, list[float]]) -> Iterator[tuple[int, tuple[int, tuple[str, list[float]]]]]:
