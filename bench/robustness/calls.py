@@ -79,8 +79,9 @@ def functions() -> list[tuple[str, Callable[..., Any]]]:
     found = [(name, getattr(rrtik, name)) for name in names]
     for thing in corpus():
         if type(thing).__module__.startswith("rrtik_ompl"):
-            methods = inspect.getmembers(thing, inspect.ismethod)
-            found += [(f"{type(thing).__name__}.{name}", each) for name, each in methods if not name.startswith("_")]
+            names = [name for name in dir(thing) if not name.startswith("_")]  # of Python 3.10 some others raise
+            methods = [(name, each) for name in names if inspect.ismethod(each := getattr(thing, name))]
+            found += [(f"{type(thing).__name__}.{name}", each) for name, each in methods]
     return list(dict(found).items())
 
 
