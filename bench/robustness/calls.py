@@ -80,7 +80,7 @@ def functions() -> list[tuple[str, Callable[..., Any]]]:
     for thing in corpus():
         if type(thing).__module__.startswith("rrtik_ompl"):
             names = [name for name in dir(thing) if not name.startswith("_")]  # of Python 3.10 some others raise
-            methods = [(name, each) for name in names if inspect.ismethod(each := getattr(thing, name))]
+            methods = [(name, each) for name in names if inspect.ismethod(each := getattr(thing, name, None))]
             found += [(f"{type(thing).__name__}.{name}", each) for name, each in methods]
     return list(dict(found).items())
 
