@@ -60,6 +60,11 @@ def quaternion_xyzw(placement: Any) -> Vector:
     return -quaternion if quaternion[3] < 0.0 else quaternion
 
 
+def pose_row(placement: pin.SE3) -> Vector:
+    """A pose as x, y, z [m] and the quaternion x, y, z, w, shape (7,)."""
+    return np.concatenate([placement.translation, quaternion_xyzw(placement)])
+
+
 def apart(first: pin.SE3, second: pin.SE3) -> tuple[float, float]:
     """How far two poses are apart [m], and by which angle they are turned to each other [rad]."""
     off = first.actInv(second)

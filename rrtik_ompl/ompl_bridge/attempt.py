@@ -40,7 +40,14 @@ ITERATION_LIMIT = "max_iterations"
 EFFORT_ITERATIONS = 1000
 EFFORT_MOTIONS = 5000
 
+
 INVALID = (ob.PlannerStatus.INVALID_START, ob.PlannerStatus.INVALID_GOAL)
+
+
+def attempt_seeds(seed: int, restarts: int) -> list[int]:
+    """Of the first attempt and of each that begins anew."""
+    seeds: list[int] = np.random.SeedSequence(seed).generate_state(restarts + 1, np.uint32).tolist()
+    return seeds
 
 
 @dataclass(frozen=True, slots=True, eq=False)

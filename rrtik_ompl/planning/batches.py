@@ -16,19 +16,19 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, ITERATION_LIMIT
+from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, ITERATION_LIMIT, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, reseed, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import shared_space
 from rrtik_ompl.path import JointPath
+from rrtik_ompl.planning.one_planner import load_kernels_for
 from rrtik_ompl.planning.outcome import Plan
 from rrtik_ompl.problem import Problem, known_problem
 from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import Room, rooms_between
-from rrtik_ompl.world.proof import PROOF_KERNELS, Proof
+from rrtik_ompl.world.proof import Proof
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,13 +73,13 @@ def plans_together(
     plans: list[Plan | None] = [None] * len(queries)
     if not (queries and serves(world, factory)):
         return plans
-    begin = time.perf_counter()
-    for kernels in (*traits_of(factory).kernels, PROOF_KERNELS):
-        library(kernels)
     ends = np.array([[each.start, each.goal.q] for each in queries])
+    any_problem = known_problem(world, *ends[0])
+    load_kernels_for(any_problem, factory)
+    begin = time.perf_counter()
     free = _usable(world, ends)
     rooms = dict(zip(np.flatnonzero(free).tolist(), rooms_between(world, ends[free], None), strict=True))
-    searcher = _Searcher(world, factory, name, known_problem(world, *ends[0]), parameters, seconds)
+    searcher = _Searcher(world, factory, name, any_problem, parameters, seconds)
     tried = {k: searcher.path(queries[k], restarts) for k, room in rooms.items() if room is not None}
     found = {k: each for k, each in tried.items() if each is not None}
     proofs = _proofs(world, {k: (each.path.waypoints, rooms[k]) for k, each in found.items()})
@@ -130,8 +130,7 @@ class _Searcher:
 
     def path(self, query: Query, restarts: int) -> _Found | None:
         """What the first attempt of `plan()` finds."""
-        seeds = np.random.SeedSequence(query.seed).generate_state(restarts + 1, np.uint32)
-        reseed(self._planner, int(seeds[0]))
+        reseed(self._planner, attempt_seeds(query.seed, restarts)[0])
         end, goal = time.perf_counter() + self._seconds, query.goal.q
         ends = query.start[None], goal[None]
         _, rows = self._planner.solve_rows(*ends, self._bounds, lambda: time.perf_counter() > end, checked=True)

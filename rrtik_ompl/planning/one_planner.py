@@ -5,12 +5,11 @@ from __future__ import annotations
 import time
 from types import MappingProxyType
 
-import numpy as np
-
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.methods import load_kernels
+from rrtik_ompl.ompl_bridge.attempt import attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import check_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, planners_with, traits_of
 from rrtik_ompl.planning.outcome import Plan, Request
@@ -34,15 +33,14 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
     """
     if problem.constraints:
         _refuse_if_it_breaks_constraints(name, factory)
-    children = np.random.SeedSequence(request.seed).generate_state(request.restarts + 1, np.uint32)
-    _load_kernels(problem, factory)
+    load_kernels_for(problem, factory)
     begin = time.perf_counter()
     search = Search(
         problem,
         factory,
         name,
         begin + request.seconds,
-        children.tolist(),
+        attempt_seeds(request.seed, request.restarts),
         request.parameters,
         request.proof,
         request.clearance,
@@ -62,7 +60,7 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
     return Plan(path is not None, path, reason, elapsed, name, request.seed, counts, problem=problem)
 
 
-def _load_kernels(problem: Problem, factory: PlannerFactory) -> None:
+def load_kernels_for(problem: Problem, factory: PlannerFactory) -> None:
     """Load what the search will use: compiling it for the first time is no part of planning."""
     if not isinstance(problem.goal, JointGoal):
         load_kernels(problem.robot)

@@ -14,7 +14,7 @@ from rrtik_ompl.choices import TickEvent
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JOINT_TOLERANCE, JointGoal
 from rrtik_ompl.ik.goal_configurations import goal_configurations
-from rrtik_ompl.poses import quaternion_xyzw
+from rrtik_ompl.poses import pose_row
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.feed import Feed, MotionTracker, required_distances
@@ -230,7 +230,7 @@ class Loop:
         path: Matrix | None = None, proven: bool | None = None,
     ) -> None:  # fmt: skip
         poses = {
-            o.name: np.concatenate([o.pose.translation, quaternion_xyzw(o.pose)])
+            o.name: pose_row(o.pose)
             for o in self._world.scene.obstacles
             if not np.array_equal(o.pose.homogeneous, self._first[o.name].homogeneous)
         }

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.poses import quaternion_xyzw
+from rrtik_ompl.poses import pose_row
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name
@@ -49,7 +49,7 @@ def fingers_of(plan: TaskPlan, drawn: Robot, at: Vector) -> Fingers:
     for (joint, name), placement in first.items():
         moved = [found[joint, name] * placement.inverse() for found in places]
         if any(np.abs(pin.log6(shift).vector).max() > NO_SHIFT for shift in moved):
-            rows = [np.concatenate([shift.translation, quaternion_xyzw(shift)]) for shift in moved]
+            rows = [pose_row(shift) for shift in moved]
             poses[nodes[joint], node_name(name)] = np.array(rows)
     return Fingers(poses, at)
 

@@ -26,10 +26,10 @@ from rrtik_ompl.fast.tables.solid_tables import SLACK_PER_METRE as SOLID_SLACK
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
 from rrtik_ompl.fast.wasm.page_kernels import page_kernels
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.poses import pose
+from rrtik_ompl.poses import pose, pose_row
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.problem_files.problem import problem_data
-from rrtik_ompl.scene import Obstacle, TimedPoses
+from rrtik_ompl.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page_fixed import standing_parts
@@ -59,8 +59,8 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     if problem.constraints:
         return None
     document = _document(problem)
-    problem, courses = _standing_still(problem)
-    problem, spare = _with_spares(problem, side)
+    scene, courses = _standing_still(problem.world.scene)
+    problem, spare = _with_spares(problem, scene, side)
     room = room_between(problem.world, np.stack([problem.start, goal]), None) or Room(0.0, 0.0)
     world = leaving_room(densely_checked(problem).world, room)
     module, motions = page_kernels(), world.motions
@@ -112,27 +112,23 @@ def _document(problem: Problem) -> dict[str, Any] | None:
         return None
 
 
-def _standing_still(problem: Problem) -> tuple[Problem, list[dict[str, Any]]]:
-    """The problem at time 0 with obstacles that stay there, and how they would move on."""
-    scene = problem.world.scene.at(0.0)
+def _standing_still(scene: Scene) -> tuple[Scene, list[dict[str, Any]]]:
+    """The scene at time 0 with obstacles that stay there, and how they would move on."""
+    scene = scene.at(0.0)
     courses = [_course(obstacle) for obstacle in scene.obstacles if obstacle.motion is not None]
-    if not courses:
-        return problem, courses
-    scene = replace(scene, obstacles=tuple(replace(obstacle, motion=None) for obstacle in scene.obstacles))
-    return problem.with_world(problem.world.with_scene(scene)), courses
+    return replace(scene, obstacles=tuple(replace(obstacle, motion=None) for obstacle in scene.obstacles)), courses
 
 
 def _course(obstacle: Obstacle) -> dict[str, Any]:
     if isinstance(obstacle.motion, TimedPoses):
-        poses = [pose.homogeneous.ravel().tolist() for pose in obstacle.motion.poses]
+        poses = [pose_row(station).tolist() for station in obstacle.motion.poses]
         return {"name": obstacle.name, "times": obstacle.motion.times.tolist(), "poses": poses}
     velocity = np.zeros(3) if obstacle.motion is None else obstacle.motion.velocity
     return {"name": obstacle.name, "velocity": velocity.tolist()}
 
 
-def _with_spares(problem: Problem, side: float) -> tuple[Problem, set[str]]:
-    """The problem with simple shapes far away, of which the page can take some, and their names."""
-    scene = problem.world.scene
+def _with_spares(problem: Problem, scene: Scene, side: float) -> tuple[Problem, set[str]]:
+    """The problem in a scene and simple shapes far away, of which the page can take some, and their names."""
     taken = {obstacle.name for obstacle in scene.obstacles} | {held.name for held in scene.attached}
     shapes = {
         "box": Box([side] * 3),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.poses import quaternion_xyzw
+from rrtik_ompl.poses import pose_row
 from rrtik_ompl.replanning.record import ReplanRun, Tick
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
@@ -58,7 +58,7 @@ def _motions(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
 def _places(obstacle: Obstacle, ticks: list[Tick], frame: Frame) -> dict[str, Any]:
     """Where an obstacle is drawn in its own frame, and where that frame is in each tick."""
     _, own = obstacle_look(obstacle, frame)
-    rest = np.concatenate([obstacle.pose.translation, quaternion_xyzw(obstacle.pose)])
+    rest = pose_row(obstacle.pose)
     poses = np.array([tick.poses.get(obstacle.name, rest) for tick in ticks])
     return {"placement": own.ravel().tolist(), "poses": np.round(poses, DIGITS).tolist()}
 

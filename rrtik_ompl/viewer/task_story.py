@@ -10,7 +10,7 @@ from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import quaternion_xyzw
+from rrtik_ompl.poses import pose_row
 from rrtik_ompl.replanning.record import ReplanRun, Tick
 from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.timed import time_task
@@ -110,4 +110,4 @@ def _poses(world: World, q: Vector) -> dict[str, Vector]:
     """Where obstacles and what is held are: x, y, z and quaternion x, y, z, w."""
     places = {item.name: world.robot.fk(q, item.link) * item.pose for item in world.scene.attached}
     places |= {item.name: item.pose for item in world.scene.obstacles}
-    return {name: np.concatenate([pose.translation, quaternion_xyzw(pose)]) for name, pose in places.items()}
+    return {name: pose_row(pose) for name, pose in places.items()}

@@ -90,7 +90,7 @@ function showState() {
 }
 
 function fillSelection() {
-  const names = [...Object.keys(ENDS), ...planning.obstacles.filter((_, k) => state.obstacles[k].shown && !staysOnCourse(k)).map(({ name }) => name)];
+  const names = [...Object.keys(ENDS), ...planning.obstacles.filter((_, k) => isMovable(k)).map(({ name }) => name)];
   document.getElementById("plan-selected").replaceChildren(...names.map((name) => make("option", { value: name, textContent: name })));
   select(names.includes(selected) ? selected : "goal");
 }

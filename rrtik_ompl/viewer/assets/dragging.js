@@ -47,7 +47,7 @@ function pointerAt(event) {
 
 function thingsToDrag() {
   const ends = Object.keys(ENDS).map((end) => ({ name: end, object: node(ENDS[end]) }));
-  const solids = planning.obstacles.map((obstacle, k) => ({ name: obstacle.name, object: node("obstacles", obstacle.node), shown: state.obstacles[k].shown && !staysOnCourse(k) }));
+  const solids = planning.obstacles.map((obstacle, k) => ({ name: obstacle.name, object: node("obstacles", obstacle.node), shown: isMovable(k) }));
   return [...ends, ...solids].filter(({ object, shown }) => shown !== false && object.visible);
 }
 

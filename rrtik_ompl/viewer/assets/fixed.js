@@ -36,10 +36,9 @@ const sameNumbers = (a, b) => a.every((value, k) => value === b[k]);
 
 /** The part of the arm that an obstacle touches where it is now, or cannot be said not to; null if none. Where it was when the page was made, Python has looked. */
 function partTouched(plan, obstacle, pose) {
-  const made = plan.obstacles[plan.obstacles.findIndex(({ name }) => name === obstacle.name)];
+  const made = plan.obstacles.find(({ name }) => name === obstacle.name);
   if (sameNumbers(pose, made.pose) && sameNumbers(obstacle.sizes, made.sizes)) return null;
-  const corners = obstacle.corners.map((corner) => [0, 1, 2].map((i) => pose[4 * i] * corner[0] + pose[4 * i + 1] * corner[1] + pose[4 * i + 2] * corner[2] + pose[4 * i + 3]));
-  const solid = { corners, axis: column(pose, 2), disc: obstacle.disc };
+  const solid = { corners: placedCorners(obstacle, pose), axis: column(pose, 2), disc: obstacle.disc };
   const touches = (other) => !surelyApart(solid, other, obstacle.radius + obstacle.margin + other.radius);
   return plan.fixed.find(({ meets, solids }) => meets.includes(obstacle.name) && solids.some(touches))?.name ?? null;
 }

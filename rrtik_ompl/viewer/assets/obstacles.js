@@ -76,15 +76,20 @@ function placePrimitive(kernels, tableName, obstacle, pose, grow) {
   placeBlock(kernels, table, row);
 }
 
+/** The corners of an obstacle's core where it is. */
+function placedCorners({ corners }, pose) {
+  return corners.map((corner) => [0, 1, 2].map(
+    (i) => pose[4 * i] * corner[0] + pose[4 * i + 1] * corner[1] + pose[4 * i + 2] * corner[2] + pose[4 * i + 3],
+  ));
+}
+
 function placeSolid(kernels, obstacle, pose) {
   const names = kernels.plan.names.table;
   const table = kernels.table(kernels.world.get("STANDING_SOLIDS"), names);
   const span = table.get("SPANS") / LANE_BYTES + names.SPAN_INTS * obstacle.place;
   const solid = kernels.ints[span + names.AROUND_FIRST];
   const block = kernels.ints[table.get("SOLIDS") / LANE_BYTES + names.SOLID_INTS * solid + names.FIRST_BLOCK];
-  const corners = obstacle.corners.map((corner) => [0, 1, 2].map(
-    (i) => pose[4 * i] * corner[0] + pose[4 * i + 1] * corner[1] + pose[4 * i + 2] * corner[2] + pose[4 * i + 3],
-  ));
+  const corners = placedCorners(obstacle, pose);
   const radius = obstacle.radius + obstacle.margin;
   const [low, high] = [Math.min, Math.max].map((pick) => [0, 1, 2].map((i) => pick(...corners.map((corner) => corner[i]))));
   const middle = low.map((value, i) => 0.5 * (value + high[i]));

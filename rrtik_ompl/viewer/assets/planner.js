@@ -114,11 +114,16 @@ function undo() {
   changed();
 }
 
+/** Where the kernels find an obstacle, in the size that it has now. */
+const putInTables = (k, pose) => placeObstacle(kernels, resized(planning.obstacles[k], state.obstacles[k].sizes), pose);
+
+/** Whether a person can take hold of an obstacle. */
+const isMovable = (k) => state.obstacles[k].shown && !staysOnCourse(k);
+
 function applyObstacle(k) {
   const kept = state.obstacles[k];
   const pose = poseNow(k);
-  const placed = kept.shown ? pose : pose.map((value, n) => (n === 11 ? value - AWAY : value));
-  placeObstacle(kernels, resized(planning.obstacles[k], kept.sizes), placed);
+  putInTables(k, kept.shown ? pose : pose.map((value, n) => (n === 11 ? value - AWAY : value)));
   moveDrawing(k);
 }
 

@@ -13,14 +13,12 @@ function poseAt(k, time) {
   if (!course) return pose;
   if (course.velocity) return pose.map((value, n) => (n % 4 === 3 && n < 12 ? value + time * course.velocity[(n - 3) / 4] : value));
   const after = course.times.findIndex((stamp) => stamp > time);
-  if (after <= 0) return course.poses[after === 0 ? 0 : course.poses.length - 1];
-  const share = (time - course.times[after - 1]) / (course.times[after] - course.times[after - 1]);
-  const [a, b] = [course.poses[after - 1], course.poses[after]];
-  const turn = new THREE.Quaternion().setFromRotationMatrix(rowMajor(a)).slerp(new THREE.Quaternion().setFromRotationMatrix(rowMajor(b)), share);
-  const spot = new THREE.Vector3(...column(a, 3)).lerp(new THREE.Vector3(...column(b, 3)), share);
-  return new THREE.Matrix4().compose(spot, turn, new THREE.Vector3(1, 1, 1)).transpose().elements.slice();
+  if (after <= 0) return rowsOf(poseBetween(course.poses, after === 0 ? 0 : course.poses.length - 1));
+  const [from, to] = [course.times[after - 1], course.times[after]];
+  return rowsOf(poseBetween(course.poses, after - 1 + (time - from) / (to - from)));
 }
 
+const rowsOf = (matrix) => matrix.transpose().elements.slice();
 const poseNow = (k) => poseAt(k, clock.time);
 const staysOnCourse = (k) => courses.get(k)?.times !== undefined;
 
@@ -30,10 +28,10 @@ function ifTheyGoOn(question) {
     const now = poseNow(k);
     const further = clock.step > 0 ? HORIZON / clock.step : 0;
     const guessed = now.map((value, n) => (n % 4 === 3 ? value + further * (value - before[n]) : value));
-    placeObstacle(kernels, resized(planning.obstacles[k], state.obstacles[k].sizes), guessed);
+    putInTables(k, guessed);
   }
   const answer = question();
-  for (const k of clock.seen.keys()) placeObstacle(kernels, resized(planning.obstacles[k], state.obstacles[k].sizes), poseNow(k));
+  for (const k of clock.seen.keys()) putInTables(k, poseNow(k));
   return answer;
 }
 
