@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.viewer.page import page
-from rrtik_tests.browser import CHROMIUM, DRAWING_3D, Browser
+from rrtik_tests.browser import CHROMIUM, Browser, planning_page
 
 pytestmark = [
     pytest.mark.kernels,
@@ -38,11 +37,9 @@ def shown_problem() -> rrtik.Problem:
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     folder = tmp_path_factory.mktemp("opening")
-    problem, file = shown_problem(), folder / "page.html"
-    file.write_text(page(problem, rrtik.plan(problem, seed=1).path), encoding="utf-8")
-    with closing(Browser(folder / "browser", DRAWING_3D)) as opened:
-        opened.open(file.as_uri())
-        opened.wait("document.documentElement.dataset.plans")
+    problem = shown_problem()
+    text = page(problem, rrtik.plan(problem, seed=1).path)
+    with planning_page(text, folder) as opened:
         yield opened
 
 

@@ -3,7 +3,6 @@
 import json
 import shutil
 import subprocess
-from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from importlib.resources import files
@@ -29,7 +28,7 @@ from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.page_planner import SAMPLES, page_planner
 from rrtik_ompl.viewer.page_tables import VERTICES
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
-from rrtik_tests.browser import CHROMIUM, DRAWING_3D, Browser
+from rrtik_tests.browser import CHROMIUM, Browser, planning_page
 
 pytestmark = pytest.mark.kernels
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
@@ -261,11 +260,7 @@ def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tm
     crate = rrtik.Obstacle("crate", rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([0.6, 0.6, 0.6]))
     world = rrtik.World(rrtik.load_robot("ur5"), Scene((crate,)))
     problem = Problem(world, [0.0, -1.2, 1.0, 0.2, 0.0, 0.0], [1.6, -1.2, 1.0, 0.2, 0.0, 0.0])
-    file = tmp_path / "page.html"
-    file.write_text(page(problem, rrtik.plan(problem, seed=1).path), encoding="utf-8")
-    with closing(Browser(tmp_path / "browser", DRAWING_3D)) as browser:
-        browser.open(file.as_uri())
-        browser.wait("document.documentElement.dataset.plans")
+    with planning_page(page(problem, rrtik.plan(problem, seed=1).path), tmp_path) as browser:
         spot = browser.ask(SPOT % "goal")
         browser.drag(spot, [spot[0] - 12.0, spot[1] - 8.0])
         browser.ask(FRAMES)
@@ -316,11 +311,8 @@ fetch("http://127.0.0.1:9/").then(() => { window.fetched = "sent"; }, (error) =>
 
 @needs_chromium
 def test_the_page_runs_no_text_as_script_and_connects_to_nobody(tmp_path: Path) -> None:
-    file = tmp_path / "page.html"
-    file.write_text(page(rrtik.load_problem("planar3_a")).replace("</body>", TEMPTED), encoding="utf-8")
-    with closing(Browser(tmp_path / "browser", DRAWING_3D)) as browser:
-        browser.open(file.as_uri())
-        browser.wait("document.documentElement.dataset.plans && window.fetched")
+    text = page(rrtik.load_problem("planar3_a")).replace("</body>", TEMPTED)
+    with planning_page(text, tmp_path, "document.documentElement.dataset.plans && window.fetched") as browser:
         assert browser.ask("[window.evaluated, window.fetched]") == ["EvalError", "TypeError"]
         assert browser.ask("window.broken.includes('connect-src')")
         assert browser.ask("window.broken.includes('script-src')")
@@ -329,11 +321,7 @@ def test_the_page_runs_no_text_as_script_and_connects_to_nobody(tmp_path: Path) 
 @needs_chromium
 def test_the_page_says_what_it_cannot_plan(tmp_path: Path) -> None:
     problem = rrtik.load_problem("planar3_a")
-    file = tmp_path / "page.html"
-    file.write_text(page(problem, rrtik.plan(problem, seed=1).path), encoding="utf-8")
-    with closing(Browser(tmp_path / "browser", DRAWING_3D)) as browser:
-        browser.open(file.as_uri())
-        browser.wait("document.documentElement.dataset.plans")
+    with planning_page(page(problem, rrtik.plan(problem, seed=1).path), tmp_path) as browser:
         blocked = browser.ask(
             "(async () => { const k = 0; const q = state.start; const t = tipPosition(q);"
             " state.obstacles[k].pose = [1, 0, 0, t.x, 0, 1, 0, t.y, 0, 0, 1, t.z, 0, 0, 0, 1];"

@@ -8,6 +8,8 @@ import subprocess
 import threading
 import time
 import urllib.request
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -179,3 +181,14 @@ class Running:
     def __exit__(self, *_):
         self._ended.set()
         self._thread.join(30)
+
+
+@contextmanager
+def planning_page(text: str, folder: Path, until: str = "document.documentElement.dataset.plans") -> Iterator[Browser]:
+    """A page that plans, opened from a file in a folder, as soon as a condition holds: it can plan."""
+    file = folder / "page.html"
+    file.write_text(text, encoding="utf-8")
+    with closing(Browser(folder / "browser", DRAWING_3D)) as browser:
+        browser.open(file.as_uri())
+        browser.wait(until)
+        yield browser
