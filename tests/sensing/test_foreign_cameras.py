@@ -8,11 +8,12 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.sensing.cameras.calibration import calibrate
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.camera_file import load_camera, save_camera
-from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, photograph
+from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, marker_print, photograph
 from rrtik_ompl.sensing.cameras.tone import coded
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
-from rrtik_ompl.sensing.markers.detection import charuco_board, dictionary_of
-from rrtik_tests.marker_views import CAMERA, facing
+from rrtik_ompl.sensing.markers.corner_pose import pose_of_square
+from rrtik_ompl.sensing.markers.detection import charuco_board, dictionary_of, find_markers, marker_cells
+from rrtik_tests.marker_views import CAMERA, SIDE, facing
 
 ROS = """\
 image_width: 640
@@ -100,16 +101,45 @@ def views(sheet, count, far=(0.3, 0.42), tone=0.0):
         yield photograph(coded(cv2.GaussianBlur(clean, (0, 0), 0.6), tone), rng, noise=0.007, blur=0.0)
 
 
-def test_a_plain_chessboard_calibrates_a_camera():
+def chessboard():
     cells = np.kron(np.indices((7, 8)).sum(axis=0) % 2, np.ones((20, 20))) * 255
-    sheet = Print(np.pad(cells.astype(np.uint8), 20, constant_values=255), 0.03 / 20)
-    found = calibrate(list(views(sheet, 7, (0.5, 0.6))), Chessboard(8, 7, 0.03))
+    return Print(np.pad(cells.astype(np.uint8), 20, constant_values=255), 0.03 / 20)
+
+
+def test_a_plain_chessboard_calibrates_a_camera():
+    found = calibrate(list(views(chessboard(), 7, (0.5, 0.6))), Chessboard(8, 7, 0.03))
     truth = CAMERA.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
     assert np.abs(found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]] - truth).max() < 6.0  # of 880; k3 is not estimated
     assert found.error < 0.12
-    assert found.camera.tone is None
+    assert found.camera.tone == 0.0
     with pytest.raises(InputError, match="in view as a whole"):
         calibrate([np.full((480, 640), 128, dtype=np.uint8)] * 6, Chessboard(8, 7, 0.03))
+
+
+@pytest.mark.parametrize(("far", "tone", "turned"), [((0.5, 0.6), 1.0, False), ((0.9, 1.1), 1.0, True),
+                                                     ((0.9, 1.1), 0.5, False), ((0.9, 1.1), 0.0, True)])  # fmt: skip
+def test_a_chessboard_tells_the_tone_of_its_photographs(far, tone, turned):
+    taken = list(views(chessboard(), 5, far, tone))
+    board = Chessboard(7, 8, 0.03) if turned else Chessboard(8, 7, 0.03)
+    found = calibrate([np.rot90(each) for each in taken] if turned else taken, board).camera
+    assert found.tone == pytest.approx(tone, abs=0.25)
+
+
+def test_a_camera_whose_tone_a_chessboard_told_places_markers_as_well_as_it_says(tmp_path):
+    camera = calibrate(list(views(chessboard(), 5, (0.5, 0.6), 1.0)), Chessboard(8, 7, 0.03)).camera
+    save_camera(camera, tmp_path / "c.yaml")
+    tone = load_camera(tmp_path / "c.yaml").tone
+    sheet, squares = marker_print(marker_cells("4x4_50", 7), SIDE), []
+    for seed, place in enumerate(([0.1, -0.05, 0.7], [0.05, 0.1, 1.0], [-0.1, 0.0, 1.4])):
+        T, rng = facing([0.5, 0.3 - 0.3 * seed, 0.2], place), np.random.default_rng(seed)
+        light = cv2.GaussianBlur(clean_picture(CAMERA, [(T, sheet)], rays=6), (0, 0), 0.6)
+        gray = photograph(coded(light, 1.0), rng, noise=0.008, blur=0.0)
+        (marker,) = find_markers(gray, "4x4_50", tone=tone)
+        found = pose_of_square(CAMERA, marker.corners, SIDE, spread=marker.spread)
+        away = found.T_camera_object.translation - T.translation
+        assert np.linalg.norm(away) < 2.5e-3 * T.translation[2] ** 2
+        squares.append(float(away @ np.linalg.solve(found.covariance[:3, :3], away)))
+    assert max(squares) < 14.2  # 0.3 % of honest ones are larger
 
 
 @pytest.mark.parametrize("wrong", [(3, 8, 0.03), (8, 8, 0.0)])

@@ -1,4 +1,4 @@
-"""Intrinsics of a camera from photographs of a board, with the uncertainty of every number; its tone by markers."""
+"""Intrinsics of a camera from photographs of a board, with the uncertainty of every number; its tone."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Vector, frozen
+from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.markers.alignment import Look, look_of
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.detection import charuco_corners, dictionary_of, find_markers
 from rrtik_ompl.sensing.sight import as_gray
 
 MIN_CORNERS, MIN_VIEWS = 8, 5
-TONE_VIEWS, TONE_MARKERS = 3, 12  # photographs in which the tone is looked at; markers that are enough
-MIN_TONE_SIDE = 20.0  # [pixels] of a marker
+TONE_VIEWS, TONE_LOOKS = 3, 12  # photographs in which the tone is looked at; markers, or pieces, that are enough
+MIN_TONE_SIDE = 20.0  # [pixels] of a marker, of a piece of a chessboard
 MAX_VIEW_ERROR = 1.0  # [pixels]; a view with a larger error is blurred, bent or mismatched
 
 
@@ -45,8 +46,8 @@ class Calibration:
 def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoard | Chessboard) -> Calibration:
     """Calibrate from photographs of one board (`detection.charuco_board`, `Chessboard`) under different angles.
 
-    The third radial coefficient stays 0: with it the second one is not stable. The camera's tone is known from a
-    board with markers; a chessboard does not say it.
+    The third radial coefficient stays 0: with it the second one is not stable. The camera's tone is the median of
+    those with which the board's markers, or pieces of a chessboard, are most like the photographs.
 
     Raises:
         InputError: If the photographs differ in size, or fewer than five show the board well enough.
@@ -54,7 +55,6 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoa
     grays = [as_gray(picture) for picture in pictures]
     if len({gray.shape for gray in grays}) > 1:
         raise InputError("the photographs differ in size; take all of them with the same camera and settings")
-    dictionary = None if isinstance(board, Chessboard) else dictionary_of(board)
     found = [board.corners(g) if isinstance(board, Chessboard) else charuco_corners(g, board) for g in grays]
     unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
     used = [k for k, reason in enumerate(unused) if not reason]
@@ -79,7 +79,7 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoa
     view_errors[used] = np.ravel(each)
     height, width = grays[0].shape
     doubts = np.ravel(sigmas)[:9]
-    tone = _tone([grays[k] for k in used[:TONE_VIEWS]], dictionary)
+    tone = _tone([(grays[k], found[k][1]) for k in used[:TONE_VIEWS]], board)
     camera = Camera(matrix, width, height, np.ravel(distortion)[:5], sigmas=doubts, tone=tone)
     return Calibration(camera, frozen(doubts[:4]), float(error), frozen(view_errors), tuple(unused))
 
@@ -95,10 +95,24 @@ def _too_few(count: int) -> str:
     return f"{count} corners of the board seen, {MIN_CORNERS} are needed: too small, blurred, or another board"
 
 
-def _tone(grays: Sequence[NDArray[np.uint8]], dictionary: str | None) -> float | None:
-    """Median tone of a board's markers; None where too few are large and clear enough."""
-    if dictionary is None:
-        return None
-    seen = [marker for gray in grays for marker in find_markers(gray, dictionary)]
-    tones = [each.look.tone for each in seen if each.look is not None and each.side >= MIN_TONE_SIDE]
-    return round(float(np.median(tones)), 3) if len(tones) >= TONE_MARKERS else None
+def _tone(
+    views: Sequence[tuple[NDArray[np.uint8], Matrix]], board: cv2.aruco.CharucoBoard | Chessboard
+) -> float | None:
+    """Median tone of a board's markers or pieces; None where too few are large and clear enough.
+
+    Args:
+        views: Photographs, and where the board's corners are in them.
+        board: The board.
+    """
+    if isinstance(board, Chessboard):
+        pieces = [(gray, *piece) for gray, pixels in views for piece in board.pieces(gray, pixels)]
+        looks = [look_of(*each) for each in pieces if np.ptp(each[1], axis=0).max() >= MIN_TONE_SIDE]
+    else:
+        looks = _looks_of_markers([gray for gray, _ in views], dictionary_of(board))
+    tones = [each.tone for each in looks if each is not None]
+    return round(float(np.median(tones)), 3) if len(tones) >= TONE_LOOKS else None
+
+
+def _looks_of_markers(grays: Sequence[NDArray[np.uint8]], dictionary: str | None) -> list[Look | None]:
+    seen = [] if dictionary is None else [marker for gray in grays for marker in find_markers(gray, dictionary)]
+    return [each.look for each in seen if each.side >= MIN_TONE_SIDE]

@@ -25,6 +25,7 @@ Pixels = NDArray[np.float32]
 MIN_LIKENESS = 0.9  # below it the marker is partly covered or the picture is not sharp
 _MAX_CORNER_SHIFT = 0.25  # of a side; inner edges are sometimes found in place of outer ones
 _CELL_PIXELS = (3, 26)  # of a cell in the ideal picture; near its size in the camera's: coarser samples lie off
+_SQUARE_PIXELS = (3, 80)  # the same of a chessboard, whose few edges are all that tells its tone
 _RIM_CELLS = 0.5  # width of the white rim that is used; farther out blur mixes in the background
 _DEFAULT_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]
 _SPOTS = _DEFAULT_SPOT * 1.5 ** np.arange(-2, 5)  # that are tried
@@ -87,18 +88,10 @@ def aligned_corners(
     Returns:
         Below `MIN_LIKENESS` the corners are returned unchanged.
     """
-    count, side = len(cells), float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
-    cell = int(np.clip(round(side / count), *_CELL_PIXELS))
-    rim = round(_RIM_CELLS * cell)
-    square = np.array([[0, 0], [count, 0], [count, count], [0, count]], dtype=np.float64) * cell + rim - 0.5
-    low, piece = _neighbourhood(gray, corners, margin=int(0.35 * side) + 4)
-    guess = cv2.getPerspectiveTransform(square.astype(np.float32), (corners - low).astype(np.float32))
-    ideal = _ideal(cells, cell, rim)
-    try:
-        fit = _aligned(ideal, piece, guess.astype(np.float32), tone, before)
-        if before is not None and fit.likeness < MIN_LIKENESS:
-            fit = _aligned(ideal, piece, guess.astype(np.float32), tone, None)
-    except cv2.error:  # the alignment did not converge
+    framed = np.pad(cells, 1, constant_values=255)
+    side = float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
+    low, square, fit = _laid_over(gray, corners, framed, _CELL_PIXELS, tone, before)
+    if fit is None:
         return Aligned(corners, 0.0, None, None)
     moved = cv2.perspectiveTransform(square[:, None], fit.homography.astype(np.float64))[:, 0]
     better = np.asarray(moved, dtype=np.float64)
@@ -110,6 +103,18 @@ def aligned_corners(
     return Aligned(corners + low, fit.likeness, spread, fit.look)
 
 
+def look_of(gray: NDArray[np.uint8], corners: Matrix, framed: NDArray[np.uint8]) -> Look | None:
+    """How a picture shows a pattern of squares, such as a piece of a chessboard; None if it is not there.
+
+    Args:
+        gray: The picture. Shape (height, width).
+        corners: Of the pattern without what is around it, to a pixel. Shape (4, 2).
+        framed: The pattern, with one cell more on each side: what is around it. Shape (n + 2, n + 2).
+    """
+    fit = _laid_over(gray, corners, framed, _SQUARE_PIXELS)[2]
+    return None if fit is None or fit.likeness < MIN_LIKENESS else fit.look
+
+
 class _Fit(NamedTuple):
     """The ideal marker as the picture would show it, the picture in its frame, and what leads from one to the other."""
 
@@ -118,6 +123,36 @@ class _Fit(NamedTuple):
     model: Pixels
     seen: Pixels
     look: Look
+
+
+def _laid_over(
+    gray: NDArray[np.uint8],
+    corners: Matrix,
+    framed: NDArray[np.uint8],
+    sizes: tuple[int, int],
+    tone: float | None = None,
+    before: Look | None = None,
+) -> tuple[Matrix, Matrix, _Fit | None]:
+    """A pattern with a frame of one cell, laid over a picture.
+
+    Returns:
+        Where the piece of the picture begins that was looked at, corners of the pattern in the ideal picture, and the
+        fit; None if it does not converge.
+    """
+    count, side = len(framed) - 2, float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
+    cell = int(np.clip(round(side / count), *sizes))
+    rim = round(_RIM_CELLS * cell)
+    square = np.array([[0, 0], [count, 0], [count, count], [0, count]], dtype=np.float64) * cell + rim - 0.5
+    low, piece = _neighbourhood(gray, corners, margin=int(0.35 * side) + 4)
+    guess = cv2.getPerspectiveTransform(square.astype(np.float32), (corners - low).astype(np.float32))
+    ideal = _ideal(framed, cell, rim)
+    try:
+        fit = _aligned(ideal, piece, guess.astype(np.float32), tone, before)
+        if before is not None and fit.likeness < MIN_LIKENESS:
+            fit = _aligned(ideal, piece, guess.astype(np.float32), tone, None)
+    except cv2.error:  # the alignment did not converge
+        return low, square, None
+    return low, square, fit
 
 
 def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | None, before: Look | None) -> _Fit:
@@ -200,10 +235,10 @@ def _peak(values: Vector) -> float:
     return best + (float(np.clip(0.5 * (low - high) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0)
 
 
-def _ideal(cells: NDArray[np.uint8], cell: int, rim: int) -> Pixels:
-    large = np.kron(cells, np.ones((cell, cell), dtype=np.uint8))
-    framed = cv2.copyMakeBorder(large, rim, rim, rim, rim, cv2.BORDER_CONSTANT, value=(255.0,))
-    return framed.astype(np.float32)
+def _ideal(framed: NDArray[np.uint8], cell: int, rim: int) -> Pixels:
+    large = np.kron(framed, np.ones((cell, cell), dtype=np.uint8))
+    cut = slice(cell - rim, rim - cell)
+    return large[cut, cut].astype(np.float32)
 
 
 def _spread(homography: Pixels, shape: tuple[int, ...]) -> Matrix:

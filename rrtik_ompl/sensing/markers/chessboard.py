@@ -1,7 +1,8 @@
-"""Plain chessboards for calibration: their inner corners in a picture."""
+"""Plain chessboards for calibration: their inner corners in a picture, and pieces that a lens bends little."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, frozen
 from rrtik_ompl.errors import InputError
+
+PIECE = 2  # squares along a side
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,3 +54,27 @@ class Chessboard:
         if not found or pixels is None:
             return np.zeros((0, 3)), np.zeros((0, 2))
         return self.points, np.reshape(pixels, (-1, 2)).astype(np.float64)
+
+    def pieces(self, gray: NDArray[np.uint8], pixels: Matrix) -> Iterator[tuple[Matrix, NDArray[np.uint8]]]:
+        """Pieces of the board, each of `PIECE` squares or fewer a side, without gaps and none over another.
+
+        Args:
+            gray: The picture.
+            pixels: From `corners`.
+
+        Yields:
+            Corners in the picture, shape (4, 2), and the piece with the squares around it, 0 black and 255 white.
+        """
+        grid = pixels.reshape(self.rows - 1, self.columns - 1, 2)
+        side = min(PIECE, self.columns - 2, self.rows - 2)
+        for row in range(0, self.rows - 1 - side, side):
+            for column in range(0, self.columns - 1 - side, side):
+                ends = (row, column), (row, column + side), (row + side, column + side), (row + side, column)
+                odd = np.indices((side + 2, side + 2)).sum(axis=0) % 2 == 1
+                middles = 0.25 * sum(
+                    grid[row + a : row + a + side, column + b : column + b + side] for a in (0, 1) for b in (0, 1)
+                )
+                across, down = np.rint(middles).astype(np.intp).reshape(-1, 2).T
+                seen, inner = gray[down, across], odd[1:-1, 1:-1].ravel()
+                white = odd == bool(seen[inner].mean() > seen[~inner].mean())
+                yield np.array([grid[end] for end in ends]), np.where(white, 255, 0).astype(np.uint8)
