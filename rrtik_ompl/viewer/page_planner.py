@@ -24,6 +24,7 @@ from rrtik_ompl.fast.tables.scene_tables import SLACK_PER_METRE as PRIMITIVE_SLA
 from rrtik_ompl.fast.tables.scene_tables import primitive_kind
 from rrtik_ompl.fast.tables.solid_tables import SLACK_PER_METRE as SOLID_SLACK
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
+from rrtik_ompl.fast.wasm.image import MemoryImage
 from rrtik_ompl.fast.wasm.page_kernels import page_kernels
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.poses import pose, pose_row
@@ -33,7 +34,8 @@ from rrtik_ompl.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page_fixed import standing_parts
-from rrtik_ompl.viewer.page_tables import BASE, layout_numbers, page_tables
+from rrtik_ompl.viewer.page_tables import BASE, add_limb, layout_numbers, page_tables
+from rrtik_ompl.viewer.page_tips import dragged_tips, tip_entry
 from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
 
@@ -68,6 +70,7 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
         return None
     try:
         image, places = page_tables(problem, world, motions)
+        tips = _tips(problem, image)
     except InputError:  # beyond what the margins of the kernels cover
         return None
     obstacles = _obstacles(problem.world, motions.fast, room.searched, spare)
@@ -81,6 +84,7 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
         "base": BASE,
         "end": image.end,
         "places": places,
+        "tips": tips,
         "names": layout_numbers(),
         "width": WIDTH,
         "dof": problem.robot.dof,
@@ -102,6 +106,15 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
         "path": {key: value for key, value in still.document().items() if key not in PATH_RESULTS},
         "problem": document,
     }
+
+
+def _tips(problem: Problem, image: MemoryImage) -> list[dict[str, Any]]:
+    """The tips that can be dragged, each with where its inverse kinematics stand, which are added to the image."""
+    robot, tips = problem.robot, []
+    for name in dragged_tips(problem.robot, problem.goal):
+        places = add_limb(image, robot if name == robot.tip else replace(robot, tip=name, closed_form=None))
+        tips += [tip_entry(robot, name) | places] if places else []
+    return tips
 
 
 def _document(problem: Problem) -> dict[str, Any] | None:

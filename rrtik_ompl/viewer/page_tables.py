@@ -24,6 +24,7 @@ from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
 from rrtik_ompl.ik.numeric.kernel_call import call_table
 from rrtik_ompl.ik.serial_chain import limb_of
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
 BASE = 1 << 20  # where the image begins; the stack of the kernels lies below
@@ -60,7 +61,7 @@ def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[M
     Raises:
         InputError: If joints go farther than the kernels cover.
     """
-    image, fast, limb = MemoryImage(BASE), motions.fast, limb_of(problem.robot)
+    image, fast = MemoryImage(BASE), motions.fast
     for each in fast.tables:
         image.add(each)
     places = {
@@ -73,9 +74,13 @@ def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[M
     shortcuts = ShortcutSearch(motions, np.zeros((PATH_ROWS, problem.robot.dof)) + problem.start, asking=False)
     places["shortcuts"] = image.add(shortcuts.table, links={shortcut_layout.MOTIONS: motions.table})
     places["crdt"] = _add_crdt(image, problem, world, motions)
-    if limb is not None:
-        places |= {"limb": image.add(limb), "ik": image.add(call_table(limb, STEPS, PATIENCE))}
     return image, places
+
+
+def add_limb(image: MemoryImage, robot: Robot) -> dict[str, int] | None:
+    """Add what inverse kinematics of a tip needs: where the page finds it. None where a joint hangs on several."""
+    limb = limb_of(robot)
+    return limb and {"limb": image.add(limb), "ik": image.add(call_table(limb, STEPS, PATIENCE))}
 
 
 def _add_connect(image: MemoryImage, problem: Problem, motions: FastMotions) -> int:

@@ -21,6 +21,7 @@ from rrtik_ompl.viewer.drawing.meshes import look_of_margin
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name, nodes_of
 from rrtik_ompl.viewer.drawing.trail import pieces
 from rrtik_ompl.viewer.drawing.viewpoint import overview
+from rrtik_ompl.viewer.page_tips import tip_entry
 from rrtik_ompl.viewer.path_contacts import PathContact
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
@@ -136,7 +137,7 @@ def grid_cell(size: float) -> float:
 
 
 def _robot(robot: Robot, tips: Sequence[str]) -> dict[str, Any]:
-    chain, shown = robot.chain, [_tip(robot, name) for name in tips]
+    chain = robot.chain
     return {
         "name": robot.name,
         "nodes": joint_nodes(robot),
@@ -146,8 +147,8 @@ def _robot(robot: Robot, tips: Sequence[str]) -> dict[str, Any]:
         "prismatic": chain.prismatic.tolist(),
         "gain": _numbers(chain.gain),
         "offset": _numbers(chain.offset),
-        "tip": _tip(robot, robot.tip),
-        "trails": shown,
+        "tip": tip_entry(robot, robot.tip),
+        "trails": [tip_entry(robot, name) for name in tips],
         "joints": [
             {"name": name, "unit": shown_unit(slides)[1], "lower": _limit(low), "upper": _limit(high)}
             for name, slides, low, high in zip(
@@ -155,11 +156,6 @@ def _robot(robot: Robot, tips: Sequence[str]) -> dict[str, Any]:
             )
         ],
     }
-
-
-def _tip(robot: Robot, name: str) -> dict[str, Any]:
-    tip = robot.model.frames[robot.model.getFrameId(name)]
-    return {"name": name, "joint": int(tip.parentJoint), "placement": _numbers(tip.placement.homogeneous.ravel())}
 
 
 def _ghosts(rows: Matrix | None) -> list[dict[str, Any]]:

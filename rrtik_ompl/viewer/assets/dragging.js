@@ -2,18 +2,36 @@
 const TURN_PER_PIXEL = 0.01;  // [rad], with the shift key
 const GHOSTS_FIRST = 0.05;  // of the picture's size: so much nearer a ghost counts than it is
 let selected = "goal";
+let held = planning?.tips[0];  // the tip by which a ghost is moved
 
-function tipFrame(q) {
-  return carried(robot.tip, jointFrames(q));
+/** The joints from a tip's to the base. */
+function jointsOf(joint) {
+  const found = [];
+  for (let k = joint; k > 0; k = robot.parent[k - 1] + 1) found.push(k);
+  return found;
 }
 
-/** Move the tip of an end by a shift [m] and a turn about z [rad], through inverse kinematics. */
+/** The tip that a person means who takes hold of a solid: of those that share most joints with it the nearest. */
+function tipOf(object, q, point) {
+  let [solid, joint] = [object, -1];
+  for (; solid && joint < 0; solid = solid.parent) joint = robot.nodes.indexOf(solid.name);
+  const frames = jointFrames(q);
+  const rank = planning.tips.map((tip) => ({
+    tip,
+    shared: jointsOf(tip.joint).filter((k) => jointsOf(joint).includes(k)).length,
+    away: new THREE.Vector3().setFromMatrixPosition(carried(tip, frames)).distanceTo(point),
+  }));
+  return rank.sort((a, b) => b.shared - a.shared || a.away - b.away)[0]?.tip;
+}
+
+/** Move the tip that is held of an end by a shift [m] and a turn about z [rad], through inverse kinematics. */
 function moveEnd(end, shift, turn) {
-  const frame = tipFrame(state[end]);
+  if (held === undefined) return false;
+  const frame = carried(held, jointFrames(state[end]));
   const e = new THREE.Matrix4().makeRotationZ(turn).multiply(new THREE.Matrix4().extractRotation(frame)).elements;
   const at = new THREE.Vector3().setFromMatrixPosition(frame).add(shift);
   const pose = [e[0], e[4], e[8], e[1], e[5], e[9], e[2], e[6], e[10], at.x, at.y, at.z];
-  const q = kernels.reach(pose, state[end]);
+  const q = kernels.reach(pose, state[end], held);
   if (q !== null) state[end] = q;
   return q !== null;
 }
@@ -67,6 +85,8 @@ function startDrag(event) {
   event.preventDefault();
   remember();
   select(found.name);
+  const { point } = found.hit;
+  if (ENDS[found.name]) held = tipOf(found.hit.object, state[found.name], new THREE.Vector3(point.x, -point.z, point.y));  // meshcat's picture has y up
   const away = viewer.camera.getWorldDirection(new THREE.Vector3());
   drag = { plane: new THREE.Plane().setFromNormalAndCoplanarPoint(away, found.hit.point), last: found.hit.point.clone(), x: event.clientX };
   pane.setPointerCapture(event.pointerId);

@@ -167,11 +167,11 @@ class Kernels {
     }
   }
 
-  /** Joint values near `from` that bring the tip to a pose (12 numbers: the rotation row by row, the origin), or null. */
-  reach(pose, from) {
-    const { places, names } = this.plan;
-    if (places.ik === undefined) return null;
-    const call = this.table(places.ik, names.ik);
+  /** Joint values near `from` that bring a tip of the plan to a pose (12 numbers: the rotation row by row, the origin), or null. */
+  reach(pose, from, tip = this.plan.tips[0]) {
+    const { names } = this.plan;
+    if (tip === undefined) return null;
+    const call = this.table(tip.ik, names.ik);
     const aim = call.get("AIMS") / NUMBER_BYTES;
     this.doubles.fill(0, aim, aim + names.ik.AIM_FLOATS);
     this.doubles.set(pose, aim);
@@ -180,7 +180,7 @@ class Kernels {
     this.doubles[aim + names.ik.FREE_TURN] = names.ik.NO_TURN;
     this.writeRow(call.get("NEAR"), from);
     this.whole[call.get("NEXT") / NUMBER_BYTES] = 0n;
-    const solved = this.entries.ik_solve(BigInt(places.limb), BigInt(places.ik));
+    const solved = this.entries.ik_solve(BigInt(tip.limb), BigInt(tip.ik));
     return solved === 1n ? this.readRows(call.get("Q"), 1)[0] : null;
   }
 

@@ -1,0 +1,61 @@
+"""Where an arm has two tips, each is dragged by itself."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.viewer.page import page
+from rrtik_ompl.viewer.page_tips import dragged_tips
+from rrtik_tests.browser import CHROMIUM, planning_page
+
+RIGHT = slice(6, 12)  # joints of the right arm
+GRASP = """(() => {
+  const r = pane.getBoundingClientRect();
+  const places = [];
+  for (let x = r.left + 5; x < r.right; x += 12) for (let y = r.top + 5; y < r.bottom; y += 12) {
+    pointerAt({ clientX: x, clientY: y });
+    const found = hitThing();
+    const { point, object } = found?.hit ?? {};
+    if (found?.name !== "goal") continue;
+    const tip = tipOf(object, state.goal, new THREE.Vector3(point.x, -point.z, point.y));
+    if (tip.name === "right_grip_point") places.push([x, y]);
+  }
+  return places[Math.floor(places.length / 2)];
+})()"""
+
+
+@pytest.mark.parametrize(
+    ("name", "tips"),
+    [("ur5", 1), ("two_titan4", 2), ("baxter", 2), ("baxter_left", 1), ("so101", 1), ("planar3", 1)],
+)
+def test_every_arm_has_a_tip_to_drag(name: str, tips: int) -> None:
+    robot = rrtik.load_robot(name)
+    found = dragged_tips(robot, None)
+    assert found[0] == robot.tip
+    assert len(found) == tips
+    if tips == 2:
+        assert {tip.split("_")[0] for tip in found} == {"left", "right"}
+
+
+def test_the_tips_of_a_goal_are_those_that_it_names() -> None:
+    problem = rrtik.load_problem("two_titan4")
+    assert dragged_tips(problem.robot, problem.goal) == ["left_grip_point", "right_grip_point"]
+
+
+@pytest.mark.kernels
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
+def test_in_a_browser_the_right_arm_is_dragged_and_the_left_one_stays(tmp_path: Path) -> None:
+    problem = rrtik.load_problem("two_titan4")
+    path = rrtik.plan(problem, "RRTConnect", seed=1).path
+    with planning_page(page(problem, path), tmp_path) as browser:
+        spot = browser.ask(GRASP)
+        browser.drag(spot, [spot[0] + 6.0, spot[1] - 10.0])
+        goal = np.array(browser.ask("state.goal"))
+    changed = goal != path.end
+    assert changed[RIGHT].any()
+    assert not changed[: RIGHT.start].any()
+    ends = [problem.robot.fk(q, "right_grip_point") for q in (path.end, goal)]
+    assert 0.005 < np.linalg.norm(ends[1].translation - ends[0].translation) < 0.5
+    np.testing.assert_allclose(ends[1].rotation, ends[0].rotation, atol=1e-3)
