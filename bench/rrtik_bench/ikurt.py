@@ -30,7 +30,8 @@ EXAMPLES = {
 }
 SLOW = ("planar3_boxes", "titan4_wrist", "titan4_axis1", "titan4_p_axis1")  # for the algorithm to the letter
 SINGULAR = SLOW[1:]
-CONNECT = "CONNECT ends at its first blocked sample, and towards a limit few samples lie"
+BLOCKED = "CONNECT ends at its first blocked sample"
+INWARD = "towards a limit few samples lie, see ikurt-limits"
 MOST_SOLUTIONS = 8  # of a PUMA's pose, joints turning less than once
 SCENE = "numbers of the scene, parameters and accuracy chosen here: none is printed"
 
@@ -84,7 +85,9 @@ def examples(quick: bool) -> list[Row]:
         repaired = _solved(problem, "ikurt", 3 if quick else 20, 10.0, jacobian=False)
         if not quick or name not in SLOW:
             literal = _solved(problem, "ikurt-published", 1 if quick else 5, 10.0)
-            reading = f"{CONNECT}: {literal.runs - literal.found} of {literal.runs} fail"
+            reading = (
+                f"{INWARD if name in SINGULAR else BLOCKED}: {literal.runs - literal.found} of {literal.runs} fail"
+            )
             rows.append(judged(f"{what}: to the letter", "solved; no time", str(literal), literal.found / literal.runs,
                                _literal_bar(name, repaired), SCENE if literal.all else reading))  # fmt: skip
         text = f"{SCENE}; repaired: misses tolerated, directions of equal chance, no Jacobian"

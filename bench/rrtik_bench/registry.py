@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rrtik_bench import drrt_con, ikurt, titan4
+from rrtik_bench import drrt_con, ikurt, ikurt_limits, titan4
 from rrtik_bench.crdt import tables as crdt
 from rrtik_bench.errata import tables as errata
 from rrtik_bench.figures import genetic as genetic_figures
+from rrtik_bench.figures import ikurt as ikurt_figures
 from rrtik_bench.figures import mb_rrt as mb_rrt_figures
 from rrtik_bench.figures import sensing as sensing_figures
 from rrtik_bench.genetic import tables as genetic
@@ -17,8 +18,12 @@ from rrtik_bench.sensing import tables as sensing
 from rrtik_bench.shortening import tables as shortening
 from rrtik_bench.tables import Collection
 
-PAGES = (titan4, mb_rrt, genetic, crdt, ikurt, drrt_con, shortening, sensing, camera_tables, sequences, errata)
-FIGURES = {**mb_rrt_figures.FIGURES, **genetic_figures.FIGURES, **sensing_figures.FIGURES}
+PAGES = (
+    *(titan4, mb_rrt, genetic, crdt, ikurt, ikurt_limits, drrt_con, shortening),
+    *(sensing, camera_tables, sequences, errata),
+)
+DRAWN = (mb_rrt_figures, genetic_figures, ikurt_figures, sensing_figures)
+FIGURES = {name: figures for page in DRAWN for name, figures in page.FIGURES.items()}
 COLLECTION = Collection(
     tables=tuple(replace(table, figures=FIGURES.get(table.name, ())) for page in PAGES for table in page.TABLES),
     also={"genetic": "ga-reb", "mbrrt": "mb-rrt", "replanning": "drrt-con", "markers": "sensing"},

@@ -5,7 +5,9 @@ import pytest
 
 from rrtik_bench.errata.grim import consistent, off
 from rrtik_bench.errata.prints import level_link_4, listed_routes, printed_routes, undefined
+from rrtik_bench.figures import ikurt as ikurt_figures
 from rrtik_bench.figures.mb_rrt import FIGURES, first_directions
+from rrtik_bench.ikurt_limits import WRIST, approach, outward_share
 from rrtik_bench.report.figures import PICTURE, Figure
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.mb_rrt.growth import grow
@@ -78,3 +80,25 @@ def test_a_figure_says_where_it_is_from_and_what_of_the_print_is_marked(tmp_path
 def test_the_growth_of_a_tree_is_drawn(tmp_path):
     FIGURES["mb-rrt-example"][0].save(tmp_path / "growth.png", True)
     assert (tmp_path / "growth.png").stat().st_size > 5_000
+
+
+def test_samples_beyond_the_limits_alone_bring_the_letter_to_a_goal_at_a_limit():
+    letter, beyond = (approach(WRIST, rule, 0, 3_000) for rule in ("to the letter", "samples beyond the limits"))
+    assert not letter.arrived
+    assert letter.connects == 1  # not one step was blocked
+    assert beyond.arrived
+    assert np.degrees(letter.at[-1, 4]) < 85.0
+    assert (np.diff(letter.nearest) <= 0.0).all()
+
+
+def test_near_a_limit_few_steps_to_the_letter_lead_there():
+    gaps = np.array([1.0, 90.0])
+    np.testing.assert_allclose(outward_share("to the letter", gaps, 180.0), gaps / 180.0)
+    np.testing.assert_allclose(outward_share("samples beyond the limits", gaps, 180.0), (gaps + 90.0) / 360.0)
+    np.testing.assert_allclose(outward_share("directions of equal chance", gaps, 180.0), 0.5)
+
+
+def test_the_planar_examples_are_drawn(tmp_path):
+    figure = next(each for each in ikurt_figures.FIGURES["ikurt-examples"] if each.name == "ikurt_planar")
+    figure.save(tmp_path / "planar.png", True)
+    assert (tmp_path / "planar.png").stat().st_size > 5_000

@@ -20,11 +20,18 @@ class Steps:
         step: Growth step delta0 [rad].
         threshold: Distance in the metric at which the step begins to shrink, in proportion.
         accuracy: Distance in the metric at which the goal counts as reached, the published min_threshold.
+        beyond: By how much of a joint's range samples may lie beyond its limits, on which steps are then put; 0 as
+            published.
+        misses: Blocked steps in a row that CONNECT lives through; 0 as published.
+        even: Whether CONNECT steps in directions of equal chance instead of towards samples; not as published.
     """
 
     step: float
     threshold: float
     accuracy: float
+    beyond: float = 0.0
+    misses: int = 0
+    even: bool = False
 
 
 class PublishedSearch:
@@ -66,18 +73,23 @@ class PublishedSearch:
                 return vertex
             q_rand = self._random()
             near = int(self.tree.nearest(q_rand[None])[0])
-            q_new = _extend(self.tree.q[near], q_rand, self._steps.step)
+            q_new = self._inside(_extend(self.tree.q[near], q_rand, self._steps.step))
             if self._free(self.tree.q[near], q_new):
                 self._add(q_new, near, self._distance(q_new))
         return None
 
     def _connect(self, near: int) -> tuple[int, bool]:
-        """Algorithm 5: step after step, until a sample is not valid; the last vertex, and whether it is at the goal."""
-        delta = self._steps.step
+        """Algorithm 5: step after step, until one is blocked; the last vertex, and whether it is at the goal."""
+        delta, missed = self._steps.step, 0
         q_near = self.tree.q[near].copy()
-        q_new = _extend(q_near, self._random(), delta)
-        while not self._stop() and self._free(q_near, q_new):
-            away = self._distance(q_new)
+        while not self._stop():
+            q_new = self._towards_any(q_near, delta)
+            if not self._free(q_near, q_new):
+                missed += 1
+                if missed > self._steps.misses:
+                    break
+                continue
+            missed, away = 0, self._distance(q_new)
             if away < self.tree.distance[near]:
                 near, q_near = self._add(q_new, near, away), q_new
             best = float(self.tree.distance[near])
@@ -85,14 +97,23 @@ class PublishedSearch:
                 return near, True
             if best < self._steps.threshold:
                 delta = best * self._steps.step / self._steps.threshold
-            q_new = _extend(q_near, self._random(), delta)
         return near, False
+
+    def _towards_any(self, q: Vector, delta: float) -> Vector:
+        if not self._steps.even:
+            return self._inside(_extend(q, self._random(), delta))
+        direction = self._rng.normal(size=len(q))
+        return self._inside(q + direction * (delta / np.linalg.norm(direction)))
+
+    def _inside(self, q: Vector) -> Vector:
+        return q if self._steps.beyond == 0.0 and not self._steps.even else np.clip(q, self._lower, self._upper)
 
     def _distance(self, q: Vector) -> float:
         return float(self._metric.distance(q[None])[0])
 
     def _random(self) -> Vector:
-        return self._rng.uniform(self._lower, self._upper)
+        room = self._steps.beyond * (self._upper - self._lower)
+        return self._rng.uniform(self._lower - room, self._upper + room)
 
     def _add(self, q: Vector, parent: int, distance: float) -> int:
         return int(self.tree.add(q[None], np.array([parent]), np.array([distance]))[0])

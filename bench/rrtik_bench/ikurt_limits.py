@@ -1,0 +1,130 @@
+"""Why IKURT to the letter does not arrive where joints are at their limits [1, ch. 5.1], and the smallest repair.
+
+CONNECT steps towards a sample inside the limits. At a gap g from the limit of a joint whose range is r, a share of
+g / r of the samples lies outwards, and leads outwards by no more than g: on the average the gap falls by its square,
+that is, as one over the number of steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+import rrtik_ompl as rrtik
+from rrtik_bench.ikurt import EXAMPLES, METRIC, SINGULAR, SOURCE, as_published
+from rrtik_bench.report.rows import Bar, Row, all_of, exactly, judged
+from rrtik_bench.tables import Table
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.ik.ikurt.metric import TipMetric
+from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
+from rrtik_ompl.problem import Problem
+
+WRIST = "titan4_wrist"
+BEYOND = 0.5  # of a joint's range
+LETTER = Steps(0.15, 0.5, 0.99 * METRIC)
+RULES = {
+    "to the letter": LETTER,
+    "blocked steps tolerated": replace(LETTER, misses=25),
+    "samples beyond the limits": replace(LETTER, beyond=BEYOND),
+    "directions of equal chance": replace(LETTER, even=True),
+}
+EVALUATIONS, FEW_EVALUATIONS = 20_000, 5_000  # of the metric, after which a run ends
+BUDGET = "of the metric; step, threshold and accuracy are chosen here: none is printed"
+
+
+class WatchedMetric(TipMetric):
+    """The published metric; remembers the nearest configuration after each evaluation.
+
+    Attributes:
+        nearest: Distance in the metric, one number an evaluation.
+        at: The configuration there, shape (dof,) each.
+    """
+
+    def distance(self, Q: Matrix) -> Vector:
+        """See :meth:`rrtik_ompl.ik.ikurt.metric.TipMetric.distance`."""
+        if self.evaluations == 0:
+            self.nearest: list[float] = []
+            self.at: list[Vector] = []
+        found = super().distance(Q)
+        for q, away in zip(Q, found, strict=True):
+            better = not self.nearest or away < self.nearest[-1]
+            self.nearest.append(float(away) if better else self.nearest[-1])
+            self.at.append(q.copy() if better else self.at[-1])
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Approach:
+    """One run: whether it arrived, how often CONNECT began, and the nearest configuration after each evaluation."""
+
+    arrived: bool
+    connects: int
+    nearest: Vector
+    at: Matrix
+
+    @property
+    def evaluations(self) -> int:
+        """Of the metric."""
+        return len(self.nearest)
+
+
+def letter_search(problem: Problem, steps: Steps, seed: int, evaluations: int) -> tuple[PublishedSearch, WatchedMetric]:
+    """The published search of a problem that begins at its start, ended after so many evaluations of the metric."""
+    metric = WatchedMetric.published(problem.robot, [problem.goal], problem.start)  # type: ignore[list-item]
+    assert isinstance(metric, WatchedMetric)
+    bounds, rng = problem.robot.finite_range(), np.random.default_rng(seed)
+    search = PublishedSearch(
+        metric,
+        steps,
+        *bounds,
+        problem.world.motion_valid,
+        lambda: metric.evaluations >= evaluations,
+        rng,
+        problem.start,
+    )
+    return search, metric
+
+
+@cache
+def approach(name: str, rule: str, seed: int, evaluations: int) -> Approach:
+    """One run of an example by one of `RULES`."""
+    search, metric = letter_search(as_published(rrtik.load_problem(name)), RULES[rule], seed, evaluations)
+    arrived = search.run() is not None
+    return Approach(arrived, search.connects, np.array(metric.nearest), np.array(metric.at))
+
+
+def outward_share(rule: str, gap: Vector, width: float) -> Vector:
+    """Share of the steps that lead a joint towards a limit, by its gap from it; its range is ``width``."""
+    room = RULES[rule].beyond * width
+    return np.full(len(gap), 0.5) if RULES[rule].even else (gap + room) / (width + 2.0 * room)
+
+
+def limits(quick: bool) -> list[Row]:
+    """The goals at limits, by the letter and with one change at a time."""
+    count, most = (1, FEW_EVALUATIONS) if quick else (5, EVALUATIONS)
+    rows = []
+    for name in SINGULAR:
+        for rule in RULES:
+            runs = [approach(name, rule, seed, most) for seed in range(count)]
+            arrived = sum(run.arrived for run in runs)
+            nearest = float(np.median([run.nearest[-1] for run in runs]))
+            text = f"{arrived} of {count}; nearest {nearest:.2g} after {np.median([r.evaluations for r in runs]):.0f}"
+            rows.append(judged(f"{EXAMPLES[name]}: {rule}", PRINTED.get(rule, "not in the print"), text,
+                               arrived / count, BARS[rule], f"at most {most} evaluations {BUDGET}"))  # fmt: skip
+        blocked = sum(approach(name, "to the letter", seed, most).connects - 1 for seed in range(count))
+        rows.append(judged(f"{EXAMPLES[name]}: blocked steps", "end CONNECT", str(blocked), blocked, NEVER_BLOCKED,
+                           "limits are a convex set: no step towards a sample inside leaves it"))  # fmt: skip
+    return rows
+
+
+PRINTED = {"to the letter": "solved; no time", "blocked steps tolerated": "no help, if none is blocked"}
+BARS = {
+    "to the letter": all_of(refutes=True),
+    "blocked steps tolerated": Bar((0.0, 1.0), held=(0.0, 0.4)),
+    "samples beyond the limits": all_of(),
+    "directions of equal chance": all_of(),
+}
+NEVER_BLOCKED = exactly(0, 1e6)
+TABLES = (Table("ikurt-limits", "Goals at limits: one change at a time", SOURCE, limits, 80, 6),)
