@@ -22,7 +22,8 @@ from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.transitions import single_joint
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.marks import Mark
-from rrtik_ompl.viewer.page_planner import packed, page_planner
+from rrtik_ompl.viewer.page_fixed import packed
+from rrtik_ompl.viewer.page_planner import page_planner
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import play_pace, story_of
 from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run

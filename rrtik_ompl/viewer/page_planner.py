@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +31,7 @@ from rrtik_ompl.problem_files.problem import problem_data
 from rrtik_ompl.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
-from rrtik_ompl.viewer.page_fixed import standing_parts
+from rrtik_ompl.viewer.page_fixed import packed, standing_parts
 from rrtik_ompl.viewer.page_tables import BASE, add_limb, layout_numbers, page_tables
 from rrtik_ompl.viewer.page_tips import dragged_tips, tip_entry
 from rrtik_ompl.world import World
@@ -205,8 +203,3 @@ def _packed_shape(body: Body) -> dict[str, Any] | None:
         "radius": core.radius,
         "corners": core.corners.tolist(),
     }
-
-
-def packed(data: bytes) -> str:
-    """Bytes as text that a page unpacks."""
-    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode("ascii")

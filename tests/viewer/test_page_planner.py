@@ -184,7 +184,7 @@ def test_every_kind_of_obstacle_is_packed_alike_wherever_and_however_large(tmp_p
     np.testing.assert_array_equal(in_node(plan, tmp_path, moves=moves)["free"], wanted)
 
 
-@pytest.mark.parametrize("name", ["kinova", "titan4", "xarm7"])
+@pytest.mark.parametrize("name", ["kinova", "titan4", "xarm7", "z1", "baxter_left"])
 def test_what_touches_the_base_leaves_nothing_free(name, tmp_path):
     robot, rng = rrtik.load_robot(name), np.random.default_rng(5)
     start = next(q for q in rng.uniform(*robot.finite_range(), (100, robot.dof)) if rrtik.World(robot).valid(q))

@@ -17,7 +17,7 @@ function hasKernels() {
 class Kernels {
   /** From the planner's part of a story; see page_planner.py. */
   static async load(plan) {
-    const [code, image] = await Promise.all([unpacked(plan.module), unpacked(plan.image)]);
+    const [code, image] = await Promise.all([unpacked(plan.module), unpacked(plan.image), unpackSurfaces(plan)]);
     const memory = new WebAssembly.Memory({ initial: Math.ceil((plan.end + FREE_ROOM) / 65536) });
     const stack = new WebAssembly.Global({ value: "i32", mutable: true }, plan.base - STACK_ROOM);
     const env = { __linear_memory: memory, __stack_pointer: stack, sin: Math.sin, cos: Math.cos };
