@@ -60,7 +60,7 @@ class Robot:
         velocity, acceleration, jerk: Limits [rad/s, rad/s^2, rad/s^3 or m], shape (dof,), inf where unknown.
         prismatic, continuous: Masks, shape (dof,). tip, postures: Frame that goals refer to; named configurations.
         allowed_collisions: Pairs of link names that are never checked against each other.
-        model, collision, visual: Pinocchio's model and geometry; do not change them.
+        model, collision: Pinocchio's model and geometry; do not change them. looks: Gives ``visual``.
         closed_form: The robot's own inverse kinematics, if it brings one.
         gripper: The joints that open and close its gripper, `rrtik_ompl.description.gripper.GripperJoints`, or None.
         padding, joint_weights: By name; see :func:`rrtik_ompl.padded` and :func:`rrtik_ompl.weighted`.
@@ -81,7 +81,7 @@ class Robot:
     allowed_collisions: frozenset[frozenset[str]]
     model: Any
     collision: Any
-    visual: Any
+    looks: Callable[[], pin.GeometryModel]
     chain: Chain
     self_collision: bool = True
     closed_form: Callable[..., Any] | None = None
@@ -102,6 +102,11 @@ class Robot:
         return len(self.joint_names)
 
     @property
+    def visual(self) -> pin.GeometryModel:
+        """Pinocchio's geometry of what is drawn; a mesh that cannot be read is an `InputError` here, at the first."""
+        return self.looks()
+
+    @property
     def link_names(self) -> tuple[str, ...]:
         """Names of all links (bodies), base first."""
         return _link_names(self)
@@ -119,10 +124,8 @@ class Robot:
         """
         array = np.asarray(values, dtype=object) if isinstance(values, (list, tuple)) else np.asarray(values)
         if array.ndim == 1 and len(array) != self.dof:
-            raise InputError(
-                f"{what}: robot '{self.name}' has {self.dof} joints ({', '.join(self.joint_names)}), "
-                f"but {len(array)} values were given"
-            )
+            joints = f"robot '{self.name}' has {self.dof} joints ({', '.join(self.joint_names)})"
+            raise InputError(f"{what}: {joints}, but {len(array)} values were given")
         return finite_array(values, (self.dof,), what).copy()
 
     def configuration_deg(self, values: ArrayLike, what: str = "configuration") -> Vector:
@@ -228,18 +231,15 @@ class Robot:
     def jacobian(self, q: ArrayLike, frame: str | None = None) -> Matrix:
         """Geometric Jacobian at the tip in world axes, rows (linear; angular), shape (6, dof)."""
         full = self.pinocchio_configuration(self.configuration(q))[0]
-        jacobian = pin.computeFrameJacobian(
-            self.model, self.model.createData(), full, self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        )
+        number, axes = self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian = pin.computeFrameJacobian(self.model, self.model.createData(), full, number, axes)
         return np.asarray(np.reshape(jacobian, (6, -1)) @ self.chain.gain)  # for one joint it comes as a vector
 
     def jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Geometric Jacobians of a batch, as :meth:`jacobian`, for Q of shape (m, dof). Shape (m, 6, dof)."""
         return self.fk_jacobian_batch(Q, frame)[1]
 
-    def fk_jacobian_batch(
-        self, Q: ArrayLike, frame: str | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def fk_jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> tuple[Matrix, Matrix]:
         """:meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""
         rows, number = self._rows(Q), self._frame_id(frame)
         frames = self.joint_frames(rows)

@@ -103,7 +103,7 @@ def build_robot(
                 "give that one limits"
             )
     held = _held_values(name, movable, actuated, ties, locked or {})
-    model, collision, visual = build_models(tree.hold(held), checked_base(base_pose, f"robot '{name}': base_pose"))
+    model, collision, looks = build_models(tree.hold(held), checked_base(base_pose, f"robot '{name}': base_pose"))
     tip_name = _last_link(name, tree, actuated) if tip is None else name_of(tip, f"the tip of robot '{name}'")
     if not model.existFrame(tip_name):
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
@@ -122,7 +122,7 @@ def build_robot(
         allowed_collisions=frozenset(frozenset(pair) for pair in allowed_collisions),
         model=model,
         collision=collision,
-        visual=visual,
+        looks=looks,
         chain=_chain(model, actuated, ties),
         self_collision=self_collision,
         closed_form=closed_form,

@@ -32,8 +32,8 @@ class RobotCache:
 
     def put(self, key: str, robot: Robot, files: Iterable[str]) -> Robot:
         """Keep a robot that was made from ``files`` (and from the meshes that it names); returns it."""
-        solids = (*robot.collision.geometryObjects, *robot.visual.geometryObjects)
-        stamps = _stamps({*files, *(solid.meshPath for solid in solids)})
+        meshes = (solid.meshPath for solid in robot.collision.geometryObjects)
+        stamps = _stamps({*files, *meshes, *getattr(robot.looks, "files", ())})
         with self._lock:
             self._robots[key] = (robot, stamps)
             if len(self._robots) > CACHE_SIZE:

@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.solids import bvh, is_mesh, mesh_arrays
-from rrtik_ompl.copies import packed, unpacked
+from rrtik_ompl.copies import Once, packed, unpacked
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.robot import Robot
@@ -47,7 +47,8 @@ def robot_from_bytes(data: bytes) -> Robot:
         if key in _known:
             return _known[key]
     state: dict[str, Any] = {name: unpacked(value) for name, value in pickle.loads(data).items()}
-    state |= {name: _geometry(state[name]) for name in ("collision", "visual")}
+    state["collision"], looks = _geometry(state["collision"]), state["looks"]
+    state["looks"] = Once(_geometry, looks)
     state["model"] = _with_limits(*state["model"])
     return _remember(key, Robot(**state))
 
@@ -64,7 +65,7 @@ def _remember(key: bytes, robot: Robot) -> Robot:
 @lru_cache(maxsize=2)  # many problems of one robot are sent one after the other
 def _bytes_of(robot: Robot) -> bytes:
     state = {field.name: packed(getattr(robot, field.name)) for field in fields(robot)}
-    state |= {name: _items(state[name]) for name in ("collision", "visual")}
+    state |= {"collision": _items(robot.collision), "looks": _items(robot.visual)}
     state["model"] = _without_limits(robot.model)
     try:
         return pickle.dumps(state, protocol=5)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import coal
@@ -11,6 +13,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import bounded_array
 from rrtik_ompl.collision.shape_table import pieces
+from rrtik_ompl.copies import Once
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Tree
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.mesh import MAX_BYTES, finite_numbers
@@ -19,7 +22,19 @@ from rrtik_ompl.files.text import read_bytes
 GREY = (0.7, 0.7, 0.7, 1.0)
 
 
-def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, Any, Any]:
+class Looks(Once[pin.GeometryModel]):
+    """What is drawn of a robot: most of the bytes of its description, read when somebody looks for the first time.
+
+    Attributes:
+        files: The meshes.
+    """
+
+    def __init__(self, make: Callable[[], pin.GeometryModel], files: tuple[str, ...] = ()) -> None:
+        super().__init__(make)
+        self.files = files
+
+
+def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, Any, Looks]:
     """Pinocchio model, collision geometry and visual geometry of a tree.
 
     Args:
@@ -27,7 +42,7 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
         T_world_base: Pose of the root link, ``pinocchio.SE3``; identity if None.
 
     Raises:
-        InputError: If a mesh file cannot be read.
+        InputError: If a mesh file of the collision geometry cannot be read.
     """
     model = pin.Model()
     model.name = tree.where
@@ -45,7 +60,9 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
         _add_link(model, links[joint.child], places)
     meshes: dict[MeshFile, Any] = {}
     hard = _geometry(tree, places, meshes, "collision")
-    return model, hard, _geometry(tree, places, meshes, "visual")
+    drawn = (solid.shape for link in tree.links for solid in link.visual)
+    files = tuple(str(shape.path) for shape in drawn if isinstance(shape, MeshFile))
+    return model, hard, Looks(partial(_geometry, tree, places, meshes, "visual"), files)
 
 
 @dataclass(slots=True, eq=False)

@@ -1,23 +1,23 @@
-"""All kernels made at once: processes make a library each, so that every core takes part."""
+"""Several libraries of kernels made at once by processes, so that every core takes part."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from rrtik_ompl.fast.simd.bitcode_store import packaged_bitcode
+from rrtik_ompl.fast.simd.bitcode_store import has_bitcode, packaged_bitcode
 from rrtik_ompl.fast.simd.code_files import kept_code, kernel_modules, kernels_by_size, machine_key
-from rrtik_ompl.fast.simd.library import code_file, library
+from rrtik_ompl.fast.simd.library import code_file, is_loaded, library
 from rrtik_ompl.fast.threads import cores
 from rrtik_ompl.files.notice import COMPILING, tell_once
 
 ROOT = Path(__file__).parents[2]  # where this package stands: another process shall take no other
 MAKE = "import sys; sys.path.insert(0, sys.argv[1]); from rrtik_ompl.fast.simd.library import library; "
-MAKE += "sys.exit(library(sys.argv[2]) is None)"
+MAKE += "sys.exit(None in [library(name) for name in sys.argv[2:]])"
 
 
 def warm_up(report: Callable[[str], None], *, jobs: int | None = None) -> bool:
@@ -40,6 +40,35 @@ def warm_up(report: Callable[[str], None], *, jobs: int | None = None) -> bool:
     return all(library(name) is not None for name in names)
 
 
+def load_together(names: Sequence[str]) -> None:
+    """Load libraries that are about to be used; processes share in making those whose bitcode is there.
+
+    A library takes LLVM half a second, once on a machine, and LLVM makes one at a time in a process.
+    """
+    missing = [name for name in dict.fromkeys(names) if not is_loaded(name) and _missing(name) and has_bitcode(name)]
+    shares = [missing[k :: cores()] for k in range(min(cores(), len(missing)))]
+    others: list[subprocess.Popen[bytes]] = []
+    try:
+        with suppress(OSError):  # no process can be begun: all is made here
+            others += [_maker(share) for share in shares[1:]]
+        for name in shares[0] if shares else ():
+            library(name)
+        for other in others:
+            other.wait()
+    finally:
+        for other in others:
+            other.terminate()
+            other.wait()
+    for name in names:
+        library(name)
+
+
+def _maker(names: list[str]) -> subprocess.Popen[bytes]:
+    """A process that makes libraries and keeps them in the user's cache."""
+    command = [sys.executable, "-W", "ignore", "-c", MAKE, str(ROOT), *names]
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
 def _missing(name: str) -> bool:
     """Whether another process can make a library and keep it for this one."""
     file = code_file(name)
@@ -60,8 +89,7 @@ def _made_by_others(names: list[str], jobs: int) -> Iterator[Callable[[str], Non
     others: list[subprocess.Popen[bytes]] = []
 
     def make(name: str) -> None:
-        command = [sys.executable, "-W", "ignore", "-c", MAKE, str(ROOT), name]
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        with _maker([name]) as process:
             others.append(process)
 
     pool = ThreadPoolExecutor(jobs)

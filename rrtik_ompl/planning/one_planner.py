@@ -6,7 +6,7 @@ import time
 from types import MappingProxyType
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.fast.warming import load_together
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ompl_bridge.attempt import attempt_seeds
@@ -65,8 +65,7 @@ def load_kernels_for(problem: Problem, factory: PlannerFactory) -> None:
     if not isinstance(problem.goal, JointGoal):
         load_kernels(problem.robot)
     if problem.world.fast is not None or problem.constraints:
-        for name in (*traits_of(factory).kernels, PROOF_KERNELS):
-            library(name)
+        load_together((*traits_of(factory).kernels, PROOF_KERNELS))
 
 
 def _refuse_if_it_breaks_constraints(name: str, factory: PlannerFactory) -> None:

@@ -9,16 +9,19 @@ from types import MappingProxyType
 from typing import Any
 
 from rrtik_ompl.errors import InputError, PlannerError
-from rrtik_ompl.fast.search.shortcut_layout import KERNELS
+from rrtik_ompl.fast.search.shortcut_layout import KERNELS as SHORTCUT_KERNELS
+from rrtik_ompl.fast.search.taut.layout import KERNELS as TAUT_KERNELS
+from rrtik_ompl.fast.warming import load_together
 from rrtik_ompl.goal import TipGoal
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits, planners_with
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits, planners_with, traits_of
 from rrtik_ompl.planning.one_planner import run_planner
 from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import shorten
 from rrtik_ompl.world.kept_clearance import possible_clearance
-from rrtik_ompl.world.motion_queries import has_kernels
+from rrtik_ompl.world.proof import PROOF_KERNELS
+from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
 
 SHARE = 0.5  # of the time left, for each planner but the last
 SHORTENING_CHECKS = 600  # motions, which take some 10 ms; a count, so that the same seed gives the same path
@@ -39,10 +42,10 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
         PlannerError: If every planner broke.
     """
     refuse_options(request.parameters)
+    _load_kernels(problem)
     best, reasons, totals, spent = _search(problem, request)
     path, left = best.path, request.seconds - spent
     if path is not None and len(path.waypoints) > 2 and left > 0.0:
-        has_kernels(problem.world, KERNELS)  # loads them, which is no part of planning
         begin = time.perf_counter()
         clearance = possible_clearance(problem.world, request.clearance, path.waypoints)
         limits: dict[str, Any] = {"seconds": left, "checks": SHORTENING_CHECKS, "clearance": clearance}
@@ -51,6 +54,13 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
         spent += time.perf_counter() - begin
     reason = "" if best.found else reasons
     return replace(best, path=path, reason=reason, seconds=spent, statistics=MappingProxyType(totals))
+
+
+def _load_kernels(problem: Problem) -> None:
+    """Load what the first planner and the shortening will use: the first time on a machine that takes a while."""
+    if problem.world.fast is not None:
+        first = traits_of(find_planner(members(problem)[0])).kernels if members(problem) else ()
+        load_together((*first, PROOF_KERNELS, SHORTCUT_KERNELS, PROVEN_KERNELS, TAUT_KERNELS))
 
 
 def _search(problem: Problem, request: Request) -> tuple[Plan, str, dict[str, int | float], float]:

@@ -144,6 +144,15 @@ def test_materials_may_be_defined_after_use_and_twice():
     assert robot.visual.geometryObjects[0].meshColor.tolist() == [1, 0, 0, 1]
 
 
+def test_a_mesh_that_is_only_drawn_is_read_when_somebody_looks(tmp_path):
+    (tmp_path / "broken.obj").write_bytes(b"v 0 0 nan\n")
+    (tmp_path / "arm.urdf").write_text(solid("<mesh filename='broken.obj'/>", "visual"))
+    robot = robot_from_urdf(tmp_path / "arm.urdf")
+    assert robot.fk(np.zeros(2)).translation[2] == 0.5  # planning does not need it
+    with pytest.raises(InputError, match=r"broken\.obj holds numbers that are not finite"):
+        robot.visual  # noqa: B018
+
+
 SRDF = """<robot name="arm">
   <group name="chain"><chain base_link="base" tip_link="hand"/></group>
   <group name="joints"><joint name="elbow"/></group>

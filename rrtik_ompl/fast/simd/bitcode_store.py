@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from rrtik_ompl.fast.simd.code_files import (
     FOLDER,
     Code,
     bitcode_key,
     bitcode_name,
     file_name,
+    kept_code,
     kept_or_made,
     machine_key,
     read_code,
@@ -23,6 +26,12 @@ def packaged_bitcode(name: str) -> Code | None:
     return read_code(FOLDER / bitcode_name(name, target), bitcode_key(name, target))
 
 
+def has_bitcode(name: str) -> bool:
+    """Whether LLVM alone, in about half a second, makes a library, for its bitcode is there."""
+    file, key = _own_file(name)
+    return packaged_bitcode(name) is not None or kept_code(file, key) is not None
+
+
 def own_bitcode(name: str) -> Code:
     """The bitcode that this machine has made of the sources; made now if it is not in the user's cache.
 
@@ -30,8 +39,7 @@ def own_bitcode(name: str) -> Code:
         ImportError: Without numba.
         RuntimeError: If a kernel needs Python or numba to run.
     """
-    key, folder = f"bitcode {machine_key(name)}", cache_folder("kernels")
-    file = None if folder is None else folder / file_name(name, key, "bitcode")
+    file, key = _own_file(name)
 
     def make() -> Code:
         from rrtik_ompl.fast.simd.bitcode import compiled_module
@@ -40,3 +48,9 @@ def own_bitcode(name: str) -> Code:
         return compiled_module(name)
 
     return kept_or_made(file, key, make)
+
+
+def _own_file(name: str) -> tuple[Path | None, str]:
+    """Where the user's cache keeps the bitcode of a library, None without a cache, and its key."""
+    key, folder = f"bitcode {machine_key(name)}", cache_folder("kernels")
+    return None if folder is None else folder / file_name(name, key, "bitcode"), key

@@ -63,6 +63,11 @@ def library(name: str) -> Library | None:
         return _libraries[name]
 
 
+def is_loaded(name: str) -> bool:
+    """Whether this process has asked for the kernels of a module before."""
+    return name in _libraries
+
+
 _said: set[str] = set()  # reasons
 
 
