@@ -34,16 +34,22 @@ class Dragged:
         drags: How many were made.
         paths: How many gave a path; the others blocked an end, or no path was found.
         refused: What `rrtik check` said of those that it refused.
-        times: From a drag of the goal to the new path, drawn [ms].
+        waits: From a drag of the goal until the new path is there, ready to be drawn [ms].
+        times: Until it has been drawn [ms].
+        kernels: Until the kernels of the page were ready [ms].
         loaded: Until the page could plan [ms].
+        drawing: Of that the start of the engine that draws and of its renderer [ms].
         size: Of the page [bytes].
     """
 
     drags: int
     paths: int
     refused: list[str]
+    waits: list[float]
     times: list[float]
+    kernels: float
     loaded: float
+    drawing: float
     size: int
 
 
@@ -75,7 +81,8 @@ def dragged(problem: rrtik.Problem, drags: int, timed: int, seed: int) -> Dragge
     files = [each for each in found["files"] if each is not None]
     refused = [said for each in files if (said := _refused(each)) is not None]
     size = len(page(problem, path).encode())
-    return Dragged(drags, len(files), refused, found["times"], found["loaded"], size)
+    seconds = {key: found[key] for key in ("waits", "times", "kernels", "loaded", "drawing")}
+    return Dragged(drags, len(files), refused, **seconds, size=size)
 
 
 def _refused(files: dict[str, str]) -> str | None:

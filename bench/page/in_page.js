@@ -1,6 +1,6 @@
 // What the report does in a page: random drags whose files are sent home, and drags that are timed until a path is drawn.
 (() => {  // the names of the page's own script are not ours
-  let drawnAt = null;  // when the page first drew the path of a drag
+  let at = null;  // when the page first had the path of a drag
 
   function randomNumbers(seed) {  // a linear congruential generator: the same drags every time
     let value = seed;
@@ -61,30 +61,37 @@
   const frame = () => new Promise((done) => { requestAnimationFrame(done); });
 
   async function timedDrags(count, seed) {
-    const [random, times] = [randomNumbers(seed), []];
+    const [random, times, waits] = [randomNumbers(seed), [], []];
     const draw = replacePath;
-    window.replacePath = (rows) => { draw(rows); drawnAt ??= performance.now(); };
+    window.replacePath = (rows) => { at ??= performance.now(); draw(rows); };
     for (let n = 0; n < count; n += 1) {
       const begin = performance.now();
-      drawnAt = null;
+      at = null;
       remember();
       select("goal");
       moveSelected(new THREE.Vector3(...[0, 1, 2].map(() => 0.04 * size * (random() - 0.5))), 0);
-      for (let k = 0; k < 200 && drawnAt === null; k += 1) await frame();
-      if (drawnAt !== null && story.moves.length) times.push(drawnAt - begin);
-      else undo();
+      for (let k = 0; k < 200 && at === null; k += 1) await frame();
+      await frame();  // in which it is drawn; at the next one it has been
+      await frame();
+      if (at !== null && story.moves.length) {
+        times.push(performance.now() - begin);
+        waits.push(at - begin);
+      } else undo();
+      for (let k = 0; k < 5; k += 1) await frame();
     }
     window.replacePath = draw;
-    return times;
+    return { times, waits };
   }
 
   async function work() {
     const { drags, timed, seed } = JSON.parse(document.getElementById("work").textContent);
     while (document.documentElement.dataset.plans !== "yes") await frame();
     const loaded = performance.now();
-    const times = await timedDrags(timed, seed);
+    const [kernelsAt, unpackedAt, viewerAt] = ["kernels", "unpacked", "viewer"].map((name) => performance.getEntriesByName(name)[0].startTime);
+    const found = await timedDrags(timed, seed);
     const files = randomDrags(drags, seed);
-    await fetch("opinion", { method: "POST", body: JSON.stringify({ loaded, times, files }) });
+    const loading = { loaded, kernels: kernelsAt, drawing: viewerAt - unpackedAt };
+    await fetch("opinion", { method: "POST", body: JSON.stringify({ ...loading, ...found, files }) });
   }
 
   work();

@@ -83,12 +83,20 @@ def written(
         refused == 0,
     )
     for name, each in drags.items():
-        median, tail = np.percentile(each.times, (50, 95)) if each.times else (np.inf, np.inf)
-        good = bool(median <= MEDIAN and tail <= TAIL)
-        report.bar(f"drag to new path, {name}", "median 16 ms, 95 % 50 ms", f"{median:.0f} ms, {tail:.0f} ms", good)
+        for what, times in (("there", each.waits), ("on screen, drawn by the processor", each.times)):
+            median, tail = np.percentile(times, (50, 95)) if times else (np.inf, np.inf)
+            good = bool(median <= MEDIAN and tail <= TAIL)
+            wanted = "median 16 ms, 95 % 50 ms"
+            report.bar(f"drag to new path {what}, {name}", wanted, f"{median:.1f} ms, {tail:.0f} ms", good)
     titan = drags["titan4_sdu"]
     report.bar("page of titan4_sdu", "1.25 MB", f"{titan.size / 1e6:.2f} MB", titan.size <= SMALL)
-    report.bar("until it can plan", "300 ms", f"{titan.loaded:.0f} ms", titan.loaded <= QUICK)
+    report.bar("until its kernels are ready", "300 ms", f"{titan.kernels:.0f} ms", titan.kernels <= QUICK)
+    report.bar(
+        "until it can plan, drawn by the processor",
+        "300 ms",
+        f"{titan.loaded:.0f} ms, of which {titan.drawing:.0f} ms start the engine and its renderer",
+        titan.loaded <= QUICK,
+    )
     rows = [
         [name, f"{a.configurations}", f"{a.motions}", f"{a.free}", f"{a.differ}", f"{a.rash}"]
         for name, a in answers.items()
@@ -98,7 +106,7 @@ def written(
         ["robot", "configurations", "motions", "of the configurations free", "answers that differ", "rashly free"],
         rows,
         text="A box, a ball, a cylinder and a capsule, each moved, turned and made another size twenty times, in node. "
-        "Where a base is not convex the page takes the convex pieces around it, and is the stricter of the two.",
+        "A base is compared by its triangles; one of more than 10,000 (so101, kinova) by the convex pieces around it.",
     )
     kinds = {False: "RRT-Connect", True: "one joint at a time"}
     rows = [
@@ -121,28 +129,27 @@ def written(
             f"{d.drags}",
             f"{d.paths}",
             f"{len(d.refused)}",
-            f"{np.median(d.times):.1f}",
+            f"{np.median(d.waits):.1f}" if d.waits else "",
+            f"{np.median(d.times):.1f}" if d.times else "",
+            f"{d.kernels:.0f}",
             f"{d.loaded:.0f}",
             f"{d.size / 1e6:.2f}",
         ]
         for name, d in drags.items()
     ]
-    heads = ["problem", "drags", "with a path", "refused", "drag to path, median [ms]", "loaded [ms]", "page [MB]"]
+    heads = ["problem", "drags", "with a path", "refused", "path there, median [ms]", "drawn, median [ms]"]
+    heads += ["kernels ready [ms]", "loaded [ms]", "page [MB]"]
     report.table(
         "Drags in headless Chromium, drawn by the processor",
         heads,
         rows,
-        text="Wall times on a shared machine, pictures included: without a graphics card they take most of it.",
+        text="Wall times on a shared machine without a graphics card: SwiftShader draws on the processor, "
+        "whose two cores it takes from the page.",
     )
     for name, each in drags.items():
         if each.refused:
             report.note(f"Refused: {name}", "\n".join(f"- {line}" for line in each.refused))
     return report
-
-
-def _shown(drags: Dragged) -> list[str]:
-    median = f"{np.median(drags.times):.1f}" if drags.times else ""
-    return [median, f"{drags.loaded:.0f}", f"{drags.size / 1e6:.2f}"]
 
 
 def main() -> int:

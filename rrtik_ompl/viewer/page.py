@@ -37,10 +37,8 @@ ASKING_POLICY = f"{POLICY}; connect-src 'self'"  # of a page that asks this mach
 SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "clearance.js", "contacts.js", "player.js")
 BOX_SHARE = 0.1  # side of a box that is added, of the arm
 STARTING = ("unpack.js", "start.js")
+KERNELS = ("kernels.js", "obstacles.js", "fixed.js")
 PLANNING = (
-    "kernels.js",
-    "obstacles.js",
-    "fixed.js",
     "moves.js",
     "shapes.js",
     "saving.js",
@@ -107,6 +105,7 @@ def page(
         meshcat=_packed_engine(),
         story=story.replace("<", "\\u003c"),  # so that no name can end the element that holds it
         commands=packed(json.dumps([base64.b64encode(each).decode("ascii") for each in recording.commands]).encode()),
+        kernels=_packed_scripts(KERNELS if told["plan"] else ()),
         script=_packed_scripts(SCRIPTS + (PLANNING if told["plan"] else ())),
         start="\n".join(asset(name) for name in STARTING),
     )

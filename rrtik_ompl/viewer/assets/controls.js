@@ -170,19 +170,13 @@ function wireControls() {
   pane.addEventListener("pointercancel", endDrag, true);
 }
 
-async function startPlanning() {
+function startPlanning() {
   const section = document.getElementById("plan-section");
   section.hidden = false;
-  if (!hasKernels()) {
+  kernels = loading.kernels;
+  if (kernels === null) {
     section.querySelectorAll(".control").forEach((element) => { element.hidden = true; });
-    planStatus("this browser cannot plan in the page: it lacks WebAssembly with SIMD", true);
-    return;
-  }
-  try {
-    kernels = await Kernels.load(planning);
-  } catch (error) {
-    section.querySelectorAll(".control").forEach((element) => { element.hidden = true; });
-    planStatus(`the page cannot plan: ${error.message}`, true);
+    planStatus(loading.fault, true);
     return;
   }
   for (const obstacle of planning.obstacles) obstacle.first = { pose: obstacle.pose.slice(), sizes: obstacle.sizes.slice() };

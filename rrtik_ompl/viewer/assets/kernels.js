@@ -14,6 +14,16 @@ function hasKernels() {
     && typeof WebAssembly === "object" && WebAssembly.validate(new Uint8Array(vectors));
 }
 
+/** The kernels of a plan, or else in words why there are none. */
+async function loadedKernels(plan) {
+  if (!hasKernels()) return { kernels: null, fault: "this browser cannot plan in the page: it lacks WebAssembly with SIMD" };
+  try {
+    return { kernels: await Kernels.load(plan), fault: "" };
+  } catch (error) {
+    return { kernels: null, fault: `the page cannot plan: ${error.message}` };
+  }
+}
+
 class Kernels {
   /** From the planner's part of a story; see page_planner.py. */
   static async load(plan) {

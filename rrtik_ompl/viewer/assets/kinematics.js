@@ -1,6 +1,5 @@
 // Forward kinematics of the arm, and its posture at any time of the path.
 const THREE = MeshCat.THREE;
-const story = JSON.parse(document.getElementById("story").textContent);
 const robot = story.robot;
 
 /** Pose in the world of every joint frame, the world itself first, at configuration q [rad or m]. */

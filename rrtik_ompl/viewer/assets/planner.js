@@ -127,12 +127,22 @@ function applyObstacle(k) {
   moveDrawing(k);
 }
 
-let waiting = false;
+let again = null;  // whether something has changed since the path of this frame; null where none was looked for in it
+/** Find a path at once, so that the next picture has it; of several changes between two pictures the first and the last count. */
 function changed() {
   planRefusal("");
-  if (waiting || clock.running) return;
-  waiting = true;
-  requestAnimationFrame(() => { waiting = false; if (!clock.running) plan(); });
+  if (clock.running) return;
+  if (again !== null) {
+    again = true;
+    return;
+  }
+  again = false;
+  requestAnimationFrame(() => {
+    const missed = again;
+    again = null;
+    if (missed && !clock.running) plan();
+  });
+  plan();
 }
 
 function plan() {

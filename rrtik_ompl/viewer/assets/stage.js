@@ -4,6 +4,7 @@ const ROOT = ["meshcat"];
 let viewer;
 try {
   viewer = new MeshCat.Viewer(pane);
+  performance.mark("viewer");
 } catch (error) {
   const sorry = document.createElement("p");
   sorry.textContent = "This browser cannot draw in 3-D: WebGL is missing or switched off.";

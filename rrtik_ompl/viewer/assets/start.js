@@ -1,4 +1,8 @@
-// The page begins: its packed parts are unpacked, then the engine runs, then the page's own script.
+// The page begins: its packed parts are unpacked; the kernels are ready before the engine draws, for the first picture takes
+// the browser longest, and nothing else comes to an end meanwhile. Then the engine runs, then the page's own script.
+const story = JSON.parse(document.getElementById("story").textContent);
+let loading = null;  // the kernels, or why they are not there
+
 (async () => {
   const runScript = (id) => {
     const text = document.getElementById(id).textContent;
@@ -9,9 +13,16 @@
     document.getElementById("pane").append(Object.assign(document.createElement("p"), { textContent: sorry }));
     return;
   }
-  for (const part of document.querySelectorAll("script[type='application/gzip']")) {
-    part.textContent = new TextDecoder().decode(await unpacked(part.textContent));
+  const unpack = async (part) => { part.textContent = new TextDecoder().decode(await unpacked(part.textContent)); };
+  const kept = [...document.querySelectorAll("script[type='application/gzip']")].map((part) => [part.id, unpack(part)]);
+  if (story.plan) {
+    await new Map(kept).get("kernels");
+    runScript("kernels");
+    loading = await loadedKernels(story.plan);
+    performance.mark("kernels");
   }
+  await Promise.all(kept.map(([, done]) => done));
+  performance.mark("unpacked");
   runScript("engine");
   runScript("page");
 })();
