@@ -85,11 +85,11 @@ def follow(browser, hands, verb, look):
     browser.wait("state.message === 'all moves are done'")
 
 
-def pick_and_place(browser, running, kind, look=lambda: None):
+def pick_and_place(browser, running, kind, look=lambda: None, rate=3.0):
     """Take the tool, lift it, carry it to the rack and put it down; `look` is called whenever something has changed."""
     browser.open(running.server.url)
     browser.wait("state && state.objects.length === 2 && role.role === 'pilot' && window.measured.frames.C > 0", 90.0)
-    faster(running)
+    faster(running, rate)
     hands = kind(browser)
     if browser.ask("state.target") != "tool":
         hands.tap("object", "state.target === 'tool'")

@@ -1,0 +1,85 @@
+"""Films a whole task on the pilot's page in a headless browser: a tool is taken, lifted, carried and put into its rack.
+
+Usage: ``python bench/pilot/film.py [--hands gamepad|keyboard] [--out bench/reports/pilot_task.mp4]``
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import sys
+import tempfile
+import time
+from bisect import bisect_right
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.shared.pages import add_out
+from rrtik_ompl.overlay.film import write_film
+from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle
+from rrtik_ompl.pilot.setup import SessionOptions
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "helpers"))
+from rrtik_tests.browser import Browser, Running
+from rrtik_tests.pilot_hands import HANDS, pick_and_place
+
+WIDTH, HEIGHT = 960, 540
+EVERY = 0.2  # [s] between pictures at least
+RATE = 5.0  # pictures a second of the film
+HELD = 2.0  # [s] of the last picture
+JOINT_RATE = 1.0  # [rad/s] of the arm's joints
+
+
+class Filming(Browser):  # type: ignore[misc]
+    """A browser that takes pictures of its page while it is asked how far things are."""
+
+    def __init__(self, folder: str) -> None:
+        """Start it."""
+        super().__init__(folder)
+        self.pictures: list[tuple[float, NDArray[np.uint8]]] = []
+        self.begun = False
+
+    def ask(self, script: str) -> Any:
+        """What a script says; a picture is taken before it where the last one is old."""
+        if self.begun and (not self.pictures or time.monotonic() - self.pictures[-1][0] >= EVERY):
+            self.look()
+        return super().ask(script)
+
+    def look(self) -> None:
+        """Take a picture."""
+        self.begun, now = True, time.monotonic()
+        data = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+        whole = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+        small = cv2.resize(whole, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+        self.pictures.append((now, np.asarray(small, dtype=np.uint8)))
+
+    def film(self) -> Iterator[NDArray[np.uint8]]:
+        """Its pictures at the rate of the film."""
+        times = [taken for taken, _ in self.pictures]
+        for now in np.arange(times[0], times[-1] + HELD, 1.0 / RATE):
+            yield self.pictures[bisect_right(times, now) - 1][1]
+
+
+def main() -> None:
+    """Do the task and write the film."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--hands", choices=sorted(HANDS), default="gamepad")
+    add_out(parser, "pilot_task.mp4", "the film")
+    options = parser.parse_args()
+    tool = Path(find_vehicle("titan4_sdu")).with_name("titan4_tool.yaml")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, closing(Filming(folder)) as browser:
+        with Running(SessionOptions("titan4_sdu", vehicle=tool, seed=1)) as running:
+            pick_and_place(browser, running, HANDS[options.hands], browser.look, rate=JOINT_RATE)
+        write_film(options.out, browser.film(), RATE)
+    count, size = len(browser.pictures), options.out.stat().st_size
+    print(f"wrote {options.out}: {count} pictures, {size / 1e6:.2f} MB, by {options.hands}")
+
+
+if __name__ == "__main__":
+    main()
