@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.canvas import NEAREST_DRAWN, Canvas
+from rrtik_ompl.overlay.canvas import FARTHEST_DRAWN, NEAREST_DRAWN, Canvas
 from rrtik_ompl.overlay.figure import Figure, figure_of, placed, tinted
 from rrtik_ompl.overlay.surfaces import ROBOT_TRIANGLES, ShapeSurfaces, obstacle_surfaces, robot_surfaces
 from rrtik_ompl.poses import rigid
@@ -26,6 +26,8 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 
 GHOST_TRIANGLES = 5_000
+FINE_PIXELS = 500_000  # of a picture; in larger ones ghosts are drawn half as fine, in a quarter of the time
+HALF_COVERED = 127
 MAX_FIGURES, MAX_LAYERS = 4, 6
 
 
@@ -65,15 +67,20 @@ class Layer:
     painted: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, canvas: Canvas) -> Layer:
-        """What is on a canvas."""
-        drawn = canvas.drawn
+    def of(cls, canvas: Canvas, camera: Camera) -> Layer:
+        """What is on a canvas, which may be coarser than the camera's pictures."""
+        colors, depths, drawn = canvas.colors, canvas.depths.copy(), canvas.drawn
+        if depths.shape != (camera.height, camera.width):
+            size = camera.width, camera.height
+            colors, depths = (cv2.resize(each, size, interpolation=cv2.INTER_NEAREST) for each in (colors, depths))
+            share = cv2.resize(255 * drawn.view(np.uint8), size, interpolation=cv2.INTER_LINEAR)
+            drawn = (depths < FARTHEST_DRAWN) & (share > HALF_COVERED)  # without the steps of the coarse one
         left, top, width, height = cv2.boundingRect(drawn.view(np.uint8))
         box = np.s_[top : top + height, left : left + width]
-        piece: Any = canvas.colors[box]
+        piece: Any = colors[box]
         if width > 0:
             piece = cv2.cvtColor(cv2.convertScaleAbs(piece, alpha=255.0), cv2.COLOR_RGB2BGR)
-        return cls(canvas.depths.copy(), drawn, box, np.asarray(piece, dtype=np.uint8))
+        return cls(np.asarray(depths), drawn, box, np.asarray(piece, dtype=np.uint8))
 
     def blend(self, picture: NDArray[np.uint8], mask: NDArray[np.bool_], opacity: float) -> None:
         """Lay it over a picture where a mask is, in place."""
@@ -97,6 +104,8 @@ class Augmenter:
         """
         self.robot, self.camera = robot, camera
         self._canvas = Canvas(camera)
+        large = camera.width * camera.height > FINE_PIXELS
+        self._ghosts_canvas = Canvas(_half(camera)) if large else self._canvas
         self._layers: dict[Hashable, Layer] = {}
         self._arm = figure_of(robot_surfaces(robot, triangles))
         thin = robot_surfaces(robot, min(triangles, GHOST_TRIANGLES))
@@ -212,15 +221,16 @@ class Augmenter:
         """
         key = (arm, None if q is None else np.asarray(q).tobytes(), solids, T.tobytes(), color)
         if key not in self._layers:
-            self._canvas.clear()
+            canvas = self._ghosts_canvas if arm is self._ghost or arm is self._gripper else self._canvas
+            canvas.clear()
             if arm is not None and q is not None:
                 shown = placed(arm, T @ (self._all_at(q) if q.ndim == 2 else self._joint_frames(q)))
-                self._canvas.draw(shown if color is None else tinted(shown, palette.fractions(color)))
+                canvas.draw(shown if color is None else tinted(shown, palette.fractions(color)))
             if solids is not None:
-                self._canvas.draw(placed(solids, T[None]))
+                canvas.draw(placed(solids, T[None]))
             if len(self._layers) >= MAX_LAYERS:
                 self._layers.pop(next(iter(self._layers)))
-            self._layers[key] = Layer.of(self._canvas)
+            self._layers[key] = Layer.of(canvas, self.camera)
         layer = self._layers[key] = self._layers.pop(key)  # the one that was used last is the last to go
         return layer
 
@@ -274,6 +284,14 @@ class Augmenter:
         for axis, color in enumerate(palette.AXES):
             tip = pose.translation + length * pose.rotation[:, axis]
             self._draw_line(drawn, np.stack([pose.translation, tip]), T_camera_base, color)
+
+
+def _half(camera: Camera) -> Camera:
+    """The same view with half as many pixels a side."""
+    matrix = np.array(camera.matrix)
+    matrix[:2, :2] *= 0.5
+    matrix[:2, 2] = 0.5 * (matrix[:2, 2] + 0.5) - 0.5
+    return Camera(matrix, (camera.width + 1) // 2, (camera.height + 1) // 2, camera.distortion)
 
 
 def _bgr(color: str) -> tuple[int, int, int]:

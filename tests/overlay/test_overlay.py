@@ -1,11 +1,13 @@
 """The arm over a picture: silhouettes against a plain z-buffer, registration against projection, what hides what."""
 
+import cv2
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from rrtik_ompl import load_robot
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.overlay import augment
 from rrtik_ompl.overlay.augment import MAX_LAYERS, Augmenter, Ghost
 from rrtik_ompl.overlay.canvas import FARTHEST_DRAWN, Canvas
 from rrtik_ompl.overlay.figure import figure_of, placed
@@ -152,3 +154,16 @@ def test_the_eye_looks_at_its_centre_with_the_world_upright():
 def test_a_picture_of_another_size_is_refused():
     with pytest.raises(InputError, match="picture"):
         Augmenter(load_robot("ur5"), CAMERA).draw(np.zeros((10, 10, 3), np.uint8), EYE)
+
+
+def test_ghosts_of_large_pictures_are_where_finer_ones_would_be(monkeypatch):
+    camera, robot = pinhole_camera(1280, 720), load_robot("titan4")
+    blank, q = np.zeros((720, 1280, 3), dtype=np.uint8), np.zeros(robot.dof)
+    coarse = Augmenter(robot, camera).draw(blank, EYE, ghosts=[Ghost(q, opacity=1.0)]).any(axis=2)
+    monkeypatch.setattr(augment, "FINE_PIXELS", camera.width * camera.height)
+    fine = Augmenter(robot, camera).draw(blank, EYE, ghosts=[Ghost(q, opacity=1.0)]).any(axis=2)
+    assert fine.sum() > 10_000
+    around = np.ones((3, 3), dtype=np.uint8)
+    edge = cv2.dilate(fine.view(np.uint8), around) != cv2.erode(fine.view(np.uint8), around)
+    assert not (coarse != fine)[~edge].any()
+    assert abs(int(coarse.sum()) - int(fine.sum())) < 0.01 * fine.sum()
