@@ -30,6 +30,7 @@ MAX_REPROJECTION_ERROR = 2.0  # [pixels] of a corner; a larger one means a wrong
 MAX_BENT = 0.04  # the same as a share of a single marker's side: sheets that are bent deviate by as much, and say so
 
 MAX_CONTRADICTION = 5.0  # `surprise` of markers together; wrong sides by 0.5 % make 6 to 40, right ones 0.2 to 1
+MAX_STRAIN = 9.0  # three standard deviations of the focal length, or of the lens, against what the file says
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,5 +185,10 @@ def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
         return (
             f"its markers contradict each other, corners lie {pose.error:.2f} pixels off: measure their sides and "
             "places again, calibrate the camera, or state what is not certain (side_sigma, sigmas_px)"
+        )
+    if len(markers) > 1 and pose.strain > MAX_STRAIN:
+        return (
+            f"its markers contradict the camera's file by {pose.strain**0.5:.1f} standard deviations of its focal "
+            "length or lens: calibrate the camera, or state what is not certain (sigmas_px, distortion_sigmas)"
         )
     return ""

@@ -107,6 +107,17 @@ def test_a_wrong_focal_length_contradicts_two_markers_of_different_distance():
     assert several(believed=wrong)[0] >= 0.9
 
 
+@pytest.mark.parametrize("off", [np.array([0.01, 0.01, 0.0]), np.array([0.0, 0.0, 0.06])], ids=["focal", "lens"])
+def test_what_another_focal_length_or_lens_would_explain_is_told_as_such(off):
+    matrix, lens = CAMERA.matrix.copy(), CAMERA.distortion.copy()
+    matrix[[0, 1], [0, 1]] *= 1.0 + off[:2]
+    lens[0] += off[2]
+    refused, _, reasons = several(believed=Camera(matrix, 640, 480, lens))
+    blunt = np.mean(["each other" in each for each in reasons])
+    assert refused > max(1.2 * blunt, 0.3)
+    assert any("focal length or lens" in each for each in reasons)
+
+
 def test_what_is_stated_is_no_contradiction_and_in_the_covariance():
     refused, within, _ = several(side=1.02, doubt=0.015)
     assert refused == 0.0

@@ -102,9 +102,20 @@ class Camera:
         _, slopes = cv2.projectPoints(rows[:, None], ORIGIN, shift, self.matrix, self.distortion)
         return np.hstack([slopes[:, 3:6], slopes[:, :3]])
 
-    def doubt(self, points: ArrayLike) -> Matrix:
-        """Covariance of the pixels of points in the frame of the camera, by `sigmas`. Shape (2 m, 2 m) [pixels^2]."""
+    def own_slopes(self, points: ArrayLike) -> Matrix:
+        """How pixels of points in the frame of the camera change with its own numbers. Shape (2 m, 9).
+
+        Args:
+            points: Shape (m, 3) [m].
+
+        Returns:
+            d pixel / d (fx, fy, cx, cy [pixels], k1, k2, p1, p2, k3).
+        """
         rows = np.ascontiguousarray(points, dtype=np.float64)
         _, slopes = cv2.projectPoints(rows[:, None], ORIGIN, ORIGIN, self.matrix, self.distortion)
-        each = slopes[:, 6:15] * self.sigmas
+        return np.asarray(slopes[:, 6:15], dtype=np.float64)
+
+    def doubt(self, points: ArrayLike) -> Matrix:
+        """Covariance of the pixels of points in the frame of the camera, by `sigmas`. Shape (2 m, 2 m) [pixels^2]."""
+        each = self.own_slopes(points) * self.sigmas
         return np.asarray(each @ each.T, dtype=np.float64)

@@ -40,6 +40,8 @@ class CornerPose:
         covariance: Of (position [m], small rotation about the axes of the camera [rad]). Shape (6, 6).
         surprise: Squared deviations of the points from their pixels, by what is known of both, for each number that
             they have more than a pose: 1 is usual; far more is a contradiction.
+        strain: Of these squared deviations, how many another focal length alone would explain, or another bend of the
+            lens, whichever is more: as large as the square of a normal number by chance. 0 for a single square.
     """
 
     T_camera_object: pin.SE3
@@ -48,6 +50,7 @@ class CornerPose:
     other_error: float
     covariance: Matrix
     surprise: float = 1.0
+    strain: float = 0.0
 
     @property
     def ambiguous(self) -> bool:
@@ -126,7 +129,8 @@ def pose_of_points(
     best = _refined(camera, points, pixels, _guesses(camera, points, pixels)[0])
     error = _error(camera, points, pixels, best)
     known = _of_pixels(len(points), sigma, spread), _of_points(camera, points, best, shifts)
-    return CornerPose(best, None, error, np.inf, *_covariance(camera, points, pixels, best, known))
+    covariance, surprise = _covariance(camera, points, pixels, best, known)
+    return CornerPose(best, None, error, np.inf, covariance, surprise, _strain(camera, points, pixels, best, known))
 
 
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
@@ -199,3 +203,17 @@ def _covariance(
     squares = float(away @ weighed[:, 0] - lever[:, 0] @ np.linalg.solve(lever[:, 1:], lever[:, 0]))
     covariance = max(squares / MAX_SURPRISE, 1.0) * (back @ found @ back.T) + back @ doubted @ back.T
     return frozen(covariance), max(squares, 0.0) / (2 * len(points) - 6)
+
+
+def _strain(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, known: tuple[Matrix, Matrix]) -> float:
+    """Squared deviations that another focal length or another k1 would explain: their score tests [69]."""
+    turned = points @ pose.rotation.T
+    seen = turned + pose.translation
+    away, slopes = (camera.project(seen) - pixels).ravel(), camera.jacobian(turned, pose.translation)
+    own = camera.own_slopes(seen)
+    lens = np.c_[own[:, :2] @ camera.matrix[[0, 1], [0, 1]], own[:, 4]]
+    weighed = np.linalg.solve(known[0] + known[1], np.c_[away, slopes, lens])
+    lever = slopes.T @ weighed
+    freed = weighed - weighed[:, 1:7] @ np.linalg.solve(lever[:, 1:7], lever)  # of what another pose explains
+    score, told = lens.T @ freed[:, 0], np.einsum("ij,ij->j", lens, freed[:, 7:])
+    return float((score**2 / np.maximum(told, 1e-9)).max())
