@@ -13,6 +13,7 @@ import time
 from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import closing
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +27,17 @@ from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle
 from rrtik_ompl.pilot.setup import SessionOptions
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "helpers"))
-from rrtik_tests.browser import Browser, Running
-from rrtik_tests.pilot_hands import HANDS, pick_and_place
+browser: Any = import_module("rrtik_tests.browser")
+hands: Any = import_module("rrtik_tests.pilot_hands")
 
-WIDTH, HEIGHT = 960, 540
-EVERY = 0.2  # [s] between pictures at least
-RATE = 5.0  # pictures a second of the film
+WIDTH, HEIGHT = 800, 450
+EVERY = 0.25  # [s] between pictures at least
+RATE = 4.0  # pictures a second of the film
 HELD = 2.0  # [s] of the last picture
 JOINT_RATE = 1.0  # [rad/s] of the arm's joints
 
 
-class Filming(Browser):  # type: ignore[misc]
+class Filming(browser.Browser):  # type: ignore[misc]
     """A browser that takes pictures of its page while it is asked how far things are."""
 
     def __init__(self, folder: str) -> None:
@@ -55,7 +56,7 @@ class Filming(Browser):  # type: ignore[misc]
         """Take a picture."""
         self.begun, now = True, time.monotonic()
         data = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
-        whole = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+        whole: Any = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
         small = cv2.resize(whole, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
         self.pictures.append((now, np.asarray(small, dtype=np.uint8)))
 
@@ -69,15 +70,15 @@ class Filming(Browser):  # type: ignore[misc]
 def main() -> None:
     """Do the task and write the film."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--hands", choices=sorted(HANDS), default="gamepad")
+    parser.add_argument("--hands", choices=sorted(hands.HANDS), default="gamepad")
     add_out(parser, "pilot_task.mp4", "the film")
     options = parser.parse_args()
     tool = Path(find_vehicle("titan4_sdu")).with_name("titan4_tool.yaml")
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, closing(Filming(folder)) as browser:
-        with Running(SessionOptions("titan4_sdu", vehicle=tool, seed=1)) as running:
-            pick_and_place(browser, running, HANDS[options.hands], browser.look, rate=JOINT_RATE)
-        write_film(options.out, browser.film(), RATE)
-    count, size = len(browser.pictures), options.out.stat().st_size
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, closing(Filming(folder)) as page:
+        with browser.Running(SessionOptions("titan4_sdu", vehicle=tool, seed=1)) as running:
+            hands.pick_and_place(page, running, hands.HANDS[options.hands], page.look, rate=JOINT_RATE)
+        write_film(options.out, page.film(), RATE)
+    count, size = len(page.pictures), options.out.stat().st_size
     print(f"wrote {options.out}: {count} pictures, {size / 1e6:.2f} MB, by {options.hands}")
 
 

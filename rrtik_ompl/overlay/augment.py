@@ -69,7 +69,9 @@ class Layer:
     @classmethod
     def of(cls, canvas: Canvas, camera: Camera) -> Layer:
         """What is on a canvas, which may be coarser than the camera's pictures."""
-        colors, depths, drawn = canvas.colors, canvas.depths.copy(), canvas.drawn
+        colors: Any = canvas.colors
+        depths: Any = canvas.depths.copy()
+        drawn = canvas.drawn
         if depths.shape != (camera.height, camera.width):
             size = camera.width, camera.height
             colors, depths = (cv2.resize(each, size, interpolation=cv2.INTER_NEAREST) for each in (colors, depths))
