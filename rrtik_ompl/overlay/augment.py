@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.canvas import FARTHEST_DRAWN, NEAREST_DRAWN, Canvas
+from rrtik_ompl.overlay.canvas import FARTHEST_DRAWN, NEAREST_DRAWN, Canvas, half_as_fine
 from rrtik_ompl.overlay.figure import Figure, figure_of, placed, tinted
 from rrtik_ompl.overlay.surfaces import ROBOT_TRIANGLES, ShapeSurfaces, obstacle_surfaces, robot_surfaces
 from rrtik_ompl.poses import rigid
@@ -107,7 +107,7 @@ class Augmenter:
         self.robot, self.camera = robot, camera
         self._canvas = Canvas(camera)
         large = camera.width * camera.height > FINE_PIXELS
-        self._ghosts_canvas = Canvas(_half(camera)) if large else self._canvas
+        self._ghosts_canvas = Canvas(half_as_fine(camera)) if large else self._canvas
         self._layers: dict[Hashable, Layer] = {}
         self._arm = figure_of(robot_surfaces(robot, triangles))
         thin = robot_surfaces(robot, min(triangles, GHOST_TRIANGLES))
@@ -286,14 +286,6 @@ class Augmenter:
         for axis, color in enumerate(palette.AXES):
             tip = pose.translation + length * pose.rotation[:, axis]
             self._draw_line(drawn, np.stack([pose.translation, tip]), T_camera_base, color)
-
-
-def _half(camera: Camera) -> Camera:
-    """The same view with half as many pixels a side."""
-    matrix = np.array(camera.matrix)
-    matrix[:2, :2] *= 0.5
-    matrix[:2, 2] = 0.5 * (matrix[:2, 2] + 0.5) - 0.5
-    return Camera(matrix, (camera.width + 1) // 2, (camera.height + 1) // 2, camera.distortion)
 
 
 def _bgr(color: str) -> tuple[int, int, int]:

@@ -69,6 +69,14 @@ class Canvas:
         )
 
 
+def half_as_fine(camera: Camera) -> Camera:
+    """The same view with half as many pixels a side."""
+    matrix = np.array(camera.matrix)
+    matrix[:2, :2] *= 0.5
+    matrix[:2, 2] = 0.5 * (matrix[:2, 2] + 0.5) - 0.5
+    return Camera(matrix, (camera.width + 1) // 2, (camera.height + 1) // 2, camera.distortion)
+
+
 def _matrix(camera: Camera) -> tuple[NDArray[np.float64], float]:
     """World to OpenGL's camera (y up, looking along -z), the intrinsics folded in, and the opening angle [rad]."""
     (fx, _, cx), (_, fy, cy), _ = camera.matrix
