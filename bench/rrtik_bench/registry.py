@@ -11,6 +11,7 @@ from rrtik_bench.figures import genetic as genetic_figures
 from rrtik_bench.figures import ikurt as ikurt_figures
 from rrtik_bench.figures import mb_rrt as mb_rrt_figures
 from rrtik_bench.figures import sensing as sensing_figures
+from rrtik_bench.genetic import coding
 from rrtik_bench.genetic import tables as genetic
 from rrtik_bench.mb_rrt import tables as mb_rrt
 from rrtik_bench.sensing import camera_tables, sequences
@@ -19,7 +20,7 @@ from rrtik_bench.shortening import tables as shortening
 from rrtik_bench.tables import Collection
 
 PAGES = (
-    *(titan4, mb_rrt, genetic, crdt, ikurt, ikurt_limits, drrt_con, shortening),
+    *(titan4, mb_rrt, genetic, coding, crdt, ikurt, ikurt_limits, drrt_con, shortening),
     *(sensing, camera_tables, sequences, errata),
 )
 DRAWN = (mb_rrt_figures, genetic_figures, ikurt_figures, sensing_figures)

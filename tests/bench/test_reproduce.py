@@ -25,7 +25,8 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 HELD, BETTER, DIFFERS, REFUTED, MISSED = Verdict
 TABLES = {table.name: table for table in COLLECTION.tables}
 FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-sequences", "errata-kinematics", "errata-grim",
-        "crdt-routes", "mb-rrt-example", "mb-rrt-10", "ikurt-solutions", "ikurt-limits", "drrt-con-arm")  # fmt: skip
+        "crdt-routes", "mb-rrt-example", "mb-rrt-10", "ikurt-solutions", "ikurt-limits", "ga-reb-coding",
+        "drrt-con-arm")  # fmt: skip
 
 
 def test_all_tables_of_the_quick_round_together_are_said_to_take_less_than_ten_minutes():

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rrtik_bench.genetic.coding import GENERATIONS, coded_run
 from rrtik_bench.genetic.published import INCH, TABLE_4, curve
 from rrtik_bench.genetic.runs import TRAJECTORIES, arm, run
 from rrtik_bench.report.figures import Figure
@@ -64,10 +65,33 @@ def generations(drawing: Drawing, quick: bool) -> None:
     tidy(panel)
 
 
+def coding(drawing: Drawing, quick: bool) -> None:
+    """Distance from the first point by generation with both codes, and points gained."""
+    first, gained = drawing.subplots(1, 2)
+    for k, (name, gray) in enumerate({"Gray code": True, "natural binary": False}.items()):
+        for seed in range(3 if quick else 10):
+            run = coded_run(1, gray, seed, restarts=False)
+            one = int(run.cost_of_point[0]) if len(run.q) else len(run.distances)
+            first.plot(1 + np.arange(one), run.distances[:one] / INCH, color=COLORS[k], linewidth=0.9,
+                       label="" if seed else name)  # fmt: skip
+            gained.plot(np.append(np.cumsum(run.cost_of_point), GENERATIONS), [*range(1, len(run.q) + 1), len(run.q)],
+                        color=COLORS[k], linewidth=0.9)  # fmt: skip
+    first.axhline(0.002, color="#1d2733", linewidth=0.8)
+    first.set(xscale="log", yscale="log", xlabel="generation", ylabel="distance from the first point [in]")
+    gained.set(xlabel="generation", ylabel="points of 251")
+    first.legend(frameon=False, fontsize=8)
+    tidy(first)
+    tidy(gained)
+
+
 FIGURES: dict[str, tuple[Figure, ...]] = {
     "ga-reb-4": (
         Figure("genetic_curves", "The four trajectories", "[2], figure 2", curves, size=(8.0, 7.0)),
         Figure("genetic_joints", "Joints along them; broad: closed form", "[2], figure 3", joints, size=(9.0, 6.0)),
         Figure("genetic_generations", "Generations", "[2, table 4]", generations, "published totals as crosses"),
     ),
-}
+    "ga-reb-coding": (
+        Figure("genetic_coding", "Trajectory 1, no restarts; line: reached", "[2], choice of the code", coding,
+               "told in words only", size=(9.0, 4.2)),
+    ),
+}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Chromosomes: 16 bits of Gray code a joint, and the window of joint values that they encode.
+"""Chromosomes: 16 bits a joint, Gray code or natural binary, and the window of joint values that they encode.
 
 Source: [2], equation 1. Every chromosome is a configuration inside its window, so that limits need no penalty.
 """
@@ -36,32 +36,38 @@ def from_gray(codes: Genes) -> Genes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Window:
-    """The joint values among which is searched: ``centre`` and ``width`` [rad or m], shapes (dof,)."""
+    """The joint values among which is searched: ``centre`` and ``width`` [rad or m], shapes (dof,).
+
+    ``gray``: whether the genes are Gray code; else natural binary.
+    """
 
     centre: Vector
     width: Vector
+    gray: bool = True
 
     def decode(self, genes: Genes) -> Matrix:
         """Configurations of chromosomes, shape (population, dof)."""
-        q: Matrix = self.centre + (from_gray(genes) / LARGEST - 0.5) * self.width
+        numbers = from_gray(genes) if self.gray else genes
+        q: Matrix = self.centre + (numbers / LARGEST - 0.5) * self.width
         return q
 
     def encode(self, Q: Matrix) -> Genes:
         """The chromosomes nearest to configurations, shape (m, dof); outside the window those at its edge."""
         share = (Q - self.centre) / np.where(self.width > 0.0, self.width, 1.0) + 0.5
-        return to_gray(np.round(np.clip(share, 0.0, 1.0) * LARGEST).astype(np.uint16))
+        numbers = np.round(np.clip(share, 0.0, 1.0) * LARGEST).astype(np.uint16)
+        return to_gray(numbers) if self.gray else numbers
 
 
-def whole_range(robot: Robot) -> Window:
+def whole_range(robot: Robot, *, gray: bool = True) -> Window:
     """All values inside the limits; of a joint without limits one turn."""
     lower, upper = robot.finite_range()
-    return Window(0.5 * (lower + upper), upper - lower)
+    return Window(0.5 * (lower + upper), upper - lower, gray)
 
 
-def around(robot: Robot, centre: Vector, width: float) -> Window:
+def around(robot: Robot, centre: Vector, width: float, *, gray: bool = True) -> Window:
     """A window of a width [rad or m] at a posture, moved inside the limits; at most as wide as these."""
     widths = np.minimum(width, robot.upper - robot.lower)
-    return Window(np.clip(centre, robot.lower + 0.5 * widths, robot.upper - 0.5 * widths), widths)
+    return Window(np.clip(centre, robot.lower + 0.5 * widths, robot.upper - 0.5 * widths), widths, gray)
 
 
 def random_genes(rng: np.random.Generator, population: int, dof: int) -> Genes:

@@ -35,6 +35,7 @@ class GeneticOptions:
         motion_weight: What the joints' motion from the last point counts [m/rad].
         largest_step: Of any joint between two points [rad or m]; individuals farther away are not taken. None: any.
         singularity_weight: What manipulability counts in favour of a posture [m]; lengths in units of the reach.
+        gray: Whether genes are Gray code; natural binary if not, beside which [2] found it faster.
     """
 
     population: int = 100
@@ -51,6 +52,7 @@ class GeneticOptions:
     motion_weight: float = 0.0
     largest_step: float | None = None
     singularity_weight: float = 0.0
+    gray: bool = True
 
     def __post_init__(self) -> None:
         for name in ("population", "tournament", "generations", "stall", "start_over", "refined"):

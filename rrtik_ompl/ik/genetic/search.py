@@ -106,7 +106,7 @@ class GaRun:
         """Begin before the first point, with a random population in the whole range."""
         self.points: list[Vector] = []
         self.costs: list[int] = []
-        self.window = whole_range(self.robot)
+        self.window = whole_range(self.robot, gray=self.options.gray)
         self.attempts += 1
         self.draw()
         if self.near is not None:
@@ -169,7 +169,8 @@ class GaRun:
         if self.options.window is not None:
             step = q - self.points[-2] if len(self.points) > 1 else 0.0
             most = np.inf if self.options.largest_step is None else self.options.largest_step
-            self.window = around(self.robot, q + np.clip(self.gain * step, -most, most), self.options.window)
+            centre = q + np.clip(self.gain * step, -most, most)
+            self.window = around(self.robot, centre, self.options.window, gray=self.options.gray)
 
     def has_stalled(self, cost: float) -> bool:
         """Whether the best cost has not improved for as long as the options allow."""

@@ -228,3 +228,19 @@ def test_settings_that_make_no_sense_are_refused(field, value):
 def test_an_unknown_preset_lists_the_known_ones():
     with pytest.raises(UnknownNameError, match="historical, refined, standard"):
         rrtik.solve_ik_trajectory(rrtik.load_robot("puma560_3dof"), curve(1) * INCH, method="genetic", options="modern")
+
+
+@pytest.mark.parametrize("gray", [True, False])
+def test_configurations_come_back_from_both_codes(gray):
+    robot = rrtik.load_robot("puma560_3dof")
+    window = whole_range(robot, gray=gray)
+    Q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (50, 3))
+    np.testing.assert_allclose(window.decode(window.encode(Q)), Q, atol=1e-4)
+    assert around(robot, Q[0], 0.1, gray=gray).gray is gray
+
+
+def test_natural_binary_stands_still_where_gray_code_goes_on():
+    robot = rrtik.load_robot("puma560_3dof")
+    few = replace(STANDARD, generations=300, stall=None, start_over=None)
+    gained = [len(follow(robot, 1, replace(few, gray=gray), seed=2).q) for gray in (True, False)]
+    assert gained[0] > 50 > gained[1]

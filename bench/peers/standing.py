@@ -1,0 +1,227 @@
+"""The standing comparison: planners that pip installs on generated families and on MotionBenchMaker's problems.
+
+    python bench/peers/standing.py [FOLDER] [--problems N] [--seeds N] [--seconds S] [--python NAME=INTERPRETER ...]
+                                   [--pages FOLDER] [--out FILE]
+
+FOLDER holds the unpacked sets mbm_panda and mbm_ur5. Each path, ours and theirs, is judged three times: its ends, our
+dense second check, and a certificate that a second program verifies. ``--pages`` writes a page of each group that can
+be turned. What is done is kept beside the page: the same command goes on from there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import atexit
+import sys
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from itertools import groupby
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+import rrtik_ompl as rrtik
+from bench.peers.description import NoTask, task_of
+from bench.peers.host import Host
+from bench.peers.report import PEERS, interpreter, joins
+from bench.shared.parts import Parts, add_options
+from bench.speed.machine import machine
+from bench.whole_calls.search import scene_files
+from bench.whole_calls.search_calls import problem_of, spent
+from rrtik_bench.report.page import Report
+from rrtik_ompl import JointPath, Problem
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.generated_problems import FAMILIES, generated_problem
+
+OURS = "rrtik_ompl, plan()"
+GENERATED, SETS = ("titan4", "ur5", "panda"), ("panda", "ur5")
+PLANNER = "fastrrtconnect"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one planner made of one problem with one seed.
+
+    Attributes:
+        group: Arm and family.
+        planner: Who.
+        seconds: Of its process.
+        found: Whether it gave a path.
+        ends: Whether that leads from the start to the goal.
+        free: Whether our dense check finds nothing.
+        proven: Whether a certificate of it is verified.
+        length: [rad]; NaN without a path.
+        failed: Why it broke, or "".
+    """
+
+    group: str
+    planner: str
+    seconds: float
+    found: bool
+    ends: bool
+    free: bool
+    proven: bool
+    length: float
+    failed: str
+
+
+def judged(group: str, planner: str, problem: Problem, rows: Matrix | None, seconds: float, failed: str) -> Outcome:
+    """A path and what the three judges say of it."""
+    if rows is None:
+        return Outcome(group, planner, seconds, False, False, False, False, float("nan"), failed)
+    path = JointPath.of(problem.robot, rows)
+    free = not path.violations(problem.world)
+    proof = rrtik.certificate_of(problem.world, path) if free else None
+    proven = proof is not None and not rrtik.verify_certificate(proof, problem.world, rows)
+    return Outcome(group, planner, seconds, True, joins(problem, rows), free, proven, path.length, failed)
+
+
+@cache
+def _host(module: str, python: str) -> Host:
+    host = Host(module, python)
+    atexit.register(host.__exit__, None, None, None)
+    return host
+
+
+def _problem(arm: str, family: str, number: int, file: str) -> Problem:
+    if not file:
+        return generated_problem(rrtik.load_robot(arm), family, number)
+    found = problem_of(file, balls=False)
+    assert found is not None
+    return found
+
+
+def compared(
+    arm: str, family: str, number: int, file: str, seeds: int, seconds: float, pythons: str, pages: str
+) -> list[Outcome]:
+    """Everybody on one problem, in turns."""
+    interpreters, group = dict(interpreter(word) for word in pythons.split()), f"{arm}, {family}"
+    problem, outcomes = _problem(arm, family, number, file), []
+    call = partial(rrtik.plan, problem, PLANNER, seconds=seconds)
+    call(seed=0)  # what a world keeps is made
+    paths: dict[str, JointPath] = {}
+    with TemporaryDirectory() as folder:
+        try:
+            task = task_of(problem, Path(folder), seconds)
+        except NoTask as error:
+            print(error, file=sys.stderr)
+            return []
+        for seed in range(1, seeds + 1):
+            taken, plan = spent(partial(call, seed=seed))
+            found = {OURS: (None if plan.path is None else plan.path.waypoints, taken, "")}
+            for name, module in PEERS.items():
+                host = _host(module, interpreters.get(module.split()[0], sys.executable))
+                if not host.absent:
+                    answer = host.ask(task, seed)
+                    found[name] = (answer.rows, answer.cpu, answer.failed)
+            for name, (rows, cpu, failed) in found.items():
+                outcomes.append(judged(group, name, problem, rows, cpu, failed))
+                if rows is not None and seed == 1:
+                    paths[name] = JointPath.of(problem.robot, rows)
+    if pages and number == 0:
+        _show(Path(pages), group, problem, paths)
+    return outcomes
+
+
+def _show(folder: Path, group: str, problem: Problem, paths: dict[str, JointPath]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, path in paths.items():
+        file = folder / f"{group}, {name}.html".replace(", ", "_").replace(" ", "_").replace("()", "")
+        rrtik.view(problem, path, html=file, title=f"{group}: {name}", still=True)
+
+
+def parts(options: argparse.Namespace) -> list[tuple[Any, ...]]:
+    """What `compared` is called with."""
+    rest = options.seeds, options.seconds, " ".join("=".join(pair) for pair in options.python), str(options.pages or "")
+    found: list[tuple[Any, ...]] = [
+        (arm, family, number, "", *rest)
+        for arm in GENERATED
+        for family in FAMILIES
+        for number in range(options.problems)
+    ]
+    for arm in SETS if options.folder else ():
+        files = scene_files(options.folder, arm, options.problems)
+        for family, members in groupby(files, lambda file: Path(file).parent.name.rsplit("_", 1)[0]):
+            found += [(arm, f"MotionBenchMaker {family}", k, file, *rest) for k, file in enumerate(members)]
+    return found
+
+
+def page(outcomes: Sequence[Outcome], options: argparse.Namespace) -> Report:
+    """All of them, then group by group."""
+    command = "python bench/peers/standing.py FOLDER --python NAME=INTERPRETER"
+    report = Report("The standing comparison", command, "a process for each planner")
+    names = list(dict.fromkeys(each.planner for each in outcomes))
+    ours = np.array([each.seconds for each in outcomes if each.planner == OURS])
+    rows = []
+    for name in names:
+        mine = [each for each in outcomes if each.planner == name]
+        ms = 1e3 * np.array([each.seconds for each in mine])
+        ratio = float(np.exp(np.log(ms / (1e3 * ours)).mean()))
+        counts = [str(sum(getattr(each, what) for each in mine)) for what in ("found", "ends", "free", "proven")]
+        lengths = [each.length for each in mine if each.found]
+        times = (np.median(ms), ms.mean(), np.quantile(ms, 0.95), ratio)
+        rows.append([name, str(len(mine)), *counts, *(f"{t:.3g}" for t in times), f"{np.median(lengths):.3g}"])
+    mine = [each for each in outcomes if each.planner == OURS]
+    sound = sum(each.ends and each.free and each.proven for each in mine if each.found)
+    report.bar("our paths: ends, dense check, certificate", "all", f"{sound} of {sum(each.found for each in mine)}",
+               sound == sum(each.found for each in mine))  # fmt: skip
+    slower = {row[0]: float(row[9]) for row in rows if row[0] != OURS}
+    text = ", ".join(f"{name} {ratio:.3g}" for name, ratio in slower.items())
+    report.bar("everybody else's time over ours, geometric mean", "> 1", text, min(slower.values(), default=2.0) > 1.0)
+    head = ["", "runs", "found", "ends right", "free by the dense check", "certificate verified", "median [ms]"]
+    head += ["mean [ms]", "95 % [ms]", "over ours (geometric mean)", "length [rad], median"]
+    report.table("All", head, rows)
+    cells = []
+    for group in dict.fromkeys(each.group for each in outcomes):
+        row = [group]
+        for name in names:
+            here = [each for each in outcomes if (each.group, each.planner) == (group, name)]
+            sound = sum(each.ends and each.free for each in here)
+            row.append(f"{sound} / {len(here)}, {1e3 * np.median([each.seconds for each in here]):.3g}")
+        cells.append(row)
+    report.table("By arm and family: right and free of runs, median [ms]", ["", *names], cells)
+    reasons = sorted({(each.planner, each.failed) for each in outcomes if each.failed})
+    if reasons:
+        counted = [[*pair, str(sum((e.planner, e.failed) == pair for e in outcomes))] for pair in reasons]
+        report.table("Runs that broke", ["", "why", "runs"], counted)
+    interpreters = dict(options.python)
+    hosts = {name: _host(module, interpreters.get(module.split()[0], sys.executable)) for name, module in PEERS.items()}
+    who = [(name, f"absent: {host.absent}" if host.absent else host.versions) for name, host in hosts.items()]
+    report.table("Who", ["", "versions"], who)
+    report.note("How it was measured", f"{HOW.format(options=options)}\n\n{machine()}")
+    return report
+
+
+HOW = f"""Ours is a whole `plan()` by `{PLANNER}` in a world that has planned before, the proofs of all motions
+included; the others' is their search alone, 32 checks per radian (MPlib: 1 % of the space's extent), first path, no
+shortening. The same files for all: the arm's own solids, limits and pairs. {{options.seeds}} seeds on each of
+{{options.problems}} problems of a family, at most {{options.seconds:g}} s each, in turns; processor time of the
+process. A run without a path counts with the time that it took. Dense check: steps in which no point of the arm moves
+more than half of the world's `motion_resolution`. Certificate: written by the log of our proof kernels and verified by
+the program of `rrtik_ompl/certificates`, which shares nothing with them."""
+
+
+def main() -> int:
+    """Measure, print the page and write it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", help="holds mbm_panda and mbm_ur5")
+    parser.add_argument("--problems", type=int, default=3, help="of each family")
+    parser.add_argument("--seeds", type=int, default=2, help="runs of each planner on each problem")
+    parser.add_argument("--seconds", type=float, default=5.0, help="for each run")
+    named: dict[str, Any] = {"type": interpreter, "metavar": "NAME=INTERPRETER", "help": "of one peer; may be repeated"}
+    parser.add_argument("--python", action="append", default=[], **named)
+    parser.add_argument("--pages", type=Path, help="a folder for pages that can be turned, one a group and planner")
+    add_options(parser, "standing.md")
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    with Parts(options.out, options.jobs) as run:
+        report = page([each for some in run(compared, parts(options)) for each in some], options)
+        return report.finish(options.out)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
