@@ -36,7 +36,8 @@ def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.flo
 
 
 def _with_poses(part: AnyPart) -> GoalPart:
-    return PoseGoal(part) if isinstance(part, pin.SE3 | np.ndarray) else part
+    matrix = isinstance(part, np.ndarray) and part.ndim > 1  # a row may be a configuration
+    return PoseGoal(part) if matrix or isinstance(part, pin.SE3) else part
 
 
 @lru_cache(maxsize=64)
@@ -127,7 +128,7 @@ class GoalSet:
     """Any of several goals: a grasp set. Poses may be given freedom: a turn about an axis, a box of positions.
 
     Attributes:
-        members: Goals of which one is enough; a pose (``pinocchio.SE3`` or an array) counts as a :class:`PoseGoal`.
+        members: Goals of which one is enough; a pose (``pinocchio.SE3`` or a matrix) counts as a :class:`PoseGoal`.
         free_rotation_axis: "x", "y" or "z" of the goal frame about which poses may be turned, or None.
         box: Full side lengths [m], in the goal frame, within which the position of poses is free, shape (3,).
         parts: The members, poses that have freedom as task-space regions.
@@ -145,10 +146,10 @@ class GoalSet:
     ) -> None:
         goals = tuple(map(_with_poses, members)) if isinstance(members, Iterable) else ()
         if not goals or not all(isinstance(goal, PoseGoal | PositionGoal | TaskRegion) for goal in goals):
-            raise InputError("goal: a set needs a list of at least one pose or position or task-space region")
+            kinds = "a list of poses, positions or regions of the tip"
+            raise InputError(f"goal: a set is {kinds}; of configurations plan to each, or take PoseGoal(robot.fk(q))")
         if free_rotation_axis not in (None, "x", "y", "z"):
-            wrong = f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}"
-            raise InputError(f"{wrong}; for another axis use TaskRegion.about_axis")
+            raise InputError(f"goal free_rotation_axis: {free_rotation_axis!r} is no axis; see TaskRegion.about_axis")
         sides = finite_array(box, (3,), "goal box")
         if (sides < 0.0).any():
             raise InputError(f"goal box must not have negative sides, got {sides.tolist()}")

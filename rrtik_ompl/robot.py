@@ -125,7 +125,8 @@ class Robot:
         array = np.asarray(values, dtype=object) if isinstance(values, (list, tuple)) else np.asarray(values)
         if array.ndim == 1 and len(array) != self.dof:
             joints = f"robot '{self.name}' has {self.dof} joints ({', '.join(self.joint_names)})"
-            raise InputError(f"{what}: {joints}, but {len(array)} values were given")
+            hint = "; a position of the tip is PositionGoal([x, y, z])" if what == "goal" and len(array) == 3 else ""
+            raise InputError(f"{what}: {joints}, but {len(array)} values were given{hint}")
         return finite_array(values, (self.dof,), what).copy()
 
     def configuration_deg(self, values: ArrayLike, what: str = "configuration") -> Vector:
@@ -244,7 +245,6 @@ class Robot:
         rows, number = self._rows(Q), self._frame_id(frame)
         frames = self.joint_frames(rows)
         poses = self._poses(rows, number, frames)
-        point = poses[:, :3, 3]
         columns = np.zeros((len(frames), 6, len(self.chain.parent)))
         joint = self.model.frames[number].parentJoint - 1
         while joint >= 0:  # only the joints between the base and the frame move it
@@ -252,7 +252,7 @@ class Robot:
             if self.chain.prismatic[joint]:
                 columns[:, :3, joint] = axis
             else:
-                columns[:, :3, joint] = cross_products(axis, point - frames[:, joint + 1, :3, 3])
+                columns[:, :3, joint] = cross_products(axis, poses[:, :3, 3] - frames[:, joint + 1, :3, 3])
                 columns[:, 3:, joint] = axis
             joint = int(self.chain.parent[joint])
         return poses, np.asarray(columns @ self.chain.gain)

@@ -46,7 +46,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-PathFile = Annotated[Path | None, typer.Argument(help="A path file: .json, .csv or .txt.")]
+
+PathFile = Annotated[
+    Path | None, typer.Argument(help="A path: .json, .csv or .txt; or a timed motion: .json, .csv, .yaml.")
+]
 
 
 class Kind(str, Enum):
@@ -82,45 +85,57 @@ def check(
     path: PathFile = None,
     proof: Annotated[Path | None, typer.Option(help="Verify this certificate of the path, and nothing else.")] = None,
 ) -> int:
-    """Check a problem, and a path for it.
+    """Check a problem, and a path or a timed motion for it.
 
-    Motions are proven free for their whole length; where that cannot be done they are checked densely. Exit code 1 if
-    the path is not valid, or if the certificate does not hold, which a path's file may have beside its waypoints.
+    Motions are proven free for their whole length; where that cannot be done they are checked densely. Of a timed
+    motion this is the curve between its points, and its speeds are compared with the robot's. Exit code 1 if the path
+    is not valid, or if the certificate does not hold, which a path's file may have beside its waypoints.
     """
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
     from rrtik_ompl import JointGoal, load_path, load_problem
-    from rrtik_ompl.certificates.certificate import certificate_beside, load_certificate
-    from rrtik_ompl.cli.plan_report import wrong_ends
-    from rrtik_ompl.world.clearance_curve import clearance_along
-    from rrtik_ompl.world.route_check import how_checked
+    from rrtik_ompl.certificates.certificate import load_certificate
+    from rrtik_ompl.cli.plan_report import faults_of_motion, faults_of_path, how_proven, path_lines
 
     question = load_problem(problem)
     world = question.world
-    route = None if path is None else load_path(path, world.robot)
-    if route is not None and proof is not None:
-        return _certified(question, route, load_certificate(proof), f"{proof}")
+    if path is not None and proof is not None:
+        return _certified(question, load_path(path, world.robot), load_certificate(proof), f"{proof}")
     kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
-    say(f"{question.name}: start is free, clearance {_millimetres(world.clearance(question.start))}{kept}")
-    if isinstance(question.goal, JointGoal):
-        say(f"{question.name}: goal is free, clearance {_millimetres(world.clearance(question.goal.q))}{kept}")
-    if route is None:
+    ends = {"start": question.start} | ({"goal": question.goal.q} if isinstance(question.goal, JointGoal) else {})
+    clear = {end: f"{end} is free, clearance {_millimetres(world.clearance(q))}{kept}" for end, q in ends.items()}
+    if path is None:
+        say(*(f"{question.name}: {line}" for line in clear.values()))
         suggest(command("plan", problem), command("show", problem))
         return FOUND
-    faults = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(world)] + wrong_ends(question, route)
-    for fault in faults:
-        say(f"{path}: {fault}")
+    from rrtik_ompl.trajectory import Trajectory
+    from rrtik_ompl.trajectory.load import load_motion_or_path
+
+    route = load_motion_or_path(path, world.robot)
+    say(*(f"{question.name}: {line}" for line in clear.values()))
+    timed = isinstance(route, Trajectory)
+    faults = faults_of_motion(question, route) if isinstance(route, Trajectory) else faults_of_path(question, route)
     if faults:
+        say(*(f"{path}: {fault}" for fault in faults))
         suggest(f"look at it: {command('show', problem, path)}")
         return NOT_FOUND
-    if any(body.kind == "obstacle" for body in world.bodies):
-        say(f"{path}: {clearance_along(world, route.waypoints)}{kept}")
-    size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
-    say(f"{path}: valid, {how_checked(world, route.waypoints)}; {size}")
-    found = None if path is None else certificate_beside(path)
-    code = FOUND if found is None else _certified(question, route, found, f"{path}")
-    suggest(f"see it: {command('show', problem, path)}", f"time it: {command('time', problem, path)}")
+    if isinstance(route, Trajectory):
+        say(f"{path}: valid, {how_proven(question, route)}; {len(route.times)} points, {route.duration:.3f} s")
+    else:
+        say(*(f"{path}: {line}" for line in path_lines(question, route, kept)))
+    code = FOUND if isinstance(route, Trajectory) else _beside(question, route, path)
+    suggest(
+        f"see it: {command('show', problem, path)}", *([] if timed else [f"time it: {command('time', problem, path)}"])
+    )
     return code
+
+
+def _beside(problem: Problem, route: JointPath, path: Path) -> int:
+    """Say whether the certificate holds that a path's file has, if it has one."""
+    from rrtik_ompl.certificates.certificate import certificate_beside
+
+    found = certificate_beside(path)
+    return FOUND if found is None else _certified(problem, route, found, f"{path}")
 
 
 def _certified(problem: Problem, route: JointPath, certificate: Certificate, file: str) -> int:

@@ -17,11 +17,15 @@ from rrtik_ompl.planning import Plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import lower_bound
 from rrtik_ompl.units import reading, shown_unit
+from rrtik_ompl.world.clearance_curve import clearance_along
 from rrtik_ompl.world.route_check import how_checked
 
 if TYPE_CHECKING:
     from rrtik_ompl.certificates.certificate import Certificate
+    from rrtik_ompl.robot import Robot
     from rrtik_ompl.trajectory import RateLimits, Trajectory
+
+SLACK = 1e-6  # share of a joint's fastest rate that rounding may add
 
 
 def moves_table(path: JointPath) -> Table:
@@ -222,3 +226,43 @@ def certified(problem: Problem, path: JointPath, found: Certificate) -> tuple[st
     kept = f", {1e3 * found.clearance:g} mm kept from obstacles" if found.clearance else ""
     moves = len(found.motions)
     return f"holds: {moves} motion{'s' * (moves != 1)} proven free{kept}, {found.entries} entries", True
+
+
+def faults_of_path(problem: Problem, route: JointPath) -> list[str]:
+    """A line for each motion of a path that is not free, and for ends that are not the problem's."""
+    lines = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(problem.world)]
+    return lines + wrong_ends(problem, route)
+
+
+def faults_of_motion(problem: Problem, motion: Trajectory) -> list[str]:
+    """The same of a timed motion, and a line for each joint that is too fast."""
+    return [*motion.faults(problem.world), *_too_fast(problem.robot, motion), *wrong_ends(problem, motion.path())]
+
+
+def _too_fast(robot: Robot, motion: Trajectory) -> list[str]:
+    """A line for each joint that goes faster than the robot's description allows."""
+    most = motion.peaks().velocity
+    units = ["m/s" if slides else "rad/s" for slides in robot.prismatic]
+    rows = zip(robot.joint_names, most.tolist(), robot.velocity.tolist(), units, strict=True)
+    return [
+        f"'{name}' goes at {rate:.4g} {unit}, its limit is {limit:.4g} {unit}"
+        for name, rate, limit, unit in rows
+        if rate > limit * (1.0 + SLACK)
+    ]
+
+
+def how_proven(problem: Problem, motion: Trajectory) -> str:
+    """How much of a timed motion without faults is proven free, in a few words."""
+    proof = motion.prove(problem.world)
+    if proof.proven:
+        return "proven free at every time"
+    return f"{proof.motions - len(proof.unproven)} of {proof.motions} pieces proven free, the others checked in steps"
+
+
+def path_lines(problem: Problem, route: JointPath, kept: str) -> list[str]:
+    """What is said of a path without faults; ``kept`` follows its clearance."""
+    world, lines = problem.world, []
+    if any(body.kind == "obstacle" for body in world.bodies):
+        lines.append(f"{clearance_along(world, route.waypoints)}{kept}")
+    size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
+    return [*lines, f"valid, {how_checked(world, route.waypoints)}; {size}"]

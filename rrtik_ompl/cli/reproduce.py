@@ -21,6 +21,13 @@ NONE: Mapping[str, str] = MappingProxyType({})
 WIDTH = 60  # of a reading in a table for a person
 
 
+def _folder(given: Path | None) -> Path | None:
+    """The folder; no other option, which typer takes for one where the folder is left out."""
+    if f"{given or ''}".startswith("-"):
+        raise InputError(f"--plot: give a folder, not {given}; ./{given} if it has that name")
+    return given
+
+
 def reproduce(
     tables: Annotated[
         list[str] | None, typer.Argument(metavar="[TABLE]...", help="Names, or beginnings of them.")
@@ -33,7 +40,8 @@ def reproduce(
         typer.Option(help="Write the comparison to this file: .md; what is done is kept beside it, and continued."),
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Draw the figures of the sources from our measurements into this folder.")
+        Path | None,
+        typer.Option(help="Draw the figures of the sources from our measurements into this folder.", callback=_folder),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
 ) -> int:

@@ -332,6 +332,11 @@ API = {
     "position goal in 2-D": (lambda: rrtik.PositionGoal([0, 0]), ["goal position"]),
     "negative tolerance": (lambda: rrtik.PositionGoal([0, 0, 0], -1), ["goal tolerance"]),
     "region of nothing": (lambda: rrtik.GoalSet([]), ["goal"]),
+    "set of configurations": (lambda: rrtik.GoalSet([np.zeros(7)]), ["configurations", "PoseGoal(robot.fk(q))"]),
+    "position as joint values": (
+        lambda: rrtik.Problem(rrtik.World(rrtik.load_robot("ur5")), [0.0] * 6, [0.3, 0.0, 0.5]),
+        ["6 joints", "PositionGoal([x, y, z])"],
+    ),
     "region about axis w": (lambda: rrtik.GoalSet([rrtik.PositionGoal([0, 0, 0])], "w"), ["free_rotation_axis"]),
     "unknown robot": (lambda: rrtik.load_robot("pand"), ["pand", "did you mean 'panda'"]),
     "unknown option of a robot": (lambda: rrtik.load_robot("titan4", limit="envelope"), ["limit", "limits"]),
