@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import ClassVar
 
@@ -10,7 +11,7 @@ from ompl import base as ob
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.connect_keeping import kept_search
+from rrtik_ompl.fast.search.connect_keeping import Searched, kept_search, solve_each
 from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.fast.search.tree_memory import certain_tree
@@ -102,6 +103,17 @@ class FastRRTConnect(SafePlanner):
         checker.checked_motions += int(counts["motions"] - counts["questions"])  # the questions it has counted
         return SearchResult(path, {**counts, "edges": counts["vertices"] - len(starts) - len(goals)}, graph=graph)
 
+    def solve_each(
+        self, ends: Matrix, seeds: Sequence[int], bounds: tuple[Vector, Vector]
+    ) -> Sequence[SearchResult | None]:
+        """See :class:`rrtik_ompl.planning.batches.SolvesEach`."""
+        self._bounds = bounds
+        if self.bound is not None or self.max_iterations is None or not has_kernels(self._world, KERNELS):
+            return [None] * len(ends)
+        drawn = [int(np.random.default_rng(seed).bit_generator.random_raw()) for seed in seeds]
+        with self._kernels(self._world) as kernels:
+            return [_result_of(found) for found in solve_each(kernels, ends, drawn, self.max_iterations)]
+
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.ends_free`; the kernels know in a few microseconds."""
         if has_kernels(self._world, KERNELS):
@@ -126,6 +138,15 @@ class FastRRTConnect(SafePlanner):
         range_, domain = connect_lengths(lower, upper, *self._lengths, turning=self.turning())
         lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)  # unknown to kernels
         return ConnectSearch(world.motions, lower, upper, range_=range_, domain=domain)
+
+
+def _result_of(found: Searched | None) -> SearchResult | None:
+    """One search of several, with the counts of a search of its own."""
+    if found is None:
+        return None
+    names = ("iterations", "vertices", "motions", "questions", "rejected")
+    counts = {name: getattr(found, name) for name in names} | {"edges": found.vertices - 2, "checked_states": 0}
+    return SearchResult(found.path, {**counts, "checked_motions": found.motions - found.questions})
 
 
 def python_rules(

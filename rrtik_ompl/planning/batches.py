@@ -11,15 +11,16 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, ITERATION_LIMIT, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, reseed, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
+from rrtik_ompl.ompl_bridge.results import SearchResult
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import shared_space
 from rrtik_ompl.path import JointPath
@@ -80,8 +81,7 @@ def plans_together(
     free = _usable(world, ends)
     rooms = dict(zip(np.flatnonzero(free).tolist(), rooms_between(world, ends[free], None), strict=True))
     searcher = _Searcher(world, factory, name, any_problem, parameters, seconds)
-    tried = {k: searcher.path(queries[k], restarts) for k, room in rooms.items() if room is not None}
-    found = {k: each for k, each in tried.items() if each is not None}
+    found = searcher.paths({k: queries[k] for k, room in rooms.items() if room is not None}, restarts)
     proofs = _proofs(world, {k: (each.path.waypoints, rooms[k]) for k, each in found.items()})
     taken = (time.perf_counter() - begin) / len(queries)
     for k, proof in proofs.items():
@@ -109,6 +109,19 @@ def _usable(world: World, ends: Matrix) -> Mask:
     return ready
 
 
+@runtime_checkable
+class SolvesEach(Protocol):
+    """A planner that searches for many queries in one call."""
+
+    def solve_each(
+        self, ends: Matrix, seeds: Sequence[int], bounds: tuple[Vector, Vector]
+    ) -> Sequence[SearchResult | None]:
+        """What `SafePlanner.solve_rows` does with each seed between free ends, shape (m, 2, dof), and its statistics.
+
+        None for those that are to be searched for one after the other.
+        """
+
+
 class _Searcher:
     """One planner that searches for one query after the other."""
 
@@ -128,18 +141,34 @@ class _Searcher:
         assert is_safe(factory)
         self._planner: SafePlanner = safe_planner(factory, name, shared_space(*self._bounds), brief, 0, options)
 
-    def path(self, query: Query, restarts: int) -> _Found | None:
-        """What the first attempt of `plan()` finds."""
-        reseed(self._planner, attempt_seeds(query.seed, restarts)[0])
-        end, goal = time.perf_counter() + self._seconds, query.goal.q
-        ends = query.start[None], goal[None]
+    def paths(self, queries: Mapping[int, Query], restarts: int) -> dict[int, _Found]:
+        """What the first attempts of `plan()` find, by the numbers of the queries."""
+        seeds = [attempt_seeds(query.seed, restarts)[0] for query in queries.values()]
+        quick: Sequence[SearchResult | None] = [None] * len(seeds)
+        if isinstance(self._planner, SolvesEach) and queries:
+            ends = np.array([(query.start, query.goal.q) for query in queries.values()])
+            quick = self._planner.solve_each(ends, seeds, self._bounds)
+        made = dict[int, _Found]()
+        for (k, query), seed, found in zip(queries.items(), seeds, quick, strict=True):
+            path = self._path(query, found or self._alone(query, seed))
+            made |= {} if path is None else {k: path}
+        return made
+
+    def _alone(self, query: Query, seed: int) -> SearchResult:
+        """What a search for one query finds."""
+        reseed(self._planner, seed)
+        end, ends = time.perf_counter() + self._seconds, (query.start[None], query.goal.q[None])
         _, rows = self._planner.solve_rows(*ends, self._bounds, lambda: time.perf_counter() > end, checked=True)
-        if rows is None:
+        return SearchResult(rows, self._planner.statistics)
+
+    def _path(self, query: Query, found: SearchResult) -> _Found | None:
+        """What was found, if it is a path from the start to the goal."""
+        if found.path is None:
             return None
-        path = JointPath.of(self._robot, rows)
-        if len(path.waypoints) < 2 or (path.start != query.start).any() or (path.end != goal).any():
+        path = JointPath.of(self._robot, found.path)
+        if len(path.waypoints) < 2 or (path.start != query.start).any() or (path.end != query.goal.q).any():
             return None
-        return _Found(query, path, self._planner.statistics)
+        return _Found(query, path, found.statistics)
 
 
 def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Room | None]]) -> dict[int, Proof]:

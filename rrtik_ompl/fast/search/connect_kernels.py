@@ -52,18 +52,23 @@ from rrtik_ompl.fast.search.connect_motions import (
     candidate_values_of,
     check_candidate,
     dof_in,
-    meeting_of,
     motions_of,
     set_row_values,
     tree_of,
 )
-from rrtik_ompl.fast.search.connect_outcomes import ask_for_candidate, on_blocked, on_free, resume_after_answers
+from rrtik_ompl.fast.search.connect_outcomes import (
+    ask_for_candidate,
+    on_blocked,
+    on_free,
+    resume_after_answers,
+    write_path,
+)
 from rrtik_ompl.fast.search.motions.motion_kernels import configuration_free
-from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance, row_at
-from rrtik_ompl.fast.search.tree_kernels import add_vertex, clear_tree, is_full, parent_of, row_of
-from rrtik_ompl.fast.search.tree_layout import CERTAIN, NO_PARENT, OPEN, TreeTable
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, row_at
+from rrtik_ompl.fast.search.tree_kernels import add_vertex, clear_tree, is_full, size_of
+from rrtik_ompl.fast.search.tree_layout import CERTAIN, NO_PARENT, OPEN
 from rrtik_ompl.fast.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import field, set_field
+from rrtik_ompl.fast.simd.lanes import field, set_field, set_int
 from rrtik_ompl.fast.simd.random_kernels import next_share, start_points
 from rrtik_ompl.fast.tables.layout import FREE, UNDECIDED
 
@@ -199,39 +204,6 @@ def begin_between(
     return starts + outside if outside >= 0 else -1
 
 
-@kernel
-def depth(tree: TreeTable, vertex: int) -> int:
-    """Number of vertices from a vertex to its root."""
-    count = 0
-    while vertex >= 0:
-        count += 1
-        vertex = parent_of(tree, vertex)
-    return count
-
-
-@kernel
-def write_path(search: ConnectTable, rows: Configuration, capacity: int) -> int:
-    """Write the path that was found, start first, if there is room for it; returns its number of rows."""
-    starts, goals, dof = tree_of(search, 0), tree_of(search, 1), dof_in(search)
-    vertex, other = meeting_of(search, 0), meeting_of(search, 1)
-    place = depth(starts, vertex)
-    if distance(dof, row_of(starts, vertex), row_of(goals, other)) == 0.0:  # the same configuration, in both trees
-        other = parent_of(goals, other)
-    total = place + depth(goals, other)
-    if total > capacity:
-        return total
-    while vertex >= 0:
-        place -= 1
-        copy_row(dof, row_of(starts, vertex), row_at(rows, dof, place))
-        vertex = parent_of(starts, vertex)
-    place = depth(starts, meeting_of(search, 0))
-    while other >= 0:
-        copy_row(dof, row_of(goals, other), row_at(rows, dof, place))
-        place += 1
-        other = parent_of(goals, other)
-    return total
-
-
 @entry
 def keep_path(search: ConnectTable) -> int:
     """Write the path to PATH, if there is room for it; returns its number of rows, PATH_ROWS."""
@@ -258,3 +230,54 @@ def solve(search: ConnectTable, starts: int, goals: int, seed: int, budget: int)
     start_rows, goal_rows = field(search, connect_layout.START_ROWS), field(search, connect_layout.GOAL_ROWS)
     outside = begin_between(search, start_rows, starts, goal_rows, goals, seed)
     return connect_layout.OUTSIDE - outside if outside >= 0 else resume(search, budget)
+
+
+@kernel
+def refuse_all(search: ConnectTable) -> int:
+    """Answer that none of what is asked is free; returns how many there were."""
+    count: int = field(search, connect_layout.QUESTIONS)
+    for k in range(count):
+        set_int(field(search, connect_layout.ANSWERS), k, 0)
+    return count
+
+
+@entry
+def solve_each(
+    search: ConnectTable,
+    ends: Configuration,
+    seeds: int,
+    count: int,
+    budget: int,
+    paths: Configuration,
+    capacity: int,
+    results: int,
+) -> int:
+    """Search for one query after the other; of what is asked none is free, so it is never asked.
+
+    ``ends``: a start and a goal each. ``budget``: motions and samples for all of them. ``paths``: room for ``capacity``
+    rows, one path behind the other. ``results``: see RESULT_NUMBERS; RUNNING if it was not searched to its end.
+    """
+    dof, used = dof_in(search), 0
+    for k in range(count):
+        status, rows, questions = connect_layout.RUNNING, 0, 0
+        start, goal = row_at(ends, dof, 2 * k), row_at(ends, dof, 2 * k + 1)
+        if budget > 0 and begin_between(search, start, 1, goal, 1, field(seeds, k)) < 0:
+            status = search_on(search, budget)
+            while status == connect_layout.ASKING:
+                questions += refuse_all(search)
+                status = search_on(search, budget)
+            budget -= field(search, connect_layout.ITERATIONS) + field(search, connect_layout.CHECKED)
+            if status == connect_layout.SOLVED:
+                rows = write_path(search, row_at(paths, dof, used), capacity - used)
+            if rows > capacity - used:
+                status, rows = connect_layout.RUNNING, 0
+        place = connect_layout.RESULT_NUMBERS * k
+        set_field(results, place, status)
+        set_field(results, place + 1, rows)
+        set_field(results, place + 2, field(search, connect_layout.ITERATIONS))
+        set_field(results, place + 3, field(search, connect_layout.CHECKED))
+        set_field(results, place + 4, size_of(tree_of(search, 0)) + size_of(tree_of(search, 1)))
+        set_field(results, place + 5, questions)
+        set_field(results, place + 6, field(search, connect_layout.REJECTED))
+        used += rows
+    return used

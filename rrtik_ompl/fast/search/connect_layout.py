@@ -41,3 +41,4 @@ NO_VERTEX = -1  # to which a question's motion leads
 SOLVED, EXHAUSTED, RUNNING, ASKING, FULL = range(5)  # status
 OUTSIDE = -1  # status that a root is not in the box; less its number
 MAX_QUESTIONS = 64  # at a time
+RESULT_NUMBERS = 7  # of one of several queries: status, rows, samples, motions, vertices, questions, rejected paths

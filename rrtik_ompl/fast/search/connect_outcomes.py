@@ -15,7 +15,7 @@ from rrtik_ompl.fast.search.connect_motions import (
     set_meeting,
     tree_of,
 )
-from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, row_at
+from rrtik_ompl.fast.search.motions.row_kernels import Configuration, copy_row, distance, row_at
 from rrtik_ompl.fast.search.tree_kernels import (
     add_vertex,
     cut_branch,
@@ -25,7 +25,7 @@ from rrtik_ompl.fast.search.tree_kernels import (
     set_state,
     state_of,
 )
-from rrtik_ompl.fast.search.tree_layout import CERTAIN, CUT, OPEN
+from rrtik_ompl.fast.search.tree_layout import CERTAIN, CUT, OPEN, TreeTable
 from rrtik_ompl.fast.simd.access import count_up
 from rrtik_ompl.fast.simd.compiled import kernel
 from rrtik_ompl.fast.simd.lanes import field, int_at, set_field, set_int
@@ -148,3 +148,36 @@ def resume_after_answers(search: ConnectTable) -> int:
             return on_free(search, CERTAIN)
         on_blocked(search)
     return connect_layout.RUNNING
+
+
+@kernel
+def depth(tree: TreeTable, vertex: int) -> int:
+    """Number of vertices from a vertex to its root."""
+    count = 0
+    while vertex >= 0:
+        count += 1
+        vertex = parent_of(tree, vertex)
+    return count
+
+
+@kernel
+def write_path(search: ConnectTable, rows: Configuration, capacity: int) -> int:
+    """Write the path that was found, start first, if there is room for it; returns its number of rows."""
+    starts, goals, dof = tree_of(search, 0), tree_of(search, 1), dof_in(search)
+    vertex, other = meeting_of(search, 0), meeting_of(search, 1)
+    place = depth(starts, vertex)
+    if distance(dof, row_of(starts, vertex), row_of(goals, other)) == 0.0:  # the same configuration, in both trees
+        other = parent_of(goals, other)
+    total = place + depth(goals, other)
+    if total > capacity:
+        return total
+    while vertex >= 0:
+        place -= 1
+        copy_row(dof, row_of(starts, vertex), row_at(rows, dof, place))
+        vertex = parent_of(starts, vertex)
+    place = depth(starts, meeting_of(search, 0))
+    while other >= 0:
+        copy_row(dof, row_of(goals, other), row_at(rows, dof, place))
+        place += 1
+        other = parent_of(goals, other)
+    return total

@@ -11,9 +11,10 @@ from collections.abc import Callable
 from typing import Any
 
 from rrtik_ompl.fast.search import connect_layout, repair_layout, shortcut_layout
-from rrtik_ompl.fast.search.connect_kernels import begin_between, search_on, write_path
+from rrtik_ompl.fast.search.connect_kernels import begin_between, search_on
 from rrtik_ompl.fast.search.connect_layout import ConnectTable
 from rrtik_ompl.fast.search.connect_motions import meeting_of, tree_of
+from rrtik_ompl.fast.search.connect_outcomes import write_path
 from rrtik_ompl.fast.search.motions.motion_kernels import (
     check_motion,
     configuration_free,

@@ -6,11 +6,13 @@ from threading import Thread
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from rrtik_ompl import Box, Obstacle, Scene, World, load_robot
 from rrtik_ompl.fast.search import connect_keeping
 from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.connect_keeping import kept_search
+from rrtik_ompl.fast.search.connect_keeping import kept_search, solve_each
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem_files.problem import load_problem
 
@@ -86,3 +88,61 @@ def test_threads_with_a_world_each_find_what_one_thread_finds() -> None:
         thread.join()
     for seed, rows in enumerate(wanted):
         np.testing.assert_array_equal(found[seed], rows)
+
+
+@pytest.fixture(scope="module")
+def crowded() -> Any:
+    """A UR5 among many boxes: kernels leave motions of its searches undecided."""
+    rng = np.random.default_rng(4)
+    boxes = [Obstacle(f"box{k}", Box((0.12, 0.12, 0.12)), place(rng)) for k in range(15)]
+    return World(load_robot("ur5"), Scene(boxes))
+
+
+def place(rng: np.random.Generator) -> Any:
+    way = rng.normal(size=3)
+    return pin.SE3(pin.Quaternion(*rng.normal(size=4)).normalized().matrix(), 0.7 * way / np.linalg.norm(way))
+
+
+def test_many_queries_in_one_call_find_what_each_finds_alone(crowded: Any) -> None:
+    world = crowded.with_accuracy("conservative")
+    rows = np.random.default_rng(1).uniform(*world.robot.finite_range(), (400, 6))
+    rows = rows[world.valid_batch(rows)]
+    ends, seeds = rows[:80].reshape(40, 2, 6), list(range(40))
+    search = ConnectSearch(world.motions, world.robot.lower, world.robot.upper)
+    together, asked, rejected = solve_each(search, ends, seeds, 1000), 0, 0
+    for each, (start, goal), seed in zip(together, ends, seeds, strict=True):
+        alone = search.solve(start[None], goal[None], seed, ask=none_free, max_iterations=1000)
+        counts = search.statistics()
+        if each is None:
+            continue
+        assert (each.path is None) == (alone is None)
+        assert alone is None or np.array_equal(each.path, alone)
+        assert [counts[name] for name in each._fields[1:]] == list(each[1:])
+        asked, rejected = asked + each.questions, rejected + each.rejected
+    assert together.count(None) < 4
+    assert asked > 0
+    assert rejected > 0
+    assert search.intact()
+
+
+def none_free(starts: Any, ends: Any) -> Any:
+    return np.zeros(len(starts), dtype=bool)
+
+
+def test_what_takes_long_or_has_no_room_is_left_to_a_search_of_its_own(crowded: Any, monkeypatch: Any) -> None:
+    world = crowded.with_accuracy("conservative")
+    rows = np.random.default_rng(1).uniform(*world.robot.finite_range(), (400, 6))
+    ends = rows[world.valid_batch(rows)][:80].reshape(40, 2, 6)
+    search = ConnectSearch(world.motions, world.robot.lower, world.robot.upper)
+    whole = solve_each(search, ends, [1] * 40, 1000)
+    monkeypatch.setattr(connect_keeping, "MEAN_BUDGET", 20)
+    brief = solve_each(search, ends, [1] * 40, 1000)
+    assert 0 < brief.count(None) < 40
+    monkeypatch.undo()
+    monkeypatch.setattr(connect_keeping, "FIRST_PATH", 3)
+    narrow = solve_each(search, ends, [1] * 40, 1000)
+    assert 0 < narrow.count(None) < 40
+    for some in (brief, narrow):
+        for one, other in zip(some, whole, strict=True):
+            assert one is None or other is None or (one.path is None) == (other.path is None)
+            assert one is None or other is None or one.path is None or np.array_equal(one.path, other.path)
