@@ -4,26 +4,33 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rrtik_bench import drrt_con, ikurt, ikurt_limits, titan4
+from rrtik_bench import drrt_con, ikurt, ikurt_limits, titan4, titan4_screws
 from rrtik_bench.crdt import tables as crdt
 from rrtik_bench.errata import tables as errata
+from rrtik_bench.figures import crdt as crdt_figures
 from rrtik_bench.figures import genetic as genetic_figures
 from rrtik_bench.figures import ikurt as ikurt_figures
 from rrtik_bench.figures import mb_rrt as mb_rrt_figures
+from rrtik_bench.figures import replanning as replanning_figures
 from rrtik_bench.figures import sensing as sensing_figures
+from rrtik_bench.figures import titan4 as titan4_figures
 from rrtik_bench.genetic import coding
 from rrtik_bench.genetic import tables as genetic
+from rrtik_bench.mb_rrt import beyond as mb_rrt_beyond
 from rrtik_bench.mb_rrt import tables as mb_rrt
-from rrtik_bench.sensing import camera_tables, sequences
+from rrtik_bench.sensing import camera_tables, detections, sequences
 from rrtik_bench.sensing import tables as sensing
 from rrtik_bench.shortening import tables as shortening
 from rrtik_bench.tables import Collection
 
 PAGES = (
-    *(titan4, mb_rrt, genetic, coding, crdt, ikurt, ikurt_limits, drrt_con, shortening),
-    *(sensing, camera_tables, sequences, errata),
+    *(titan4, titan4_screws, mb_rrt, mb_rrt_beyond, genetic, coding, crdt, ikurt, ikurt_limits, drrt_con, shortening),
+    *(sensing, camera_tables, sequences, detections, errata),
 )
-DRAWN = (mb_rrt_figures, genetic_figures, ikurt_figures, sensing_figures)
+DRAWN = (
+    *(titan4_figures, mb_rrt_figures, genetic_figures, crdt_figures, ikurt_figures),
+    *(replanning_figures, sensing_figures),
+)
 FIGURES = {name: figures for page in DRAWN for name, figures in page.FIGURES.items()}
 COLLECTION = Collection(
     tables=tuple(replace(table, figures=FIGURES.get(table.name, ())) for page in PAGES for table in page.TABLES),

@@ -25,7 +25,8 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 HELD, BETTER, DIFFERS, REFUTED, MISSED = Verdict
 TABLES = {table.name: table for table in COLLECTION.tables}
 FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-sequences", "errata-kinematics", "errata-grim",
-        "crdt-routes", "mb-rrt-example", "mb-rrt-10", "ikurt-solutions", "ikurt-limits", "ga-reb-coding",
+        "crdt-routes", "mb-rrt-example", "mb-rrt-10", "mb-rrt-sliding", "mb-rrt-obstacles",
+        "ikurt-solutions", "ikurt-limits", "ga-reb-coding",
         "drrt-con-arm")  # fmt: skip
 
 
@@ -43,6 +44,7 @@ def test_the_beginning_of_names_chooses_all_tables_of_a_page():
         "sensing-gripper",
         "sensing-accuracy",
         "sensing-sequences",
+        "sensing-detections",
     ]
     genetic_tables = [name for name in TABLES if name.startswith("ga-reb-")]
     assert [table.name for table in chosen(TABLES, ["genetic"], COLLECTION.also)] == genetic_tables

@@ -9,6 +9,7 @@ import numpy as np
 from rrtik_bench.mb_rrt.runs import GOALS, PRECISION, arm, precise
 from rrtik_bench.report.figures import Figure
 from rrtik_ompl.arrays import Vector
+from rrtik_ompl.ik.mb_rrt.c_space import grow_in_joint_space
 from rrtik_ompl.ik.mb_rrt.growth import grow, one_link
 from rrtik_ompl.ik.mb_rrt.links import Links, sunflower
 from rrtik_ompl.ik.mb_rrt.variants import projected, square, surface
@@ -55,6 +56,30 @@ def first_directions(draw: str, count: int, rng: np.random.Generator) -> Vector:
     nodes = one_link(np.zeros((count, 2)), samples, 10.0, rng)
     angle = np.arctan2(nodes[:, 1], nodes[:, 0]) - np.arctan2(GOAL[1], GOAL[0])
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def two_joints(drawing: Drawing, quick: bool) -> None:
+    """The arm of two joints: the classical tree in its joint space, and the answer in the workspace."""
+    links, goal = Links([10.0, 10.0]), np.array([6.0, 11.0])
+    run = grow_in_joint_space(
+        links, goal, tolerance=0.2, rng=np.random.default_rng(1), passes=2_000 if quick else 10_000
+    )
+    joints, arm_panel = drawing.subplots(1, 2)
+    first = np.arctan2(run.nodes[1][:, 1], run.nodes[1][:, 0])
+    second = run.nodes[2] - run.nodes[1]
+    bend = np.arctan2(second[:, 1], second[:, 0]) - first
+    joints.plot(
+        np.degrees(first), np.degrees((bend + np.pi) % (2.0 * np.pi) - np.pi), ".", color=COLORS[5], markersize=3
+    )
+    joints.set(xlim=(-180, 180), ylim=(-180, 180), aspect="equal", xlabel="theta1 [deg]", ylabel="theta2 [deg]",
+               title=f"{run.passes} vertices")  # fmt: skip
+    arm_panel.plot(*run.nodes[2].T, ".", color=COLORS[5], markersize=3)
+    arm_panel.plot(*run.chain.T, "o-", color="#1d2733")
+    arm_panel.plot(*goal, "+", color=COLORS[1], markersize=12)
+    arm_panel.set(xlim=(-21, 21), ylim=(-21, 21), aspect="equal", xlabel="x [cm]", ylabel="y [cm]",
+                  title=f"{run.misses.min():.2f} cm from the goal")  # fmt: skip
+    tidy(joints)
+    tidy(arm_panel)
 
 
 def directions(drawing: Drawing, quick: bool) -> None:
@@ -120,6 +145,8 @@ def precision(drawing: Drawing, quick: bool) -> None:
 TABLES = "[3, tables 10 and 11]"
 FIGURES: dict[str, tuple[Figure, ...]] = {
     "mb-rrt-example": (
+        Figure("mb_rrt_two_joints", "RRT in the joint space of two joints: steps of 3 degrees, tolerance 0.2 cm",
+               "[3, figure 11]", two_joints, size=(9.0, 4.8)),
         Figure("mb_rrt_growth", "A tree of four links grows, with its solution regions", "[3, figures 12, 13, 16, 21]",
                growth, size=(11.0, 3.6)),
         Figure("mb_rrt_directions", "Directions of the first link", "[3, figures 14 to 20]", directions,

@@ -1,0 +1,101 @@
+"""What goes wrong in detection [1, ch. 4.2.3]: markers not found, found where there are none, taken for others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rrtik_bench.report.rows import Bar, Row, exactly, judged
+from rrtik_bench.sensing.runs import CAMERA, DICTIONARY, HARD, PLAIN, SIDE, random_poses
+from rrtik_bench.tables import Table
+from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph
+from rrtik_ompl.sensing.markers.detection import find_markers, marker_cells
+
+DISTANCES = (500, 1000, 1500, 2000)  # [mm]
+NUMBERS = 50  # of the dictionary
+LIGHTS: dict[str, Mapping[str, Any]] = {"even light": PLAIN, "blur, gradient, flicker, JPEG": HARD}
+USABLE = 1500  # [mm] as [1] concludes
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Of photographs with one marker each: found as itself, not found, taken for another; and what else was found."""
+
+    right: int
+    missing: int
+    confused: int
+    extra: int
+
+    def __str__(self) -> str:
+        return f"{self.right} right, {self.missing} not found, {self.confused} confused, {self.extra} beside it"
+
+
+def counts(distance: int, how: Mapping[str, Any], pictures: int) -> Counts:
+    """Photographs of markers at a distance [mm], each with the next number of the dictionary."""
+    rng, right, confused, extra = np.random.default_rng([7, distance]), 0, 0, 0
+    for k, place in enumerate(random_poses(1e-3 * distance, pictures, 7)):
+        number = k % NUMBERS
+        clean = clean_picture(CAMERA, [(place, marker_print(marker_cells(DICTIONARY, number), SIDE))], rays=4)
+        found = [marker.number for marker in find_markers(photograph(clean, rng, **how), DICTIONARY)]
+        right += number in found
+        confused += bool(found) and number not in found
+        extra += len(found) - (number in found)
+    return Counts(right, pictures - right - confused, confused, extra)
+
+
+def false_positives(pictures: int) -> int:
+    """Markers that are found where printed squares bear random cells, none of the dictionary's."""
+    rng, found = np.random.default_rng(8), 0
+    cells = [marker_cells(DICTIONARY, k) for k in range(NUMBERS)]
+    for place in random_poses(0.8, pictures, 8):
+        pattern = rng.permutation(cells[int(rng.integers(NUMBERS))].ravel()).reshape(cells[0].shape)
+        clean = clean_picture(CAMERA, [(place, marker_print(pattern, SIDE))], rays=4)
+        found += len(find_markers(photograph(clean, rng, **PLAIN), DICTIONARY))
+    return found
+
+
+def detections(quick: bool) -> list[Row]:
+    """The three kinds of failure by distance and light."""
+    pictures, rows = 10 if quick else 100, []
+    for light, how in LIGHTS.items():
+        for distance in DISTANCES:
+            found = counts(distance, how, pictures)
+            least = 0.9 if distance <= USABLE else 0.5
+            rows.append(
+                judged(
+                    f"{distance} mm, {light}",
+                    "kinds are named, not counted",
+                    str(found),
+                    found.right / pictures,
+                    Bar((0.0, 1.0), held=(least, 1.0)),
+                    f"{pictures} photographs by the synthetic camera; usable to {USABLE} mm in print",
+                )
+            )
+            wrong = found.confused + found.extra
+            rows.append(
+                judged(
+                    f"{distance} mm, {light}: confused or beside it",
+                    "named",
+                    str(wrong),
+                    wrong,
+                    exactly(0, 10 * pictures),
+                )
+            )
+    none = false_positives(pictures)
+    rows.append(
+        judged(
+            "false positives in squares with shuffled cells",
+            "named",
+            f"{none} in {pictures}",
+            none / pictures,
+            Bar((0.0, 10.0), held=(0.0, 0.05)),
+            "cells of the dictionary's markers in random order",
+        )
+    )
+    return rows
+
+
+TABLES = (Table("sensing-detections", "Not found, confused, false", "[1, ch. 4.2.3]", detections, 60, 8),)
