@@ -1,4 +1,4 @@
-"""Ten pages to look at, each one file that needs no network: arms that people have, two arms, a maze, a cloud, a tree.
+"""Pages to look at, each one file that needs no network: arms that people have, two arms, a maze, a cloud, a tree.
 
 Run it as ``python bench/page/gallery.py FOLDER``.
 """
@@ -54,6 +54,7 @@ def pages() -> Iterator[tuple[str, str, Callable[[Path], None]]]:
         problem = partial(generated_problem, rrtik.load_robot(robot), family, seed)
         yield f"{robot}_{family}", text, lambda file, problem=problem: planned(problem(), None, file)  # type: ignore[misc]
     for name, planner, text in (
+        ("panda_shelf", None, "a Panda reaches from one compartment of a shelf into another"),
         ("titan4_sdu", "bicrdt", "TITAN 4 takes a tool from a panel, one joint at a time"),
         ("titan4_prisms", "RRTConnect", "TITAN 4 between prisms"),
         ("two_titan4", None, "two TITAN 4 on one vehicle, planned together"),

@@ -7,6 +7,7 @@ import gzip
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.collision.bodies import Body, by_motion
 from rrtik_ompl.collision.enclosure import enclosure
@@ -15,7 +16,8 @@ from rrtik_ompl.fast.tables.layout import CONVEX_SOLID
 from rrtik_ompl.fast.tables.solid_tables import convex_solids
 from rrtik_ompl.world import World
 
-GRAIN = 1e-7  # [m] of the corners of triangles; obstacles are so much larger for it
+DIGITS = 6  # of a metre, of corners of pieces around meshes; pieces are so much larger for it
+GRAIN = 1e-6  # [m] of the corners of triangles; obstacles are so much larger for it
 MOST_TRIANGLES = 10_000  # of a mesh; a page that has more would be too large, and takes the pieces around it
 
 
@@ -30,11 +32,12 @@ def standing_parts(world: World) -> list[dict[str, Any]] | None:
         partners.setdefault(first, []).append(world.bodies[second].name)
     found = []
     for number, names in partners.items():
-        solids = _solids(world.bodies[number])
+        body = world.bodies[number]
+        surfaces = _surfaces(body)
+        solids = [] if surfaces else _solids(body)
         if solids is None:
             return None
-        body = world.bodies[number]
-        found.append({"name": body.name, "meets": sorted(set(names)), "solids": solids, "surfaces": _surfaces(body)})
+        found.append({"name": body.name, "meets": sorted(set(names)), "solids": solids, "surfaces": surfaces})
     return found
 
 
@@ -42,19 +45,21 @@ def _solids(body: Body) -> list[dict[str, Any]] | None:
     around, placement = convex_solids(body.geometry).around, body.placement
     if not around or any(solid.kind != CONVEX_SOLID for solid in around):
         return None
+    rounded = is_mesh(body.geometry)
+    digits, more = (DIGITS, 2.0 * 10.0**-DIGITS) if rounded else (17, 0.0)
     return [
         {
-            "corners": (solid.corners @ placement.rotation.T + placement.translation).tolist(),
+            "corners": np.round(solid.corners @ placement.rotation.T + placement.translation, digits).tolist(),
             "axis": (placement.rotation @ solid.axis).tolist(),
             "disc": solid.disc,
-            "radius": solid.radius,
+            "radius": solid.radius + more,
         }
         for solid in around
     ]
 
 
 def _surfaces(body: Body) -> list[dict[str, Any]]:
-    """The triangles of a mesh, in the world, which decide where the solids around it are touched."""
+    """The triangles of a mesh, in the world; none of another body, nor of a mesh of very many."""
     if not is_mesh(body.geometry):
         return []
     vertices, triangles = mesh_arrays(body.geometry)
@@ -62,16 +67,28 @@ def _surfaces(body: Body) -> list[dict[str, Any]]:
         return []
     used, numbers = np.unique(triangles, return_inverse=True)
     placed = vertices[used] @ body.placement.rotation.T + body.placement.translation
-    faces = np.asarray(numbers, dtype="<u4")
-    corners = np.round(placed / GRAIN).astype("<i4")
     return [
         {
-            "corners": packed(corners.tobytes()),
-            "faces": packed(faces.tobytes()),
+            "corners": packed(_planes(np.round(placed / GRAIN))),
+            "faces": packed(_planes(_steps(numbers.reshape(-1, 3)))),
             "grain": GRAIN,
             "enclosed": None if is_closed(body.geometry) else _enclosed(body),
         }
     ]
+
+
+def _steps(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles as small numbers: the lowest corner first, less that of the one before; the others less it."""
+    lowest = faces.argmin(axis=1)
+    turned = faces[np.arange(len(faces))[:, None], (lowest[:, None] + np.arange(3)) % 3]  # its sense stays
+    turned = turned[np.argsort(turned[:, 0], kind="stable")]
+    return np.column_stack([np.diff(turned[:, 0], prepend=0), turned[:, 1:] - turned[:, :1]])
+
+
+def _planes(rows: NDArray[Any]) -> bytes:
+    """Whole numbers, shape (n, 3), column by column, all their lowest bytes first: half as large once packed."""
+    columns = np.ascontiguousarray(rows.T).astype("<i4").reshape(-1)
+    return np.ascontiguousarray(columns.view(np.uint8).reshape(-1, 4).T).tobytes()
 
 
 def _enclosed(body: Body) -> dict[str, Any]:

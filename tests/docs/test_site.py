@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import rrtik_ompl
+from bench.page.gallery import pages
 
 ROOT = Path(__file__).parents[2]
 pytest.importorskip("mkdocs", reason="the extra docs needs Python 3.11")
@@ -33,3 +34,12 @@ def test_every_public_name_is_on_a_page_of_the_reference(site):
 def test_the_site_loads_nothing_from_elsewhere(site):
     loaded = re.compile(r'(?:<script[^>]*src|<img[^>]*src|<link[^>]*rel="stylesheet"[^>]*href)="(https?:[^"]*)"')
     assert [url for file in site.rglob("*.html") for url in loaded.findall(file.read_text())] == []
+
+
+def test_pages_that_plan_are_linked_where_the_workflow_publishes_them():
+    url = re.search(r"^site_url: (\S+)", (ROOT / "docs/site/mkdocs.yml").read_text(), re.MULTILINE)[1]
+    texts = [file.read_text() for file in (ROOT / "README.md", ROOT / "docs/pages.md")]
+    linked = [name for text in texts for name in re.findall(rf"\({re.escape(url)}pages/(\w+)\.html\)", text)]
+    assert len(linked) >= len(texts)
+    assert set(linked) <= {name for name, _, _ in pages()}
+    assert "bench.page.gallery build/site/pages" in (ROOT / ".github/workflows/docs.yml").read_text()

@@ -1,6 +1,6 @@
 // Obstacles beside what never moves, such as the base of the arm, which the kernels do not compare. An obstacle is a convex
-// solid: the hull of corners, each with a disc across an axis, and a ball around every point of that. Solids that stand still
-// are such ones too; of meshes these are pieces around them, and where an obstacle touches a piece the triangles decide.
+// solid: the hull of corners, each with a disc across an axis, and a ball around every point of that. What stands still are
+// such solids too, or the triangles of a mesh; of a mesh of very many triangles they are pieces around it.
 const APART_ROUNDS = 100;  // of the search for the distance of two solids; then they count as touching
 const ROUNDING = 1e-9;  // [m]
 const ANGLE_OF_HALF = 2 * Math.PI;  // solid angle of half a sphere
@@ -9,15 +9,16 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
+const beside = (a, axis) => { const along = dot(a, axis); return a.map((value, i) => value - along * axis[i]); };
+const unit = (a) => { const length = norm(a); return length > 0 ? a.map((value) => value / length) : a; };
+
 /** The point of a solid's core that lies farthest in a direction. */
 function farthest({ corners, axis, disc }, direction) {
   let best = corners[0];
   for (const corner of corners) if (dot(corner, direction) > dot(best, direction)) best = corner;
   if (disc === 0) return best;
-  const along = dot(direction, axis);
-  const across = direction.map((value, i) => value - along * axis[i]);
-  const length = norm(across);
-  return length > 0 ? best.map((value, i) => value + (disc / length) * across[i]) : best;
+  const across = unit(beside(unit(beside(direction, axis)), axis));  // twice, for rounding leaves much of an axis where a direction is nearly along it
+  return best.map((value, i) => value + disc * across[i]);
 }
 
 /** Shares of three edges at most whose sum with a first point is nearest to the origin, on the flat through all of them; null where they are no basis. */
@@ -59,11 +60,18 @@ function surelyApart(a, b, distance) {
     const further = minus(farthest(a, nearest.map((value) => -value)), farthest(b, nearest));
     if (dot(nearest, further) > distance * length) return true;
     const found = [[...simplex, further], [nearest, further]].map(nearestOf).find(({ at }) => norm(at) < length);  // the second where rounding spoils the first
-    if (found === undefined || found.points.length === 4) return false;
-    simplex = found.points;
+    if (found === undefined) return false;
+    simplex = found.points.length < 4 ? found.points : [found.at];  // the origin is inside, or they are flat
     nearest = found.at;
   }
   return false;
+}
+
+/** Rows of three whole numbers, as page_fixed.py packs them. */
+function wholeRows(bytes) {
+  const count = bytes.length / 12;
+  const at = (k) => [0, 1, 2, 3].reduce((sum, plane) => sum | (bytes[3 * count * plane + k] << (8 * plane)), 0);
+  return Array.from({ length: count }, (_, k) => [at(k), at(count + k), at(2 * count + k)]);
 }
 
 /** The triangles of the meshes among what stands still, unpacked. */
@@ -71,8 +79,9 @@ async function unpackSurfaces(plan) {
   const meshes = plan.fixed.flatMap(({ surfaces }) => surfaces).filter(({ corners }) => typeof corners === "string");
   await Promise.all(meshes.map(async (surface) => {
     const [corners, faces] = await Promise.all([unpacked(surface.corners), unpacked(surface.faces)]);
-    surface.corners = Float64Array.from(new Int32Array(corners.buffer), (value) => value * surface.grain);
-    surface.faces = new Uint32Array(faces.buffer);
+    surface.corners = wholeRows(corners).flatMap((row) => row.map((value) => value * surface.grain));
+    let first = 0;
+    surface.faces = wholeRows(faces).flatMap(([step, second, third]) => { first += step; return [first, first + second, first + third]; });
     if (surface.enclosed) surface.enclosed.cells = await unpacked(surface.enclosed.cells);
   }));
 }
@@ -133,6 +142,6 @@ function partTouched(plan, obstacle, pose) {
   if (sameNumbers(pose, made.pose) && sameNumbers(obstacle.sizes, made.sizes)) return null;
   const solid = { corners: placedCorners(obstacle, pose), axis: column(pose, 2), disc: obstacle.disc };
   const touches = (other) => !surelyApart(solid, other, obstacle.radius + other.radius + ROUNDING);
-  const meets = ({ solids, surfaces }) => solids.some(touches) && (!surfaces.length || surfaces.some((each) => surfaceTouches(each, solid, obstacle.radius, endsOf(obstacle, pose))));
+  const meets = ({ solids, surfaces }) => solids.some(touches) || surfaces.some((each) => surfaceTouches(each, solid, obstacle.radius, endsOf(obstacle, pose)));
   return plan.fixed.find((part) => part.meets.includes(obstacle.name) && meets(part))?.name ?? null;
 }
