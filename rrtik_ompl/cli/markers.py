@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from rrtik_ompl.cli.terminal import progress, say
@@ -15,11 +16,12 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
+    from rrtik_ompl.sensing.cameras.calibration import Calibration
     from rrtik_ompl.sensing.cameras.camera import Camera
     from rrtik_ompl.sensing.rig import Rig
     from rrtik_ompl.sensing.sensor import Sensor, View
 
-markers = typer.Typer(help="Print markers, calibrate a camera, sense what it sees.")
+markers = typer.Typer(help="Print markers, calibrate cameras, sense what they see.")
 
 Dictionary = Annotated[str, typer.Option(help="4x4_50 sees farthest; aruco_mip_36h12 confuses least; apriltag_36h11.")]
 BOARD_MARKER = 0.73  # side of a board's markers, of a chess square, where it is not said
@@ -66,8 +68,10 @@ def print_sheet(
 
 @markers.command("calibrate")
 def calibrate_camera(
-    photographs: Annotated[Path, typer.Argument(help="Folder of photographs of the board, or a video.")],
-    out: Annotated[Path, typer.Option(help="The camera file to write: .yaml.")],
+    photographs: Annotated[
+        list[Path], typer.Argument(help="Folder of photographs of the board, or a video; of a rig one each camera.")
+    ],
+    out: Annotated[Path, typer.Option(help="The camera file to write, of a rig its file: .yaml.")],
     columns: Annotated[int, typer.Option(help="Chess squares of the board across.")] = 6,
     rows: Annotated[int, typer.Option(help="Chess squares of the board down.")] = 8,
     square: Annotated[float, typer.Option(help="Side of a chess square as printed [mm].")] = 30.0,
@@ -75,9 +79,10 @@ def calibrate_camera(
     dictionary: Dictionary = "4x4_50",
     chessboard: Annotated[bool, typer.Option("--chessboard", help="The board has no markers.")] = False,
 ) -> int:
-    """Calibrate a camera.
+    """Calibrate a camera, or cameras that are fixed to each other.
 
-    From photographs of a printed board, with markers or without; writes the camera file.
+    From photographs of a printed board, with markers or without; writes the camera file. Two folders or more, each with
+    one camera's photographs of the same moments in order, make a rig: its file, and one for each camera beside it.
     """
     check_target(out, SCENES)
     from rrtik_ompl.sensing.cameras.calibration import calibrate
@@ -90,19 +95,49 @@ def calibrate_camera(
     if not chessboard:
         small = BOARD_MARKER * square if marker is None else marker
         board = charuco_board(columns, rows, 1e-3 * square, 1e-3 * small, dictionary)
+    if len(photographs) > 1:
+        return _calibrate_rig(photographs, out, board)
     with progress("detecting the board"):
-        taken = list(pictures_from(photographs))
+        taken = list(pictures_from(photographs[0]))
         found = calibrate([picture.pixels for picture in taken], board)
     save_camera(found, out)
-    for picture, error, unused in zip(taken, found.view_errors, found.unused, strict=True):
-        say(f"{picture.name}: {unused or f'{error:.3f} px'}")
-    names = ("fx", "fy", "cx", "cy")
-    values = found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
-    say(", ".join(f"{n} {v:.2f} +- {s:.2f}" for n, v, s in zip(names, values, found.sigmas, strict=True)))
-    if found.camera.tone is not None:
-        say(f"tone {found.camera.tone:.2f} (0: grey values are light, 1: coded as sRGB)")
+    _tell(found, [picture.name for picture in taken])
     say(f"error {found.error:.3f} px over {sum(not r for r in found.unused)} photographs; wrote {out}")
     return 0
+
+
+def _calibrate_rig(photographs: list[Path], out: Path, board: Any) -> int:
+    """Calibrate cameras that are fixed to each other."""
+    from pinocchio.rpy import matrixToRpy
+
+    from rrtik_ompl.sensing.rig_calibration import calibrate_rig
+    from rrtik_ompl.sensing.rig_file import pictures_together, save_rig
+
+    with progress("detecting the board"):
+        moments = list(pictures_together([str(each) for each in photographs]))
+        found = calibrate_rig([[each[k].pixels for each in moments] for k in range(len(photographs))], board)
+    files, rig = save_rig(found.rig, out), found.rig
+    for k, (each, file) in enumerate(zip(found.cameras, files, strict=True)):
+        _tell(each, [f"{photographs[k].name}/{pictures[k].name}" for pictures in moments])
+        say(f"camera {k + 1}: error {each.error:.3f} px; wrote {file}")
+    for k, (T, count, error) in enumerate(zip(rig.poses[1:], found.moments, found.errors, strict=True), start=2):
+        xyz = " ".join(f"{value:.4f}" for value in T.translation)
+        rpy = " ".join(f"{value:.3f}" for value in np.degrees(matrixToRpy(T.rotation)))
+        say(f"camera {k} in the frame of camera 1: xyz {xyz} m, rpy {rpy} deg, {error:.3f} px over {count} moments")
+    turn = np.degrees(rig.rotation_sigma)
+    say(f"+- {1e3 * rig.position_sigma:.2f} mm, +- {turn:.3f} deg; wrote {out}")
+    return 0
+
+
+def _tell(found: Calibration, names: list[str]) -> None:
+    """What became of each photograph, and the numbers of the camera."""
+    for name, error, unused in zip(names, found.view_errors, found.unused, strict=True):
+        say(f"{name}: {unused or f'{error:.3f} px'}")
+    values = found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
+    heads = ("fx", "fy", "cx", "cy")
+    say(", ".join(f"{n} {v:.2f} +- {s:.2f}" for n, v, s in zip(heads, values, found.sigmas, strict=True)))
+    if found.camera.tone is not None:
+        say(f"tone {found.camera.tone:.2f} (0: grey values are light, 1: coded as sRGB)")
 
 
 @markers.command("sense")

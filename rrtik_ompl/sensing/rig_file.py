@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import pinocchio as pin
@@ -13,9 +14,10 @@ from pydantic import Field
 
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.sections import Name, NotNegative, Section, Version, parse
-from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
+from rrtik_ompl.poses import quaternion_xyzw
 from rrtik_ompl.problem_files.scene import PoseEntry
-from rrtik_ompl.sensing.cameras.camera_file import load_camera
+from rrtik_ompl.sensing.cameras.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
 from rrtik_ompl.sensing.rig import Rig
 
@@ -61,6 +63,27 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
     with document.at(("cameras",)):
         turn = float(np.deg2rad(entry.rotation_sigma_deg))
         return Rig(tuple(cameras), tuple(poses), entry.position_sigma, turn)
+
+
+def save_rig(rig: Rig, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a rig, and its cameras into files beside it: of ``rig.yaml`` they are ``rig_1.yaml`` and so on.
+
+    Returns:
+        The files of the cameras.
+
+    Raises:
+        InputError: If a file cannot be written.
+    """
+    target = Path(path)
+    files = [target.with_name(f"{target.stem}_{k}.yaml") for k in range(1, len(rig.cameras) + 1)]
+    entries: list[dict[str, Any]] = []
+    for camera, T, file in zip(rig.cameras, rig.poses, files, strict=True):
+        save_camera(camera, file)
+        pose = {"xyz": T.translation.tolist(), "quat_xyzw": quaternion_xyzw(T).tolist()}
+        entries.append({"file": file.name} | ({"pose": pose} if entries else {}))
+    sigmas = {"position_sigma": rig.position_sigma, "rotation_sigma_deg": float(np.rad2deg(rig.rotation_sigma))}
+    write_yaml(target, {"version": 1, "cameras": entries} | sigmas)
+    return files
 
 
 def pictures_together(sources: Sequence[str]) -> Iterator[tuple[Picture, ...]]:

@@ -18,6 +18,8 @@ from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.detection import charuco_corners, dictionary_of, find_markers
 from rrtik_ompl.sensing.sight import as_gray
 
+Board = cv2.aruco.CharucoBoard | Chessboard
+
 MIN_CORNERS, MIN_VIEWS = 8, 5
 TONE_VIEWS, TONE_LOOKS = 3, 12  # photographs in which the tone is looked at; markers, or pieces, that are enough
 MIN_TONE_SIDE = 20.0  # [pixels] of a marker, of a piece of a chessboard
@@ -43,7 +45,12 @@ class Calibration:
     unused: tuple[str, ...]
 
 
-def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoard | Chessboard) -> Calibration:
+def board_corners(gray: NDArray[np.uint8], board: Board) -> tuple[Matrix, Matrix]:
+    """Corners of a board in a grey picture: on the board [m], shape (k, 3), and their pixels, shape (k, 2)."""
+    return board.corners(gray) if isinstance(board, Chessboard) else charuco_corners(gray, board)
+
+
+def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board) -> Calibration:
     """Calibrate from photographs of one board (`detection.charuco_board`, `Chessboard`) under different angles.
 
     The third radial coefficient stays 0: with it the second one is not stable. The camera's tone is the median of
@@ -55,7 +62,7 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoa
     grays = [as_gray(picture) for picture in pictures]
     if len({gray.shape for gray in grays}) > 1:
         raise InputError("the photographs differ in size; take all of them with the same camera and settings")
-    found = [board.corners(g) if isinstance(board, Chessboard) else charuco_corners(g, board) for g in grays]
+    found = [board_corners(gray, board) for gray in grays]
     unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
     used = [k for k, reason in enumerate(unused) if not reason]
     result = None
@@ -95,9 +102,7 @@ def _too_few(count: int) -> str:
     return f"{count} corners of the board seen, {MIN_CORNERS} are needed: too small, blurred, or another board"
 
 
-def _tone(
-    views: Sequence[tuple[NDArray[np.uint8], Matrix]], board: cv2.aruco.CharucoBoard | Chessboard
-) -> float | None:
+def _tone(views: Sequence[tuple[NDArray[np.uint8], Matrix]], board: Board) -> float | None:
     """Median tone of a board's markers or pieces; None where too few are large and clear enough.
 
     Args:

@@ -19,8 +19,8 @@ PIECE = 2  # squares along a side
 class Chessboard:
     """A chessboard without markers: squares across and down, and the side of a square [m].
 
-    It must be in view as a whole. Sides of which one is odd and one even make it clear which end is which; the
-    calibration of a camera does not need to know that.
+    It must be in view as a whole. Sides of which one is odd and one even make it clear which end is which: the square
+    after the first corner is then a black one. The calibration of a single camera does not need to know that.
 
     Raises:
         InputError: If it has fewer than 4 x 4 squares, or the side is not positive.
@@ -53,7 +53,17 @@ class Chessboard:
         found, pixels = cv2.findChessboardCornersSB(gray, pattern, flags=cv2.CALIB_CB_ACCURACY)
         if not found or pixels is None:
             return np.zeros((0, 3)), np.zeros((0, 2))
-        return self.points, np.reshape(pixels, (-1, 2)).astype(np.float64)
+        found_at = np.reshape(pixels, (-1, 2)).astype(np.float64)
+        if (self.columns + self.rows) % 2 == 1 and self._first_is_white(gray, found_at):
+            found_at = found_at[::-1].copy()
+        return self.points, found_at
+
+    def _first_is_white(self, gray: NDArray[np.uint8], pixels: Matrix) -> bool:
+        """Whether the square after the first corner is white: lighter than its neighbour."""
+        grid = pixels.reshape(self.rows - 1, self.columns - 1, 2)
+        middles = [np.rint(grid[:2, k : k + 2].reshape(4, 2).mean(axis=0)).astype(int) for k in (0, 1)]
+        here, beside = (int(gray[down, across]) for across, down in middles)
+        return here > beside
 
     def pieces(self, gray: NDArray[np.uint8], pixels: Matrix) -> Iterator[tuple[Matrix, NDArray[np.uint8]]]:
         """Pieces of the board, each of `PIECE` squares or fewer a side, without gaps and none over another.
