@@ -8,7 +8,6 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from rrtik_ompl.cli.terminal import progress, say
@@ -16,7 +15,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
-    from rrtik_ompl.sensing.cameras.calibration import Calibration
+    from rrtik_ompl.sensing.cameras.calibration import Board, Calibration
     from rrtik_ompl.sensing.cameras.camera import Camera
     from rrtik_ompl.sensing.rig import Rig
     from rrtik_ompl.sensing.sensor import Sensor, View
@@ -106,8 +105,9 @@ def calibrate_camera(
     return 0
 
 
-def _calibrate_rig(photographs: list[Path], out: Path, board: Any) -> int:
+def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
     """Calibrate cameras that are fixed to each other."""
+    import numpy as np
     from pinocchio.rpy import matrixToRpy
 
     from rrtik_ompl.sensing.rig_calibration import calibrate_rig

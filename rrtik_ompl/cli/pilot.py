@@ -36,6 +36,9 @@ def pilot(
         bool, typer.Option("--record-pictures", help="Keep the pictures too, beside the record.")
     ] = False,
     second: Annotated[str | None, typer.Option(help="Camera number or film that is shown beside the first.")] = None,
+    rig: Annotated[
+        Path | None, typer.Option(help="In place of --camera-file: both cameras are sensed together: .yaml.")
+    ] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recorded session.")] = None,
     arm: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="An arm; a simulated one if left out.")] = None,
     master: Annotated[
@@ -76,6 +79,7 @@ def pilot(
         record=record,
         record_pictures=record_pictures,
         second=_second(second),
+        rig=rig,
         replay=replay,
         arm=arm,
         master=master,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import Feed
 from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera, LiveCamera, SimulatedFurtherCamera
 from rrtik_ompl.pilot.devices.line_arm import LineArm
-from rrtik_ompl.pilot.devices.perception import LivePerception, SimulatedSource
+from rrtik_ompl.pilot.devices.perception import CameraOfRig, LivePerception, SimulatedSource
 from rrtik_ompl.pilot.devices.simulated_vehicle import SimulatedVehicle, find_vehicle, load_vehicle
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
@@ -31,6 +31,7 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.camera_file import load_camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
 from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+from rrtik_ompl.sensing.rig_file import load_rig, pictures_together
 from rrtik_ompl.sensing.scene_from_view import SIGMAS
 from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.sensing.sight import check_size
@@ -51,6 +52,7 @@ class SessionOptions:
     record: Path | None = None
     record_pictures: bool = False
     second: int | Path | None = None
+    rig: Path | None = None
     replay: Path | None = None
     arm: str | None = None
     master: str | None = None
@@ -81,6 +83,8 @@ def open_session(options: SessionOptions) -> OpenSession:
         InputError: If a file, the camera or the arm cannot be used.
     """
     problem = load_problem(options.problem)
+    if options.rig is not None and options.source is None:
+        raise InputError("--rig: needs pictures of cameras, films or folders, not simulated or recorded ones")
     if options.replay is not None:
         return _replay(options, problem, options.replay)
     if options.arm is not None and isinstance(options.source, Path):
@@ -122,7 +126,9 @@ def _further(
     if vehicle is not None and isinstance(source, SimulatedSource):
         for mount in vehicle.further:
             found[mount.name] = SimulatedFurtherCamera(mount, _simulated(vehicle, problem), source.camera, source.arm)
-    if second is not None:
+    if second is not None and options.rig is not None:
+        found["second"] = CameraOfRig(perception)
+    elif second is not None:
         feed = Feed(lambda: pictures_from(second), paced=not isinstance(second, int))
         found["second"] = LiveCamera(feed)
     return found
@@ -148,23 +154,38 @@ def _perception(
     if vehicle is not None and simulated is not None:
         sensor = Sensor(vehicle.camera, vehicle.marker_map, sigmas=options.sigmas)
         return LivePerception(sensor, simulated, arm_in_picture=True)
-    for name, file in (("--camera-file", options.camera_file), ("--map", options.map_file)):
+    eye = None if options.rig is None else load_rig(options.rig)
+    for name, file in (("--camera-file", options.rig or options.camera_file), ("--map", options.map_file)):
         if file is None:
             raise InputError(f"pictures need {name} FILE (see: rrtik markers --help)")
-    camera, marker_map = load_camera(str(options.camera_file)), load_marker_map(str(options.map_file))
-    sensor = Sensor(camera, marker_map, sigmas=options.sigmas)
-    source = options.source
+    source, second = options.source, options.second
     if source is None:
         raise InputError("there is no source of pictures")
-    return LivePerception(
-        sensor, Feed(lambda: _fitting(pictures_from(source), camera), paced=not isinstance(source, int))
-    )
+    marker_map, paced = load_marker_map(str(options.map_file)), not isinstance(source, int)
+    if eye is None:
+        camera = load_camera(str(options.camera_file))
+        sensor = Sensor(camera, marker_map, sigmas=options.sigmas)
+        return LivePerception(sensor, Feed(lambda: _fitting(pictures_from(source), (camera,)), paced=paced))
+    if options.camera_file is not None or second is None or len(eye.cameras) != len((source, second)):
+        raise InputError(
+            f"--rig {options.rig}: needs two cameras, the pictures of the second by --second, and no --camera-file"
+        )
+    both = [str(source), str(second)]
+    feed = Feed(lambda: _fitting(_together(both), eye.cameras), paced=paced)
+    return LivePerception(Sensor(eye, marker_map, sigmas=options.sigmas), feed)
 
 
-def _fitting(pictures: Iterator[Picture], camera: Camera) -> Iterator[Picture]:
-    """The same pictures; the first that the camera cannot have taken ends them with an error."""
+def _together(sources: Sequence[str]) -> Iterator[Picture]:
+    """Pictures of the first source, each with those that the others took at the same time."""
+    for first, *others in pictures_together(sources):
+        yield replace(first, others=tuple(others))
+
+
+def _fitting(pictures: Iterator[Picture], cameras: Sequence[Camera]) -> Iterator[Picture]:
+    """The same pictures; the first that a camera cannot have taken ends them with an error."""
     for picture in pictures:
-        check_size(picture.pixels, camera, picture.name)
+        for each, camera in zip((picture, *picture.others), cameras, strict=True):
+            check_size(each.pixels, camera, each.name)
         yield picture
 
 

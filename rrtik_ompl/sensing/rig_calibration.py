@@ -77,8 +77,8 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
     for number, taken in enumerate(pictures, start=1):
         try:
             cameras.append(calibrate(taken, board))
-        except InputError as error:
-            raise InputError(f"camera {number}: {error}") from None
+        except InputError as reason:
+            raise InputError(f"camera {number}: {reason}") from None
     corners = [[board_corners(as_gray(picture), board) for picture in taken] for taken in pictures]
     poses, moments, errors, sigmas = [pin.SE3.Identity()], [], [], []
     for number in range(1, len(pictures)):

@@ -45,6 +45,53 @@ def test_the_shipped_scenario_has_every_color_of_lamp_and_places_the_object_well
     opened.close()
 
 
+def rig_of_one_place(tmp_path):
+    """A rig whose two cameras are the same one, so that its photographs do for both."""
+    file = tmp_path / "rig.yaml"
+    cameras = f"- file: {CAMERA}\n- {{file: {CAMERA}, pose: {{xyz: [0, 0, 0]}}}}\n"
+    file.write_text(f"version: 1\ncameras:\n{cameras}position_sigma: 0.0005\n")
+    return file
+
+
+def test_two_cameras_are_sensed_together_and_the_second_is_shown(tmp_path):
+    photographs = FOLDER / "photographs"
+    wanted = SessionOptions(
+        "titan4_sdu", source=photographs, second=photographs, rig=rig_of_one_place(tmp_path), map_file=Path(MAP)
+    )
+    alone = SessionOptions("titan4_sdu", source=photographs, camera_file=Path(CAMERA), map_file=Path(MAP))
+    places, sigmas = [], []
+    for options in (wanted, alone):
+        opened = open_session(options)
+        engine = opened.engine
+        engine.update(0.0)
+        seen = engine.session.surroundings.named("valve")
+        places.append(seen.T_base_object.translation)
+        sigmas.append(seen.position_sigma)
+        if options is wanted:
+            engine.execute({"name": "preset", "view": "second"}, 0.1)
+            assert "second" in engine.state()["views"]
+            assert np.array_equal(engine.perception.others[0], engine.perception.picture)
+            assert engine.outside_picture()[:2] == b"\xff\xd8"
+        opened.close()
+    assert np.linalg.norm(places[0] - places[1]) < 1e-3
+    assert sigmas[0] < sigmas[1]
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({}, "second by --second"),
+        ({"second": FOLDER / "photographs", "camera_file": Path(CAMERA)}, "no --camera-file"),
+        ({"source": None}, "not simulated"),
+    ],
+)
+def test_a_rig_without_its_two_sources_is_refused_in_one_line(tmp_path, more, said):
+    given = {"source": FOLDER / "photographs", "map_file": Path(MAP), "rig": rig_of_one_place(tmp_path)} | more
+    with pytest.raises(InputError, match=said) as refused:
+        open_session(SessionOptions("titan4_sdu", **given))
+    assert "\n" not in str(refused.value)
+
+
 def test_the_outside_view_is_drawn_only_when_it_changed():
     opened = open_session(SessionOptions("titan4_sdu"))
     engine = opened.engine

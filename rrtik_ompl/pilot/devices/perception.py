@@ -55,6 +55,7 @@ class LivePerception:
 
     Attributes:
         source: Of the pictures.
+        others: The last pictures of the other cameras of a rig.
     """
 
     def __init__(self, sensor: Sensor, source: PictureSource, *, arm_in_picture: bool = False) -> None:
@@ -62,6 +63,7 @@ class LivePerception:
         self.camera, self.arm_in_picture = sensor.camera, arm_in_picture
         self.picture = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
         self.T_base_camera: pin.SE3 | None = sensor.marker_map.T_base_camera
+        self.others: tuple[NDArray[np.uint8], ...] = ()
         self.lost = self.hint = ""
         self._explain_again = -np.inf
         self._sensor, self.source = sensor, source
@@ -72,13 +74,15 @@ class LivePerception:
             taken = self.source.latest()
             if taken is None:
                 return
-            view = self._sensor.view(Picture(taken.pixels, taken.name, time))
+            others = [Picture(each.pixels, each.name, time) for each in taken.others]
+            view = self._sensor.view(Picture(taken.pixels, taken.name, time), *others)
         except RrtikError as error:
             self.lost = str(error)
             if self.lost != ENDED:  # the last picture of a film was a good one
                 session.unusable = self.lost
             return
         self.lost, self.picture = "", taken.pixels
+        self.others = tuple(each.pixels for each in taken.others)
         session.see(view.placed, time)
         if tip := tip_seen(self._sensor.marker_map, view.seen):
             session.see_arm(*tip, time)
@@ -108,6 +112,21 @@ class LivePerception:
             self._explain_again = time + EXPLANATION_SECONDS
             return self._sensor.why_nothing("camera")
         return self.hint
+
+
+class CameraOfRig:
+    """The second camera of a rig, whose pictures are sensed with those of the first."""
+
+    def __init__(self, perception: LivePerception) -> None:
+        """Take what senses them."""
+        self._perception = perception
+
+    def picture(self) -> NDArray[np.uint8] | None:
+        """The picture that was sensed last; None if there is none yet."""
+        return self._perception.others[0] if self._perception.others else None
+
+    def close(self) -> None:
+        """Nothing to release: the perception has it."""
 
 
 class SimulatedSource:

@@ -24,11 +24,15 @@ MAX_FILE_BYTES = 512 * 1024 * 1024
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """One picture: blue, green, red, shape (height, width, 3), where it comes from, and its time [s]."""
+    """One picture: blue, green, red, shape (height, width, 3), where it comes from, and its time [s].
+
+    ``others`` are those that the other cameras of a rig took at the same time.
+    """
 
     pixels: NDArray[np.uint8]
     name: str
     time: float
+    others: tuple[Picture, ...] = ()
 
 
 def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
