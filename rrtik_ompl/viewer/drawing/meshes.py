@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import coal
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.shape_table import shape_of
-from rrtik_ompl.collision.solids import is_mesh
+from rrtik_ompl.collision.solids import SameObject, is_mesh
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Mesh, PointCloud, Shape, Sphere
 from rrtik_ompl.shapes.surfaces import Faces
@@ -27,7 +28,7 @@ from rrtik_ompl.viewer.drawing.objects import (
 from rrtik_ompl.viewer.drawing.triangles import box_corners, split_creases, thin_out, tube
 
 MAX_OBSTACLE_TRIANGLES = 30_000  # a drawn mesh above this is thinned out; the one that is checked stays as it is
-MOST_POINTS = 1_000_000  # drawn of a cloud; a page has 16 bytes for each
+MOST_POINTS = 200_000  # drawn of a cloud; a page has 16 bytes for each, and has to open soon
 BEAD = 0.9  # radius of the bead that stands for a robot that is a mere point, in thicknesses of a line
 _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # three.js has its cylinders along y
 
@@ -121,10 +122,16 @@ def look_of_coal(geometry: Any, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | N
         cone = CylinderGeometry(2.0 * geometry.halfLength, 0.0, geometry.radius)
         return _primitive(cone, _Y_TO_Z, half)
     try:
-        shape = shape_of(geometry)
+        shape = _shape_of(SameObject(geometry))
         return None if shape is None else look_of_shape(shape, limit)
     except InputError:  # a link's mesh without area: nothing to see
         return None
+
+
+@lru_cache(maxsize=64)
+def _shape_of(key: SameObject) -> Shape | None:
+    """The shape of a coal geometry; an arm and its ghosts, which have fewer triangles, ask for the same."""
+    return shape_of(key.geometry)
 
 
 def _primitive(geometry: Geometry, placement: NDArray[np.float64], half: ArrayLike) -> Look:
