@@ -239,6 +239,12 @@ def _colors() -> dict[str, str]:
         "BEFORE",
         "BACKGROUND_TOP",
         "BACKGROUND_BOTTOM",
+        "GRID_MIDDLE",
+        "GRID",
+        "BACKGROUND_TOP_DARK",
+        "BACKGROUND_BOTTOM_DARK",
+        "GRID_MIDDLE_DARK",
+        "GRID_DARK",
     )
     return {name.lower(): getattr(palette, name) for name in names}
 

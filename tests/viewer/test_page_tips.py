@@ -59,3 +59,19 @@ def test_in_a_browser_the_right_arm_is_dragged_and_the_left_one_stays(tmp_path: 
     ends = [problem.robot.fk(q, "right_grip_point") for q in (path.end, goal)]
     assert 0.005 < np.linalg.norm(ends[1].translation - ends[0].translation) < 0.5
     np.testing.assert_allclose(ends[1].rotation, ends[0].rotation, atol=1e-3)
+
+
+@pytest.mark.kernels
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
+def test_the_page_is_dark_where_the_system_prefers_that(tmp_path: Path) -> None:
+    lightness = "getComputedStyle(document.body).%s.match(/[0-9]+/g).map(Number).reduce((a, b) => a + b, 0)"
+    ground = "toned('background_top')"
+    with planning_page(page(rrtik.load_problem("planar3_a")), tmp_path) as browser:
+        found = {}
+        for mode in ("light", "dark"):
+            browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": mode}])
+            found[mode] = [browser.ask(lightness % which) for which in ("backgroundColor", "color")]
+            found[mode].append(browser.ask(ground))
+    assert found["light"][0] > 600 > 200 > found["light"][1]
+    assert found["dark"][0] < 200 < 600 < found["dark"][1]
+    assert found["light"][2] != found["dark"][2]

@@ -34,8 +34,14 @@ function setVisible(path, on) {
 function rgb(color) {
   return [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16) / 255);
 }
-viewer.set_property(["Background"], "top_color", rgb(story.colors.background_top));
-viewer.set_property(["Background"], "bottom_color", rgb(story.colors.background_bottom));
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const toned = (name) => story.colors[dark.matches ? `${name}_dark` : name];
+
+function showGround() {
+  viewer.set_property(["Background"], "top_color", rgb(toned("background_top")));
+  viewer.set_property(["Background"], "bottom_color", rgb(toned("background_bottom")));
+  addGrid();
+}
 for (const light of ["SpotLight", "PointLightNegativeX", "PointLightPositiveX", "AmbientLight", "FillLight"]) {
   viewer.set_property(["Lights", light], "visible", false);
 }
@@ -52,13 +58,14 @@ sky.position.set(0, 0, 1);
 function addGrid() {
   const cell = story.grid;
   const cells = 2 * Math.ceil(Math.max(high.x - low.x, high.y - low.y, size / 2) * 0.75 / cell);
-  const grid = new THREE.GridHelper(cells * cell, cells, 0xbcc6d0, 0xd2d9e0);
+  const grid = new THREE.GridHelper(cells * cell, cells, toned("grid_middle"), toned("grid"));
   grid.rotation.x = Math.PI / 2;
   const snap = (value) => Math.round(value / cell) * cell;
   grid.position.set(snap(centre.x), snap(centre.y), low.z - 0.01 * size);
   viewer.set_object([...ROOT, "grid"], grid);
 }
-addGrid();
+showGround();
+dark.addEventListener("change", showGround);
 
 // Dark edges make flat-sided obstacles readable from every side.
 function outline(group, color) {
