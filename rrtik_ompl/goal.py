@@ -37,7 +37,7 @@ def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.flo
 
 def _with_poses(part: AnyPart) -> GoalPart:
     matrix = isinstance(part, np.ndarray) and part.ndim > 1  # a row may be a configuration
-    return PoseGoal(part) if matrix or isinstance(part, pin.SE3) else part
+    return PoseGoal(part) if matrix or isinstance(part, pin.SE3) else part  # type: ignore[return-value]
 
 
 @lru_cache(maxsize=64)

@@ -80,7 +80,7 @@ def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[M
 def add_limb(image: MemoryImage, robot: Robot) -> dict[str, int] | None:
     """Add what inverse kinematics of a tip needs: where the page finds it. None where a joint hangs on several."""
     limb = limb_of(robot)
-    return limb and {"limb": image.add(limb), "ik": image.add(call_table(limb, STEPS, PATIENCE))}
+    return None if limb is None else {"limb": image.add(limb), "ik": image.add(call_table(limb, STEPS, PATIENCE))}
 
 
 def _add_connect(image: MemoryImage, problem: Problem, motions: FastMotions) -> int:
