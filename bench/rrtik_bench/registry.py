@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rrtik_bench import drrt_con, ikurt, ikurt_limits, titan4, titan4_screws
+from rrtik_bench import drrt_con, drrt_con_scenes, ikurt, ikurt_limits, titan4, titan4_screws, titan4_tracking
 from rrtik_bench.crdt import tables as crdt
 from rrtik_bench.errata import tables as errata
 from rrtik_bench.figures import crdt as crdt_figures
@@ -24,7 +24,8 @@ from rrtik_bench.shortening import tables as shortening
 from rrtik_bench.tables import Collection
 
 PAGES = (
-    *(titan4, titan4_screws, mb_rrt, mb_rrt_beyond, genetic, coding, crdt, ikurt, ikurt_limits, drrt_con, shortening),
+    *(titan4, titan4_screws, titan4_tracking, mb_rrt, mb_rrt_beyond, genetic, coding, crdt, ikurt, ikurt_limits),
+    *(drrt_con, drrt_con_scenes, shortening),
     *(sensing, camera_tables, sequences, detections, errata),
 )
 DRAWN = (

@@ -27,7 +27,7 @@ TABLES = {table.name: table for table in COLLECTION.tables}
 FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-sequences", "errata-kinematics", "errata-grim",
         "crdt-routes", "mb-rrt-example", "mb-rrt-10", "mb-rrt-sliding", "mb-rrt-obstacles",
         "ikurt-solutions", "ikurt-limits", "ga-reb-coding",
-        "drrt-con-arm")  # fmt: skip
+        "drrt-con-arm", "drrt-con-unannounced")  # fmt: skip
 
 
 def test_all_tables_of_the_quick_round_together_are_said_to_take_less_than_ten_minutes():
