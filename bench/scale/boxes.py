@@ -15,17 +15,19 @@ from rrtik_ompl import Box, Obstacle, Problem, Scene, World, load_robot, plan, p
 PLANNER, BUSY = "fastrrtconnect", 20.0  # [s]: no clock ends a search on a busy machine
 EDGE, ROOM = 0.02, 1.5  # [m] of a box; radius of the ball that they fill
 MANY = 1000  # boxes, from which on as much of the room is full
+FACES, WALL, THICK = 3, 0.75, 0.02  # of a room: half of its sides, thickness of its panels [m]
 PLANS, FEWEST, ROWS, WORLDS, MOVES = 8, 3, 8000, 2, 200  # FEWEST plans among the most boxes
 
 
 @dataclass(frozen=True)
 class Among:
-    """Processor times among so many boxes: a world [us a box], a configuration, a move of one box [us], plans [ms].
+    """Processor times among ``count`` boxes: a world [us a box], a configuration, a move of one box [us], plans [ms].
 
     ``moved``: a move with the check of a configuration; ``motions``: that each plan checked; ``free``: share of the
     configurations.
     """
 
+    count: int
     world: float
     check: float
     move: float
@@ -52,20 +54,46 @@ def scene_of(count: int) -> Scene:
     return Scene(tuple(Obstacle(f"box {k}", Box([edge] * 3), pose(p)) for k, p in enumerate(away)))
 
 
+def corner_of(count: int) -> Scene:
+    """The same corner of a room around the base whatever the number: a floor and two walls, each of square panels."""
+    along = max(int((count / FACES) ** 0.5), 1)
+    edge = 2.0 * WALL / along
+    spots = edge * (np.arange(along) + 0.5) - WALL
+    panel, flat = Box([edge, edge, THICK]), np.array([(x, y, 0.0) for x in spots for y in spots])
+    quarter = np.pi / 2.0
+    faces = [
+        pose([0.0, 0.0, -0.03]),
+        pose([WALL, 0.0, WALL, 0.0, quarter, 0.0]),
+        pose([0.0, WALL, WALL, quarter, 0.0, 0.0]),
+    ]
+    moves = [pose(p) for p in flat]
+    placed = [face * move for face in faces for move in moves]
+    return Scene(tuple(Obstacle(f"panel {k}", panel, each) for k, each in enumerate(placed)))
+
+
 def among_boxes(count: int) -> Among:
-    """A UR5 among boxes."""
-    robot, scene = load_robot("ur5"), scene_of(count)
+    """A UR5 among boxes drawn around it."""
+    return _among(scene_of(count), PLANS if count <= MANY else FEWEST)
+
+
+def among_panels(count: int) -> Among:
+    """A UR5 in a corner of about so many panels."""
+    return _among(corner_of(count), PLANS)
+
+
+def _among(scene: Scene, plans: int) -> Among:
+    robot, count = load_robot("ur5"), len(scene.obstacles)
     made = [spent(partial(World, robot, scene)) for _ in range(WORLDS + 1)][1:]
     world: World = made[0][1]
     rows = np.random.default_rng(2).uniform(*robot.finite_range(), (ROWS, robot.dof))
     free = rows[world.valid_batch(rows)]
     check = min(spent(partial(world.valid_batch, rows))[0] for _ in range(3)) / ROWS
-    plans = PLANS if count <= MANY else FEWEST
     problems = [Problem(world, a, b) for a, b in zip(free[: 2 * plans : 2], free[1::2], strict=False)]
     ask = [partial(plan, problem, PLANNER, seed=1, seconds=BUSY) for problem in problems]
     ask[0]()
     runs, moves = [spent(call) for call in ask], _move(world)
     return Among(
+        count=count,
         world=1e6 * min(taken for taken, _ in made) / count,
         check=1e6 * check,
         move=1e6 * moves[0],
