@@ -14,8 +14,11 @@ from rrtik_ompl import Box, Obstacle, Problem, Scene, World, load_robot, plan, p
 
 PLANNER, BUSY = "fastrrtconnect", 20.0  # [s]: no clock ends a search on a busy machine
 EDGE, ROOM = 0.02, 1.5  # [m] of a box; radius of the ball that they fill
+# [rad] of the first two joints in a corner: from one turn to another the arm would have to pass through floor and walls
+LOWEST, HIGHEST = (-2.9, -3.0), (-0.2, -0.1)
 MANY = 1000  # boxes, from which on as much of the room is full
 FACES, WALL, THICK = 3, 0.75, 0.02  # of a room: half of its sides, thickness of its panels [m]
+FIRST = 500  # pairs of configurations that are looked at
 PLANS, FEWEST, ROWS, WORLDS, MOVES = 8, 3, 8000, 2, 200  # FEWEST plans among the most boxes
 
 
@@ -78,17 +81,24 @@ def among_boxes(count: int) -> Among:
 
 def among_panels(count: int) -> Among:
     """A UR5 in a corner of about so many panels."""
-    return _among(corner_of(count), PLANS)
+    return _among(corner_of(count), PLANS, corner=True)
 
 
-def _among(scene: Scene, plans: int) -> Among:
+def _among(scene: Scene, plans: int, *, corner: bool = False) -> Among:
     robot, count = load_robot("ur5"), len(scene.obstacles)
     made = [spent(partial(World, robot, scene)) for _ in range(WORLDS + 1)][1:]
     world: World = made[0][1]
-    rows = np.random.default_rng(2).uniform(*robot.finite_range(), (ROWS, robot.dof))
+    lower, upper = robot.finite_range()
+    if corner:
+        lower, upper = np.append(LOWEST, lower[2:] / 2.0), np.append(HIGHEST, upper[2:] / 2.0)
+    rows = np.random.default_rng(2).uniform(lower, upper, (ROWS, robot.dof))
     free = rows[world.valid_batch(rows)]
     check = min(spent(partial(world.valid_batch, rows))[0] for _ in range(3)) / ROWS
-    problems = [Problem(world, a, b) for a, b in zip(free[: 2 * plans : 2], free[1::2], strict=False)]
+    starts, ends = free[: len(free) // 2 * 2 : 2], free[1::2]
+    if corner:  # much of it is free: what a straight motion solves is left out
+        blocked = ~world.motion_valid_batch(starts[:FIRST], ends[:FIRST])
+        starts, ends = starts[:FIRST][blocked], ends[:FIRST][blocked]
+    problems = [Problem(world, a, b) for a, b in zip(starts[:plans], ends[:plans], strict=True)]
     ask = [partial(plan, problem, PLANNER, seed=1, seconds=BUSY) for problem in problems]
     ask[0]()
     runs, moves = [spent(call) for call in ask], _move(world)

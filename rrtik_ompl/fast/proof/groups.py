@@ -6,6 +6,7 @@ A ball and a box around all of them answer for many pairs at once, wherever an a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import TypeAlias
 
 import numpy as np
@@ -16,15 +17,16 @@ from rrtik_ompl.fast.tables.solid_tables import ConvexSolid
 from rrtik_ompl.fast.tables.z_order import z_order
 
 MANY = 32  # obstacles, from which on neighbours among them are compared as one
-BLOCK = 16  # so many neighbours
+BLOCK = 16  # so many neighbours, and so many blocks of neighbours
 
 Members: TypeAlias = tuple[int, ...]  # numbers of bodies
+Levels: TypeAlias = Sequence[Sequence[Members]]  # blocks of bodies, then blocks of BLOCK blocks, and so on
 Parts: TypeAlias = Sequence[Sequence[ConvexSolid]]
 
 
 def compared_as_one(
     bodies: Sequence[Body], parts: Parts, pairs: Sequence[tuple[int, int]], *, fixed: bool
-) -> list[tuple[Members, list[Members]]]:
+) -> list[tuple[Members, Levels]]:
     """Bodies of one joint with one padding, each with blocks of standing bodies that none of them may touch.
 
     One that is alone is listed beside many obstacles only.
@@ -44,42 +46,64 @@ def compared_as_one(
     beside: dict[Members, list[int]] = {}
     for (_, _, still), members in movers.items():
         beside.setdefault(tuple(members), []).append(still)
-    made = []
+    made = list[tuple[Members, Levels]]()
     for together, stills in beside.items():
         if fixed and len(stills) >= MANY:
             made.append((together, _blocks(parts, stills)))
         elif len(together) > 1:
-            made.append((together, [(still,) for still in stills]))
+            made.append((together, [[(still,) for still in stills]]))
     return made
 
 
 def group_rows(
-    groups: Sequence[tuple[Members, Sequence[Members]]], ends: Sequence[int], sweeps: dict[tuple[Members, int], int]
-) -> tuple[list[tuple[int, ...]], dict[Members, int]]:
-    """Pairs of several bodies, made of those that begin the table, and the numbers of the solids around several.
+    groups: Sequence[tuple[Members, Levels]],
+    ends: Sequence[int],
+    sweeps: dict[tuple[Members, int], int],
+    begin: int,
+) -> tuple[list[tuple[int, ...]], dict[Members, int], list[int]]:
+    """Pairs of several bodies, made of those that begin the table.
 
     Args:
         groups: Bodies of one joint, each with blocks of obstacles.
         ends: The number of each body's solid, and how many there are.
         sweeps: Numbers of the sweeps; those of the groups are added.
+        begin: The number of the first of these pairs.
+
+    Returns:
+        The pairs, the numbers of the solids around several bodies, and the numbers of those pairs that no other holds.
     """
     rows: list[tuple[int, ...]] = []
     together: dict[Members, int] = {}
+    top: list[int] = []
     first = 0
 
     def solid(members: Members) -> int:
         return ends[members[0]] if len(members) == 1 else together.setdefault(members, ends[-1] + len(together))
 
-    for members, blocks in groups:
+    for members, levels in groups:
         sweep = sweeps.setdefault((members, 0), len(sweeps))
-        for block in blocks:
-            end = first + len(members) * len(block)
-            rows.append((solid(members), solid(block), 0, sweep, -1, first, end, members[0], -1, block[0], -1))
-            first = end
-    return rows, together
+        held = range(first, first := first + len(members) * sum(map(len, levels[0])))  # pairs of bodies
+        for number, level in enumerate(levels):
+            own = range(begin + len(rows), begin + len(rows) + len(level))
+            place = held.start
+            for block in level:
+                end = min(place + (BLOCK if number else len(members) * len(block)), held.stop)
+                rows.append((solid(members), solid(block), 0, sweep, -1, place, end, members[0], -1, block[0], -1))
+                place = end
+            held = own
+        top += held
+    return rows, together, top
 
 
-def _blocks(parts: Parts, stills: Sequence[int]) -> list[Members]:
-    """Neighbours in space, up to BLOCK of them at a time."""
+def _blocks(parts: Parts, stills: Sequence[int]) -> Levels:
+    """Neighbours in space, up to BLOCK of them at a time, and neighbours among these blocks."""
     order = z_order(np.array([parts[k][0].corners.mean(axis=0) for k in stills])).tolist()
-    return [tuple(stills[k] for k in order[first : first + BLOCK]) for first in range(0, len(order), BLOCK)]
+    levels = [_joined([(stills[k],) for k in order])]
+    while len(levels[-1]) > BLOCK:
+        levels.append(_joined(levels[-1]))
+    return levels
+
+
+def _joined(blocks: Sequence[Members]) -> list[Members]:
+    """One block in the place of every BLOCK."""
+    return [tuple(chain.from_iterable(blocks[k : k + BLOCK])) for k in range(0, len(blocks), BLOCK)]

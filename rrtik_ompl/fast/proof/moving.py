@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.cloud_frames import cloud_bodies, cloud_poses
+from rrtik_ompl.fast.proof.groups import BLOCK
 from rrtik_ompl.fast.proof.packing import NOTHING, ProofPairs, sizes_of, solid_kind
 from rrtik_ompl.fast.tables.cloud_tables import cloud_table
 from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, convex_solids, placed_bodies
@@ -19,6 +21,7 @@ NO_LIMIT = 1 << 62
 _BALL = slice(layout.BALL_CENTRE, layout.BALL_CENTRE + 3)
 _AXES = slice(layout.BOX_AXES, layout.BOX_AXES + 9)
 _MIDDLE = slice(layout.BOX_MIDDLE, layout.BOX_MIDDLE + 3)
+_HALF = slice(layout.BOX_HALF, layout.BOX_HALF + 3)
 _DISC_AXIS = slice(layout.DISC_AXIS, layout.DISC_AXIS + 3)
 
 
@@ -132,8 +135,12 @@ class MovedSolids:
         corners = slice(self._records[parts[0], layout.FIRST_CORNER], self._records[parts[-1], layout.END_CORNER])
         self._corners[corners] = np.concatenate([solid.corners for solid in own])
         for group in self._groups.get(number, ()):
-            solids = [self._solid(k) for member in self._packed.groups[group] for k in self._parts(member)]
-            self._sizes[self._packed.firsts[-1] + group] = sizes_of([solids], np.eye(3)[None])
+            members, place = self._packed.groups[group], self._packed.firsts[-1] + group
+            if len(members) > BLOCK:  # what is around what was there and what is new is around all
+                solids = [_box(self._sizes[place]), *own]
+            else:
+                solids = [self._solid(k) for member in members for k in self._parts(member)]
+            self._sizes[place] = sizes_of([solids], np.eye(3)[None])
         return True
 
     def _parts(self, number: int) -> range:
@@ -150,6 +157,12 @@ class MovedSolids:
             axis=sizes[_DISC_AXIS],
             radius=float(sizes[layout.ROUND]),
         )
+
+
+def _box(sizes: Vector) -> ConvexSolid:
+    """The box around several bodies, whose axes are those of the world."""
+    ends = sizes[_MIDDLE] + np.array([[-1.0], [1.0]]) * sizes[_HALF]
+    return ConvexSolid(np.array(list(product(*ends.T))))
 
 
 def _turned(turns: NDArray[np.float64], a: Matrix) -> Matrix:

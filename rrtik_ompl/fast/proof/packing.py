@@ -104,7 +104,7 @@ def proof_pairs(
     common = cache(partial(_common, chain))
     moving = [(i, j) for i, j in pairs if on[i] or on[j]]
     groups = compared_as_one(bodies, parts, moving, fixed=fixed)
-    grouped = {(k, still): None for members, blocks in groups for block in blocks for still in block for k in members}
+    grouped = {(k, s): None for members, (blocks, *_) in groups for block in blocks for s in block for k in members}
     for i, j in [*grouped, *(pair for pair in moving if pair not in grouped and pair[::-1] not in grouped)]:
         base = common(on[i], on[j])
         one, other = (i, j) if base == on[j] else (j, i)
@@ -121,10 +121,10 @@ def proof_pairs(
         numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
         span = (first, len(of_parts))
         whole.append((ends[one], ends[other], base, *own, *span, one, numbers[0], other, numbers[1]))
-    of_groups, together = group_rows(groups, ends, sweeps)
+    of_groups, together, top = group_rows(groups, ends, sweeps, len(whole) + len(of_parts))
     rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 4)
     rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
-    top = [*range(len(whole) + len(of_parts), len(rows)), *range(len(grouped), len(whole))]
+    top += range(len(grouped), len(whole))
     sides = rows[:, layout.PAIR_SIZE :]
     named = np.sort(sides[:, ::2], axis=1)
     packed = _solid_arrays(bodies, parts, list(together))
@@ -166,8 +166,8 @@ def proof_pairs(
     arrays = body_arrays(bodies)
     beside = np.asarray(arrays.obstacles[named].any(axis=1))
     margins = arrays.kept_apart(named)
-    spans = [slice(*row[layout.PARTS_FIRST : layout.PARTS_END + 1]) for row in of_groups]
-    margins[len(whole) + len(of_parts) :] = [margins[span].max() for span in spans]
+    for number, row in enumerate(of_groups, len(whole) + len(of_parts)):
+        margins[number] = margins[row[layout.PARTS_FIRST] : row[layout.PARTS_END]].max()
     return ProofPairs(made, named, sides, margins, beside, ends, list(together))
 
 

@@ -206,14 +206,16 @@ def beyond(table: ProofTable, pair: int, begin: int, end: int, width: float) -> 
 def settle(table: ProofTable, level: int, number: int) -> int:
     """Go through the open pairs of an interval and list those that stay open for its halves; returns how many do.
 
-    Where whole bodies cannot be proven apart their parts are.
+    Where several bodies, or a whole one, cannot be proven apart, what they consist of joins the list.
     """
     pairs, lists, total, step = pairs_of(table), lists_of(table), pair_count_of(table), (layout.NODES - 1) >> level
     begin, end = node_frames(table, number * step), node_frames(table, number * step + step)
     left, row, next_row = 0, total * level, total * (level + 1)
     telling = log_room_of(table) > 0
-    for k in range(int_at(counts_of(table), level)):
+    count, k = int_at(counts_of(table), level), 0
+    while k < count:
         pair = int_at(lists, row + k)
+        k += 1
         first, last = first_part_of(pairs, pair), end_part_of(pairs, pair)
         if first == last or telling:
             if settled(table, pair, begin, end, level, number):
@@ -228,9 +230,8 @@ def settle(table: ProofTable, level: int, number: int) -> int:
             left += 1
             continue
         for part in range(first, last):
-            if not settled(table, part, begin, end, level, number):
-                set_int(lists, next_row + left, part)
-                left += 1
+            set_int(lists, row + count, part)
+            count += 1
     set_int(counts_of(table), level + 1, left)
     return left
 
