@@ -84,6 +84,24 @@ def test_a_marker_in_haze_is_found_at_the_second_try():
     assert np.abs(marker.corners - true).max() < 0.5
 
 
+@pytest.mark.parametrize(("family", "spoilt", "found"), [("apriltag_36h11", 4, True), ("apriltag_36h11", 6, False),
+                                                         ("4x4_50", 1, False)])  # fmt: skip
+def test_all_that_a_code_corrects_is_corrected_at_a_second_look_if_codes_are_far_apart(family, spoilt, found):
+    cells = marker_cells(family, 19).copy()
+    inner = cells[1:-1, 1:-1]
+    for k in range(spoilt):
+        inner[divmod(5 * k, len(inner))] ^= 255
+    gray = np.full((480, 640), 230, dtype=np.uint8)
+    drawn = np.kron(cells, np.ones((15, 15), dtype=np.uint8))
+    gray[100 : 100 + len(drawn), 200 : 200 + len(drawn)] = 20 + (0.8 * drawn).astype(np.uint8)
+    assert [each.number for each in find_markers(gray, family, align=False)] == ([19] if found else [])
+
+
+def test_nothing_is_seen_in_noise():
+    noise = np.random.default_rng(3).normal(128.0, 40.0, (480, 640)).clip(0, 255).astype(np.uint8)
+    assert find_markers(noise, "apriltag_36h11") == ()
+
+
 def test_a_blurred_marker_is_found_at_the_third_try():
     T = facing([0.8, 0.0, 0.4], [0.1, 0.05, 2.1])
     clean = clean_picture(CAMERA, [(T, marker_print(marker_cells("apriltag_36h11", 7), SIDE))], rays=6)

@@ -27,6 +27,8 @@ DICTIONARIES = {
 _ENLARGED = 2.0  # for further tries
 _CALM = 1.0, 1.4  # standard deviation of the blur against noise there, in the second and the third [enlarged pixels]
 _SHARPENED, _EDGE = 8.0, 3.0  # in the third: times what is finer than a spot of this size is added [enlarged pixels]
+_WIDEST = 53  # window of light in a second look [pixels], in which all that a code corrects is corrected; 23 is usual
+_FAR_APART = 3  # bits that a dictionary corrects; others would see markers in any clutter
 _AROUND = 81  # side of the window in which light and contrast are made even there
 _FAINT = 1.5  # grey values: less contrast is noise
 _CONTRAST = 60.0  # grey values for a standard deviation of the window
@@ -100,6 +102,8 @@ def find_markers(
     corners, numbers = _again(gray, before) if near and before else ([], None)
     if numbers is None:
         corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
+    if numbers is None:
+        corners, numbers, _ = _detector(dictionary, thorough=True).detectMarkers(gray)
     if numbers is None:
         corners, numbers = _further_tries(gray, dictionary, 1 if near else 2)
     found: list[SeenMarker] = []
@@ -204,9 +208,15 @@ def _table(dictionary: str) -> cv2.aruco.Dictionary:
 
 
 @lru_cache
-def _detector(dictionary: str, outline_share: float = MIN_OUTLINE_SHARE) -> cv2.aruco.ArucoDetector:
+def _detector(
+    dictionary: str, outline_share: float = MIN_OUTLINE_SHARE, thorough: bool = False
+) -> cv2.aruco.ArucoDetector:
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     parameters.minMarkerPerimeterRate = outline_share
+    if thorough:
+        parameters.adaptiveThreshWinSizeMax = _WIDEST
+        far_apart = _table(dictionary).maxCorrectionBits >= _FAR_APART
+        parameters.errorCorrectionRate = 1.0 if far_apart else parameters.errorCorrectionRate
     parameters.minDistanceToBorder = 0  # else markers that fill half of the picture are lost, though wholly in view
     return cv2.aruco.ArucoDetector(_table(dictionary), parameters)
