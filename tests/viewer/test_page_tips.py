@@ -1,7 +1,8 @@
-"""Where an arm has two tips, each is dragged by itself."""
+"""What is drawn of a page: two tips of an arm, each dragged by itself; dark and light; shadows."""
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -75,3 +76,20 @@ def test_the_page_is_dark_where_the_system_prefers_that(tmp_path: Path) -> None:
     assert found["light"][0] > 600 > 200 > found["light"][1]
     assert found["dark"][0] < 200 < 600 < found["dark"][1]
     assert found["light"][2] != found["dark"][2]
+
+
+@pytest.mark.kernels
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
+def test_arm_and_obstacles_cast_shadows_on_the_ground_alone(tmp_path: Path) -> None:
+    drawn = "key.castShadow = %s; viewer.set_dirty(); new Promise((done) => setTimeout(done, 1500))"
+    with planning_page(page(rrtik.load_problem("titan4_sdu")), tmp_path) as browser:
+        pictures = []
+        for on in ("true", "false"):
+            browser.ask(drawn % on)
+            browser.screenshot(tmp_path / "page.png")
+            pictures.append(cv2.imread(str(tmp_path / "page.png")).astype(int).sum(axis=2))
+    darker = pictures[1] - pictures[0]
+    assert (darker > 30).sum() > 2000  # pixels
+    assert (darker < -30).sum() < 20
+    coloured = pictures[1] < 500  # arm and obstacles
+    assert (darker[coloured] > 30).sum() < 0.05 * (darker > 30).sum()

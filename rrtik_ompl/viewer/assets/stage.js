@@ -53,16 +53,32 @@ const fill = new THREE.DirectionalLight(0xffffff, 0.25);
 fill.position.set(-1, 0.6, 0.3);
 const sky = new THREE.HemisphereLight(0xffffff, 0xb9c0c8, 0.55);
 sky.position.set(0, 0, 1);
-[key, fill, sky].forEach((light, k) => viewer.set_object(["Lights", `page ${k}`], light));
+key.position.multiplyScalar(2 * size).add(centre);
+key.target.position.copy(centre);
+[key, fill, sky, key.target].forEach((light, k) => viewer.set_object(["Lights", `page ${k}`], light));
+
+// The arm and the obstacles cast shadows on the ground alone: on each other they would hide what one looks for.
+function castShadows() {
+  if (story.planar) return;
+  key.castShadow = true;
+  key.shadow.mapSize.set(1024, 1024);
+  Object.assign(key.shadow.camera, { left: -size, right: size, bottom: -size, top: size, near: 0.1 * size, far: 6 * size });
+  node().traverse((item) => { item.castShadow = item.receiveShadow = false; });
+  node("robot").traverse((item) => { item.castShadow = item.isMesh === true; });
+}
+castShadows();
 
 function addGrid() {
   const cell = story.grid;
   const cells = 2 * Math.ceil(Math.max(high.x - low.x, high.y - low.y, size / 2) * 0.75 / cell);
   const grid = new THREE.GridHelper(cells * cell, cells, toned("grid_middle"), toned("grid"));
   grid.rotation.x = Math.PI / 2;
+  const floor = new THREE.Mesh(new THREE.PlaneGeometry(cells * cell, cells * cell), new THREE.ShadowMaterial({ opacity: 0.2 }));
+  floor.receiveShadow = true;
   const snap = (value) => Math.round(value / cell) * cell;
-  grid.position.set(snap(centre.x), snap(centre.y), low.z - 0.01 * size);
-  viewer.set_object([...ROOT, "grid"], grid);
+  const ground = new THREE.Group().add(grid, floor);
+  ground.position.set(snap(centre.x), snap(centre.y), low.z - 0.01 * size);
+  viewer.set_object([...ROOT, "grid"], ground);
 }
 showGround();
 dark.addEventListener("change", showGround);
@@ -72,6 +88,7 @@ function outline(group, color) {
   const meshes = [];
   group.traverse((item) => { if (item.isMesh) meshes.push(item); });
   for (const mesh of meshes) {
+    mesh.castShadow = true;
     const index = mesh.geometry.index;
     if ((index && index.count > 60000) || mesh.material.transparent) continue;
     mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(mesh.geometry, 30), new THREE.LineBasicMaterial({ color })));
