@@ -131,7 +131,8 @@ function addPlayer() {
   }
   addEventListener("keydown", (event) => {
     const action = story.moves.length ? ACTIONS[event.key] : undefined;
-    const own = event.key === " " ? "select, button, [type=checkbox]" : "select";  // what answers this key by itself
+    const typed = "select, textarea, input:not(#scrub, [type=checkbox])";
+    const own = event.key === " " ? `${typed}, button, [type=checkbox]` : typed;  // what answers this key by itself
     if (!action || event.target.matches?.(own) || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
     action();
