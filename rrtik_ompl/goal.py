@@ -146,10 +146,11 @@ class GoalSet:
     ) -> None:
         goals = tuple(map(_with_poses, members)) if isinstance(members, Iterable) else ()
         if not goals or not all(isinstance(goal, PoseGoal | PositionGoal | TaskRegion) for goal in goals):
-            kinds = "a list of poses, positions or regions of the tip"
+            kinds = "a list of at least one pose or position or region of the tip"
             raise InputError(f"goal: a set is {kinds}; of configurations plan to each, or take PoseGoal(robot.fk(q))")
         if free_rotation_axis not in (None, "x", "y", "z"):
-            raise InputError(f"goal free_rotation_axis: {free_rotation_axis!r} is no axis; see TaskRegion.about_axis")
+            what = f"must be x, y or z, got {free_rotation_axis!r}"
+            raise InputError(f"goal free_rotation_axis {what}; for another axis see TaskRegion.about_axis")
         sides = finite_array(box, (3,), "goal box")
         if (sides < 0.0).any():
             raise InputError(f"goal box must not have negative sides, got {sides.tolist()}")

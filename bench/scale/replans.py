@@ -60,7 +60,7 @@ def _walk(seed: int) -> Walk:
             problem = Problem(world, *ends)
         except ProblemError:
             continue
-        if world.clearance(ends[0]) > BOUND / RATE:
+        if world.clearance(ends[0]) > 5.0 * BOUND / RATE:  # points, their radius and two ticks of the ball lie between
             break
     options = {"rate": RATE, "step": STEP, "seconds": SECONDS, "speed_bound": BOUND, "seed": seed}
     run = replan(problem, lambda t: scene_at(seed, t), clock=time.process_time, **options)

@@ -18,7 +18,9 @@ def problem() -> rrtik.Problem:
 
 @pytest.fixture(scope="module")
 def path(problem: rrtik.Problem) -> rrtik.JointPath:
-    return rrtik.plan(problem, "RRTConnect", seed=1).path
+    path = rrtik.plan(problem, "RRTConnect", seed=1).path
+    assert path is not None
+    return path
 
 
 def checked(motion: rrtik.Trajectory, folder: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:

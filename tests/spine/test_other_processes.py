@@ -90,7 +90,7 @@ THROUGH = {
     "joblib and Dask": lambda value: cloudpickle.loads(cloudpickle.dumps(value)),
 }
 OWN = {"_digest", "_measure", "_prover", "problem"}  # of one process; plans are sent without their problem
-NOT_COMPARED = OWN | {"closed_form", "model", "collision", "visual"}
+NOT_COMPARED = OWN | {"closed_form", "model", "collision", "looks"}
 
 
 def same(first, second):

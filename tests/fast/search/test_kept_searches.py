@@ -105,7 +105,7 @@ def place(rng: np.random.Generator) -> Any:
 
 def test_many_queries_in_one_call_find_what_each_finds_alone(crowded: Any) -> None:
     world = crowded.with_accuracy("conservative")
-    rows = np.random.default_rng(1).uniform(*world.robot.finite_range(), (400, 6))
+    rows = np.random.default_rng(1).uniform(-2.0 * np.pi, 2.0 * np.pi, (400, 6))
     rows = rows[world.valid_batch(rows)]
     ends, seeds = rows[:80].reshape(40, 2, 6), list(range(40))
     search = ConnectSearch(world.motions, world.robot.lower, world.robot.upper)
@@ -131,7 +131,7 @@ def none_free(starts: Any, ends: Any) -> Any:
 
 def test_what_takes_long_or_has_no_room_is_left_to_a_search_of_its_own(crowded: Any, monkeypatch: Any) -> None:
     world = crowded.with_accuracy("conservative")
-    rows = np.random.default_rng(1).uniform(*world.robot.finite_range(), (400, 6))
+    rows = np.random.default_rng(1).uniform(-2.0 * np.pi, 2.0 * np.pi, (400, 6))
     ends = rows[world.valid_batch(rows)][:80].reshape(40, 2, 6)
     search = ConnectSearch(world.motions, world.robot.lower, world.robot.upper)
     whole = solve_each(search, ends, [1] * 40, 1000)
