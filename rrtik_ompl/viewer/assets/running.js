@@ -1,5 +1,6 @@
 // Obstacles that move by themselves, and the arm that goes on planning among them: a run in the page.
-const HORIZON = 0.3;  // [s] for which an obstacle is expected to go on as it does
+const LOOKS = [0.1, 0.2, 0.4, 0.7];  // [s] ahead, for which an obstacle is expected to go on as it does
+const EVASION = 0.3;  // [s] that the way of an evasion may take
 const RUN_MILLISECONDS = 6;  // of a search in one frame
 const EVASIONS = 60;  // directions that are tried to make way
 const LONGEST_FRAME = 0.1;  // [s]
@@ -22,15 +23,15 @@ const rowsOf = (matrix) => matrix.transpose().elements.slice();
 const poseNow = (k) => poseAt(k, clock.time);
 const staysOnCourse = (k) => courses.get(k)?.times !== undefined;
 
-/** What a question says if the obstacles go on for a while as they did in the last frame; the page does not look into their plans. */
+/** Whether a question about each look ahead has a yes if the obstacles go on as they did in the last frame; the page does not look into their plans. */
 function ifTheyGoOn(question) {
-  for (const [k, { before }] of clock.seen) {
-    const now = poseNow(k);
-    const further = clock.step > 0 ? HORIZON / clock.step : 0;
-    const guessed = now.map((value, n) => (n % 4 === 3 ? value + further * (value - before[n]) : value));
-    putInTables(k, guessed);
-  }
-  const answer = question();
+  const answer = LOOKS.every((ahead) => {
+    for (const [k, { before }] of clock.seen) {
+      const further = clock.step > 0 ? ahead / clock.step : 0;
+      putInTables(k, poseNow(k).map((value, n) => (n % 4 === 3 ? value + further * (value - before[n]) : value)));
+    }
+    return question(ahead);
+  });
   for (const k of clock.seen.keys()) putInTables(k, poseNow(k));
   return answer;
 }
@@ -55,7 +56,7 @@ const rowsFree = (rows) => rows.every((row, k) => k === 0 || kernels.motionFree(
 /** A posture nearby that is free now and a moment later, or null. */
 function wayOut() {
   for (let n = 0; n < EVASIONS; n += 1) {
-    const q = clock.q.map((value, j) => Math.min(Math.max(value + HORIZON * planning.rates[j] * (2 * clock.random() - 1), planning.lower[j]), planning.upper[j]));
+    const q = clock.q.map((value, j) => Math.min(Math.max(value + EVASION * planning.rates[j] * (2 * clock.random() - 1), planning.lower[j]), planning.upper[j]));
     if (kernels.motionFree(clock.q, q) && ifTheyGoOn(() => kernels.free(q))) return q;
   }
   return null;
@@ -99,9 +100,9 @@ function runOn(seconds) {
     const aside = wayOut();
     if (aside) clock.rest = [aside];
     clock.work = null;
-  } else if (!clock.rest.length || !rowsFree([clock.q, ...clock.rest]) || !ifTheyGoOn(() => rowsFree(partAhead(HORIZON)))) {
+  } else if (!clock.rest.length || !rowsFree([clock.q, ...clock.rest]) || !ifTheyGoOn((ahead) => rowsFree(partAhead(ahead)))) {
     clock.rest = [];
-    if (!searchOn() || !ifTheyGoOn(() => rowsFree(partAhead(HORIZON)))) return "waits";
+    if (!searchOn() || !ifTheyGoOn((ahead) => rowsFree(partAhead(ahead)))) return "waits";
   }
   const rows = partAhead(seconds);
   if (!rowsFree(rows)) return "waits";
