@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from numbers import Real
 
 import numpy as np
 from ompl import base as ob
@@ -115,6 +116,14 @@ def usable(starts: Matrix, goals: Matrix | None, free: Mask) -> tuple[Matrix, Ma
 
 
 def condition_of(ptc: ob.PlannerTerminationCondition | Callable[[], object] | float) -> Stop:
-    """A termination condition from what OMPL or a person hands to solve."""
-    condition: Stop = ob.timedPlannerTerminationCondition(float(ptc)) if isinstance(ptc, (int, float)) else ptc
-    return condition
+    """A termination condition from what OMPL or a person hands to solve.
+
+    Raises:
+        InputError: If it is none.
+    """
+    if isinstance(ptc, Real):  # numbers of NumPy too
+        condition: Stop = ob.timedPlannerTerminationCondition(float(ptc))
+        return condition
+    if not callable(ptc):
+        raise InputError(f"solve: expected seconds or a termination condition, got {type(ptc).__name__}")
+    return ptc

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from ompl import base as ob
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, RrtikError
 from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph
 
 
@@ -70,8 +70,12 @@ def _hint(error: BaseException) -> str:
 
 
 def explained(error: BaseException) -> str:
-    """The text of an exception. Drops the frames, which would keep borrowed states of a callback alive."""
-    text = "".join(traceback.format_exception(error)).strip() + _hint(error)
+    """An exception with its traceback; one of ours, which says what to do, in its line.
+
+    Drops the frames, which would keep borrowed states of a callback alive.
+    """
+    known = isinstance(error, RrtikError)
+    text = str(error) if known else "".join(traceback.format_exception(error)).strip() + _hint(error)
     link: BaseException | None = error
     while link is not None:
         link.__traceback__ = None

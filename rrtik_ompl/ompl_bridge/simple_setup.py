@@ -12,6 +12,7 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
+from rrtik_ompl.ompl_bridge.region_constraint import projected_space
 from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, circular_space, planning_bounds
 from rrtik_ompl.ompl_bridge.spaces.coordinates import Coordinates, coordinates_of
 from rrtik_ompl.ompl_bridge.states import StateIO
@@ -71,7 +72,8 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
     Its space is a RealVectorStateSpace within the joint limits [rad; m]; a joint without limits gets a turn on both
     sides of the start of a problem, or half a turn on both sides of 0 for a world. States and motions are checked by
     the world, exactly as in `plan()`; the validity checker knows the clearance, so that OMPL's reports of it are right.
-    Beside OMPL's own projection the space has "tip", the position of the tip.
+    Beside OMPL's own projection the space has "tip", the position of the tip. For a problem with path constraints it
+    is a ConstrainedSpaceInformation of a ProjectedStateSpace, for planners of OMPL.
 
     Args:
         world_or_problem: A `World`, or a `Problem`, whose world it is then.
@@ -79,7 +81,7 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
             The space is a CompoundStateSpace then, with the joints in their order, and "tip" its default projection.
 
     Raises:
-        InputError: If it is neither, or a problem has path constraints.
+        InputError: If it is neither, or SO(2) is wanted along path constraints.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -91,14 +93,14 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
         return _information(world_or_problem, *world_or_problem.robot.finite_range(), so2)
     if not isinstance(world_or_problem, Problem):
         raise InputError(f"space_information: expected a World or a Problem, got {type(world_or_problem).__name__}")
-    if world_or_problem.constraints:
-        raise InputError(
-            "space_information: the problem has path constraints, which need a constrained space of OMPL's; "
-            "make one of RegionConstraint(problem), see docs/own_ompl_code.md"
-        )
     goal = world_or_problem.goal
     ends = goal.q[None] if isinstance(goal, JointGoal) else world_or_problem.start[None]
-    return _information(world_or_problem.world, *planning_bounds(world_or_problem, ends), so2)
+    bounds = planning_bounds(world_or_problem, ends)
+    if not world_or_problem.constraints:
+        return _information(world_or_problem.world, *bounds, so2)
+    if so2:
+        raise InputError("space_information: a problem with path constraints has no space with SO(2); leave so2 out")
+    return _judged(projected_space(world_or_problem, *bounds), world_or_problem.world)
 
 
 def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.SimpleSetup:
@@ -113,7 +115,7 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
         so2: See :func:`space_information`.
 
     Raises:
-        InputError: If it is no problem, or has path constraints.
+        InputError: If it is no problem, or SO(2) is wanted along path constraints.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -141,12 +143,20 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
 def _information(world: World, lower: Vector, upper: Vector, so2: bool) -> ob.SpaceInformation:
     endless = world.robot.continuous
     si = circular_space(lower, upper, endless) if so2 and endless.any() else bounded_space(lower, upper)
-    si.setStateValidityChecker(WorldValidity(si, world))
     si.setMotionValidator(CheckedMotions(si, world.motion_valid))
+    return _judged(si, world)
+
+
+def _judged(si: ob.SpaceInformation, world: World) -> ob.SpaceInformation:
+    """Set up, with states judged by a world and the projection "tip"."""
+    si.setStateValidityChecker(WorldValidity(si, world))
     space = si.getStateSpace()
-    tip = TipProjection(space, world.robot, coordinates_of(si))
+    if isinstance(si, ob.ConstrainedSpaceInformation):
+        si.setup()  # after which alone its space keeps a projection
+    tip = TipProjection(space, world.robot, coordinates_of(si, constrained=True))
     space.registerProjection(TIP_PROJECTION, tip)
     if space.isCompound():  # has none of its own, and KPIECE1 and its kin need one
         space.registerDefaultProjection(tip)
-    si.setup()
+    if not si.isSetup():
+        si.setup()
     return si

@@ -21,7 +21,7 @@ def space_bounds(si: ob.SpaceInformation) -> tuple[Vector, Vector]:
     Raises:
         InputError: If a bound is missing: not finite, or the lower one not below the upper one.
     """
-    return _checked_bounds(*coordinates_of(si).bounds(si.getStateSpace()))
+    return _checked_bounds(*coordinates_of(si, constrained=True).bounds(si.getStateSpace()))
 
 
 def _checked_bounds(low: list[float], high: list[float]) -> tuple[Vector, Vector]:
@@ -54,7 +54,7 @@ class StateIO:
     """
 
     def __init__(self, si: ob.SpaceInformation) -> None:
-        self._coordinates = coordinates_of(si)
+        self._coordinates = coordinates_of(si, constrained=True)
         self._space = si.getStateSpace()
         self.dof, self.turning = self._coordinates.size, self._coordinates.turning
         self.turns = bool(self.turning.any())

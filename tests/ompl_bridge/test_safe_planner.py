@@ -172,6 +172,16 @@ def test_a_planner_without_a_problem_says_so() -> None:
     planner = Recorder(small_problem().getSpaceInformation())
     assert str(planner.solve(0.1)) == "Crash"
     assert "no problem definition" in str(planner.error)
+    assert len(str(planner.error).splitlines()) == 1
+
+
+def test_the_time_may_be_a_number_of_numpy_but_no_text() -> None:
+    setup = small_problem()
+    _, planner = solve(setup)
+    for seconds in (np.float32(0.1), np.int64(1), np.float64(0.1)):
+        assert (str(planner.solve(seconds)), planner.error) == ("Timeout", None)
+    assert str(planner.solve("soon")) == "Crash"  # type: ignore[arg-type]
+    assert planner.error == "solve: expected seconds or a termination condition, got str"
 
 
 def test_a_problem_without_start_or_goal_says_so() -> None:

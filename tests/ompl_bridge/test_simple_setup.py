@@ -15,6 +15,7 @@ from ompl import geometric as og
 import rrtik_ompl as rrtik
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_planners import FastRRTConnect
 
 pytestmark = pytest.mark.usefixtures("quiet_ompl")
 
@@ -90,13 +91,71 @@ def test_wrong_arguments_get_one_line(problem):
         rrtik.space_information("titan4")
     with pytest.raises(InputError, match="expected a Problem, got World"):
         rrtik.simple_setup(problem.world)
-    with pytest.raises(InputError, match=r"RegionConstraint\(problem\)"):
-        rrtik.simple_setup(rrtik.load_problem("ur5_upright"))
+    with pytest.raises(InputError, match="path constraints has no space with SO"):
+        rrtik.simple_setup(rrtik.load_problem("ur5_upright"), so2=True)
     si = ob.SpaceInformation(ob.RealVectorStateSpace(3))
     with pytest.raises(InputError, match="3 coordinates, the robot 6 joints"):
         rrtik.objectives.tip_travel(si, problem.world.robot)
     with pytest.raises(InputError, match="weight"):
         rrtik.objectives.clearance(rrtik.space_information(problem), problem.world, weight=0.0)
+
+
+# --- path constraints ---------------------------------------------------------------------------------------------
+
+
+def level_problem(thickness=None, goal=None):
+    """The tip keeps its height and turns about the vertical axis; a thin post may stand halfway."""
+    robot = rrtik.load_robot("titan4")
+    start = rrtik.load_problem("titan4_prisms").start
+    tip, halfway = robot.fk(start).translation, robot.fk(start + 0.25 * np.eye(6)[0]).translation
+    post = [] if thickness is None else [rrtik.Obstacle("post", rrtik.Box([thickness, thickness, 3.0]), halfway)]
+    world = rrtik.World(robot, rrtik.Scene(post))
+    goal = start + 0.5 * np.eye(6)[0] if goal is None else goal
+    return rrtik.Problem(world, start, goal, constraints=[rrtik.on_plane(tip, [0.0, 0.0, 1.0])])
+
+
+@pytest.mark.parametrize("make", [og.RRTConnect, og.KPIECE1])
+def test_a_problem_with_path_constraints_gets_a_projected_space(make):
+    problem = level_problem(0.02)
+    setup = rrtik.simple_setup(problem)
+    si = setup.getSpaceInformation()
+    planner = make(si)
+    if make is og.KPIECE1:
+        planner.setProjectionEvaluator("tip")
+    setup.setPlanner(planner)
+    assert setup.solve(30.0)
+    path = setup.getSolutionPath()
+    assert path.check()
+    assert path.clearance() > 0.0
+    path.interpolate()
+    rows = StateIO(si).rows(path)
+    assert problem.world.valid_batch(rows).all()  # free and held
+    assert problem.world.unheld.motion_valid_batch(rows[:-1], rows[1:]).all()
+    assert rows[-1] == pytest.approx(problem.goal.q)
+
+
+def test_motions_along_constraints_are_checked_between_their_steps():
+    for thickness, free in ((None, True), (1e-3, False)):
+        problem = level_problem(thickness)
+        si = rrtik.space_information(problem)
+        ends = [state_of(si, q) for q in (problem.start, problem.goal.q)]
+        assert all(si.isValid(state) for state in ends)
+        assert si.checkMotion(*ends) is free
+
+
+def test_a_goal_of_the_tip_is_sampled_along_constraints():
+    tip = level_problem().robot.fk(level_problem().goal.q).translation
+    problem = level_problem(goal=rrtik.PositionGoal(tip, tolerance=0.01))
+    setup = rrtik.simple_setup(problem, seed=1)
+    setup.setPlanner(og.RRTConnect(setup.getSpaceInformation()))
+    assert setup.solve(30.0)
+    end = StateIO(setup.getSpaceInformation()).rows(setup.getSolutionPath())[-1]
+    assert np.linalg.norm(problem.robot.fk(end).translation - tip) < 0.0101
+
+
+def test_our_planners_refuse_a_projected_space():
+    with pytest.raises(InputError, match="got a ProjectedStateSpace"):
+        FastRRTConnect(rrtik.space_information(level_problem()))
 
 
 # --- objectives ---------------------------------------------------------------------------------------------------

@@ -19,8 +19,8 @@ class Coordinates:
     """The numbers of a state, in the order in which OMPL serializes them.
 
     Attributes:
-        kind: Of the space: real, SO(2), SE(2), or any other compound. Those that interpolate otherwise, such as
-            Dubins' curves, are none of these.
+        kind: Of the space: real, SO(2), SE(2), any other compound, or one that is constrained. Those that interpolate
+            otherwise, such as Dubins' curves, are none of these.
         size: How many numbers.
         parts: Of a compound those of its subspaces.
     """
@@ -44,6 +44,8 @@ class Coordinates:
             return [state.value]
         if self.kind is ob.SE2StateSpace:
             return [state.getX(), state.getY(), state.getYaw()]
+        if self.kind is ob.ConstrainedStateSpace:
+            return [state[k] for k in range(self.size)]
         return [number for k, part in enumerate(self.parts) for number in part.read(state[k])]
 
     def write(self, state: ob.State, numbers: list[float]) -> None:
@@ -55,6 +57,8 @@ class Coordinates:
         elif self.kind is ob.SE2StateSpace:
             state.setXY(*numbers[:2])
             state.setYaw(numbers[2])
+        elif self.kind is ob.ConstrainedStateSpace:
+            state.copy(np.array(numbers))
         else:
             for k, part in enumerate(self.parts):
                 part.write(state[k], numbers[: part.size])
@@ -67,20 +71,30 @@ class Coordinates:
             return list(bounds.low), list(bounds.high)
         if self.kind is ob.SO2StateSpace:
             return [-np.pi], [np.pi]
+        if self.kind is ob.ConstrainedStateSpace:
+            return self.parts[0].bounds(space.getSpace())
         of_parts = [part.bounds(space.getSubspace(k)) for k, part in enumerate(self.parts)]
         lower, upper = ([number for each in of_parts for number in each[side]] for side in (0, 1))
         return lower, upper
 
 
-def coordinates_of(si: ob.SpaceInformation) -> Coordinates:
+def coordinates_of(si: ob.SpaceInformation, *, constrained: bool = False) -> Coordinates:
     """The coordinates of the space of a SpaceInformation.
+
+    Args:
+        si: The SpaceInformation.
+        constrained: Whether the space may be a constrained one of real coordinates, in which motions are not straight.
 
     Raises:
         InputError: If ``si`` is no SpaceInformation, or its space has other states than rows of numbers, or none.
     """
     if not isinstance(si, ob.SpaceInformation):
         raise InputError(f"planner: expected an ompl.base.SpaceInformation, got {type(si).__name__}")
-    found = _coordinates(si.getStateSpace(), "")
+    space = si.getStateSpace()
+    if constrained and isinstance(space, ob.ConstrainedStateSpace):
+        ambient = _coordinates(space.getSpace(), " that is constrained")
+        return Coordinates(ob.ConstrainedStateSpace, ambient.size, (ambient,))
+    found = _coordinates(space, "")
     if found.size == 0:
         raise InputError("planner: needs a space of at least one coordinate, got none")
     return found
