@@ -19,6 +19,7 @@ from rrtik_ompl.errors import InputError, ProblemError, Renamed, require
 from rrtik_ompl.goal import Goal, JointGoal, MultiGoal, PoseGoal, parts_of
 from rrtik_ompl.poses import rigid
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.shapes import PointCloud
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
 from rrtik_ompl.world.holding_world import HoldingWorld
@@ -181,7 +182,9 @@ def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
         lower = "lower the margin" + (" or the padding" if thick else "")
         remedy = f"move it or {lower}" + (", or allow the pair" if world.self_margin or thick else "")
         return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
-    return ProblemError(f"{what} is in collision: {world.explain(q)}; move it or allow the pair", pairs, part=what)
+    clouds = {each.name for each in world.scene.obstacles if isinstance(each.shape, PointCloud)}
+    own = ", take the arm's own points out by without_robot()," if any(clouds & set(pair) for pair in pairs) else ""
+    return ProblemError(f"{what} is in collision: {world.explain(q)}; move it{own} or allow the pair", pairs, part=what)
 
 
 def _keep(robot: Robot, held: HeldRegions, q: Vector, what: str) -> None:

@@ -12,6 +12,7 @@ from rrtik_ompl.fast.search.connect_layout import KERNELS
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph
 from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
 from rrtik_ompl.replanning.connecting import KernelConnect, PythonConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
@@ -60,16 +61,22 @@ class DRRTCon(SafePlanner):
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        core = self._core
+        core, graph = self._core, None
         reused = core is not None and core.path is not None and self._from_kept(core, starts, goals, checker, ptc)
         if core is None or not reused:
             fresh = self._new()
             found = fresh.begin(starts, goals, checker, ptc)
+            graph = self._trees(fresh)
             if core is None or found:  # a path that is blocked now is of more use to the next call than none
                 core = self._core = fresh
         path = self._asked(core, checker, ptc)
         statistics = {"iterations": core.connect.samples, "repairs": core.repairs, "reused": int(reused)}
-        return SearchResult(path, statistics)
+        return SearchResult(path, statistics, graph=graph if path is None else None)
+
+    def _trees(self, core: DrrtCon) -> PlannerGraph | None:
+        """What the search for a first path has grown; without it a solve in vain has no nearest approach."""
+        trees = core.connect.trees if isinstance(core.connect, PythonConnect) else None
+        return None if trees is None else self.grown(trees[0].grown, trees[1].grown)
 
     def _asked(self, core: DrrtCon, checker: MotionChecker, ptc: Stop) -> Matrix | None:
         """A path whose edges, made by cuts and joins, were asked as a whole; None if it is blocked.

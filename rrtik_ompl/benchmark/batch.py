@@ -65,6 +65,9 @@ def plan_batch(
     """
     if isinstance(problems, str | os.PathLike) or not isinstance(problems, Iterable):
         raise InputError(f"problems must be a list of names or files, got {problems!r:.80}")
+    problems = list(problems)
+    for k, each in enumerate(problems):
+        require(each, str | os.PathLike, f"problems[{k}]", "give a name or a file; save_problem() writes one")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
     named = [file_source(os.fspath(each), Path.cwd()) for each in problems]
     limit = positive(seconds, "seconds")

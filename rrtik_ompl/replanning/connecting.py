@@ -17,6 +17,7 @@ from rrtik_ompl.fast.search.connect_layout import KERNELS as CONNECT_KERNELS
 from rrtik_ompl.fast.search.shortcut import ShortcutSearch
 from rrtik_ompl.fast.search.shortcut_layout import KERNELS as CUT_KERNELS
 from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect
+from rrtik_ompl.search.tree import ConfigurationTree
 from rrtik_ompl.transitions import without_repeats
 from rrtik_ompl.world.motion_queries import KernelWorld, MotionFree, MotionQueries, Stop
 
@@ -82,11 +83,16 @@ class KernelConnect:
 
 
 class PythonConnect:
-    """The published search in Python, for any motion check."""
+    """The published search in Python, for any motion check.
+
+    Attributes:
+        trees: Of the last search, from both sides; None before the first.
+    """
 
     def __init__(self, lower: Vector, upper: Vector, max_edge: float, seed: int, iterations: int = ITERATIONS) -> None:
         self._lower, self._upper, self._max_edge = lower, upper, max_edge
         self._rng, self._iterations, self.samples = np.random.default_rng(seed), iterations, 0
+        self.trees: tuple[ConfigurationTree, ConfigurationTree] | None = None
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
@@ -94,7 +100,7 @@ class PythonConnect:
         """See :class:`Connect`."""
         rules = ConnectRules(self._lower, self._upper, self._max_edge, max_iterations=self._iterations)
         search = RrtConnect(first, second, rules, one_by_one(motions), self._rng)
-        bridge = search.run(stop)
+        bridge, self.trees = search.run(stop), search.trees
         self.samples += search.iterations
         return None if bridge is None else joined(first, bridge, second, chain=chain)
 

@@ -11,7 +11,7 @@ from rrtik_ompl.collision.cloud_solid import cloud_gap, cloud_solid, nearest_of_
 from rrtik_ompl.collision.digests import scene_digest
 from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.collision.solids import bvh, measured
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.fast import COLLIDING, FREE
 from rrtik_ompl.fast.tables import cloud_layout
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
@@ -162,6 +162,16 @@ def test_contacts_name_the_cloud_and_the_distance():
 
 
 @pytest.mark.kernels
+def test_a_cloud_with_the_arm_in_it_is_told_with_the_remedy():
+    robot = rrtik.load_robot("panda")
+    start = robot.posture("default")
+    cloud = PointCloud(robot.fk(start).translation + np.zeros((1, 3)), 0.01)
+    with pytest.raises(
+        ProblemError, match=r"'scan' overlap.*; move it, take .* by without_robot\(\), or allow the pair"
+    ):
+        rrtik.Problem(World(robot, Scene([Obstacle("scan", cloud)])), start, start)
+
+
 def test_a_cloud_that_is_moved_is_where_it_is_now():
     robot = rrtik.load_robot("ur5")
     rng = np.random.default_rng(12)

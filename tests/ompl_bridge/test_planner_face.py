@@ -19,7 +19,7 @@ from rrtik_ompl.ompl_bridge.contract.problems import outside_bar, outside_wall, 
 from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, RoadmapPlanner
 
 GROWING = (BiCRDT, CBiRRT, CRDT, FastRRTConnect, IKURT, MBRRT)
-TWO_TREES = (BiCRDT, CBiRRT, FastRRTConnect, MBRRT)
+TWO_TREES = (BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, MBRRT)
 BLOCKED = (-0.4, 0.0, 0.0)  # a goal behind a wall that nothing passes
 
 pytestmark = pytest.mark.usefixtures("quiet_ompl")

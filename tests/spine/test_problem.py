@@ -163,7 +163,7 @@ def test_a_goal_pose_that_is_no_rigid_pose_is_refused(matrix):
 
 
 def test_a_region_takes_no_goal_in_joint_values():
-    with pytest.raises(InputError, match="pose or position"):
+    with pytest.raises(InputError, match="of the tip; of configurations plan to each"):
         GoalSet([JointGoal([0.0, 0.0])])
 
 
