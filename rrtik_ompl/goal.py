@@ -149,8 +149,7 @@ class GoalSet:
             kinds = "a list of at least one pose or position or region of the tip"
             raise InputError(f"goal: a set is {kinds}; of configurations plan to each, or take PoseGoal(robot.fk(q))")
         if free_rotation_axis not in (None, "x", "y", "z"):
-            what = f"must be x, y or z, got {free_rotation_axis!r}"
-            raise InputError(f"goal free_rotation_axis {what}; for another axis see TaskRegion.about_axis")
+            raise InputError(f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}; or a TaskRegion")
         sides = finite_array(box, (3,), "goal box")
         if (sides < 0.0).any():
             raise InputError(f"goal box must not have negative sides, got {sides.tolist()}")

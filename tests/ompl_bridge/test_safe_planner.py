@@ -180,7 +180,7 @@ def test_the_time_may_be_a_number_of_numpy_but_no_text() -> None:
     _, planner = solve(setup)
     for seconds in (np.float32(0.1), np.int64(1), np.float64(0.1)):
         assert (str(planner.solve(seconds)), planner.error) == ("Timeout", None)
-    assert str(planner.solve("soon")) == "Crash"  # type: ignore[arg-type]
+    assert str(planner.solve("soon")) == "Crash"
     assert planner.error == "solve: expected seconds or a termination condition, got str"
 
 
