@@ -10,13 +10,14 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import LARGEST, Mask, Matrix, Vector, bounded_array, dimensions, finite_array, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, at_most
 
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
 LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # of every pose
 LAST_ROW_TOLERANCE = 1e-8
 NOT_RIGID = 1e-6  # largest entry of R R^T - 1 that still counts as rounding, and is removed
 ROUNDING = 1e-12  # the same of a rotation that stays as it is
+MOST_MOVING = 200  # joints with which Pinocchio computes: its memory grows with their cube, 32 GB at 1,000
 
 
 def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike | None = None, what: str = "pose") -> Any:
@@ -69,6 +70,25 @@ def apart(first: pin.SE3, second: pin.SE3) -> tuple[float, float]:
     """How far two poses are apart [m], and by which angle they are turned to each other [rad]."""
     off = first.actInv(second)
     return float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
+
+
+def working_memory(model: pin.Model) -> pin.Data:
+    """What Pinocchio needs to compute with a model (``pinocchio.Model``): its ``pinocchio.Data``.
+
+    Raises:
+        InputError: If the model has so many joints that this may be more than the machine has.
+    """
+    few_joints(model)
+    return model.createData()
+
+
+def few_joints(model: pin.Model) -> None:
+    """Refuse a model (``pinocchio.Model``) with more joints than :func:`working_memory` has room for.
+
+    Raises:
+        InputError: If it has.
+    """
+    at_most(int(model.nv), MOST_MOVING, f"robot '{model.name}': moving joints", "fix some; fk and jacobian take more")
 
 
 def rigid(T: Any, what: str) -> Any:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, finite_number, number_rows
 from rrtik_ompl.copies import as_value, itself
 from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.poses import cross_products, joint_motions
+from rrtik_ompl.poses import MOST_MOVING, cross_products, joint_motions
 from rrtik_ompl.units import shown_unit
 
 FEW = 16  # configurations up to which Pinocchio's calls cost less than numpy's
@@ -215,7 +215,7 @@ class Robot:
 
     def _poses(self, rows: Matrix, frame: int, joint_frames: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Poses of a frame for configurations, shape (m, dof): of few by Pinocchio. Shape (m, 4, 4)."""
-        if not 0 < len(rows) <= FEW:
+        if self.model.nv > MOST_MOVING or not 0 < len(rows) <= FEW:
             target = self.model.frames[frame]
             frames = self.joint_frames(rows) if joint_frames is None else joint_frames
             return np.asarray(frames[:, target.parentJoint] @ target.placement.homogeneous)
@@ -231,9 +231,10 @@ class Robot:
 
     def jacobian(self, q: ArrayLike, frame: str | None = None) -> Matrix:
         """Geometric Jacobian at the tip in world axes, rows (linear; angular), shape (6, dof)."""
-        full = self.pinocchio_configuration(self.configuration(q))[0]
-        number, axes = self._frame_id(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        jacobian = pin.computeFrameJacobian(self.model, self.model.createData(), full, number, axes)
+        if self.model.nv > MOST_MOVING:
+            return np.asarray(self.jacobian_batch(self.configuration(q)[None], frame)[0])
+        full, axes = self.pinocchio_configuration(self.configuration(q))[0], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian = pin.computeFrameJacobian(self.model, self.model.createData(), full, self._frame_id(frame), axes)
         return np.asarray(np.reshape(jacobian, (6, -1)) @ self.chain.gain)  # for one joint it comes as a vector
 
     def jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
@@ -243,8 +244,7 @@ class Robot:
     def fk_jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> tuple[Matrix, Matrix]:
         """:meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""
         rows, number = self._rows(Q), self._frame_id(frame)
-        frames = self.joint_frames(rows)
-        poses = self._poses(rows, number, frames)
+        poses = self._poses(rows, number, frames := self.joint_frames(rows))
         columns = np.zeros((len(frames), 6, len(self.chain.parent)))
         joint = self.model.frames[number].parentJoint - 1
         while joint >= 0:  # only the joints between the base and the frame move it

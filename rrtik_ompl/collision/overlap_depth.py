@@ -12,6 +12,7 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.solids import is_mesh
+from rrtik_ompl.poses import working_memory
 from rrtik_ompl.robot import Robot
 
 
@@ -31,7 +32,7 @@ class OverlapDepth:
     def __init__(self, robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> None:
         self._robot, self._bodies = robot, bodies
         self._pairs = [pair for pair in pairs if not any(_hollow(bodies[k].geometry) for k in pair)]
-        self._data = robot.model.createData()
+        self._data = working_memory(robot.model)
 
     def travel(self, q: Vector) -> float:
         """Whatever moves each point of the arm by less than this [m] leaves a collision at q, shape (n,), standing.

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import bounded_array, finite_array
 from rrtik_ompl.choices import DhConvention
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
-from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.description.tree import MOST_JOINTS, Joint, Link, Solid, Tree
+from rrtik_ompl.errors import InputError, UnknownNameError, at_most
 from rrtik_ompl.poses import rigid, turned_z
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import Capsule
@@ -132,9 +132,11 @@ def robot_from_dh(
 
 
 def _checked(name: str, rows: Iterable[DhRow]) -> list[DhRow]:
+    given = list(rows)
+    at_most(len(given) + 1, MOST_JOINTS, f"robot '{name}': joints")
     table = [
         DhRow(**{f: getattr(row, f) for f in DhRow.__slots__} | {"joint": row.joint or f"joint{k}"})
-        for k, row in enumerate(rows, start=1)
+        for k, row in enumerate(given, start=1)
     ]
     if not table:
         raise InputError(f"robot '{name}': the DH table has no rows; give one per joint")

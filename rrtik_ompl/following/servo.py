@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, not_negative, positive
 from rrtik_ompl.choices import one_of
 from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.poses import working_memory
 from rrtik_ompl.world import World
 
 METHODS = ("scaled", "clipped")
@@ -84,7 +85,7 @@ class Servo:
             raise InputError(f"kept must be less than near, got {self._kept:g} and {self._near:g} m")
         require(slide, bool, "slide")
         self._slide = slide
-        self._data = self._robot.model.createData()
+        self._data = working_memory(self._robot.model)
         self._tip = self._robot.model.getFrameId(self._robot.tip)
         self._speed = np.where(np.isfinite(self._robot.velocity), self._robot.velocity, 1.0)
         low, high = self._robot.lower, self._robot.upper

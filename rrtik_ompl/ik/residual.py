@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.poses import working_memory
 from rrtik_ompl.robot import Robot
 
 SHARE = 0.01  # of the tolerance: a solution on the rim would not survive rounding
@@ -52,7 +53,7 @@ def _tip_of(robot: Robot, thread: int) -> tuple[Any, Any, int, bool]:
     del thread
     chain, model = robot.chain, robot.model
     plain = model.nq == robot.dof and np.array_equal(chain.gain, np.eye(robot.dof)) and not chain.offset.any()
-    return model, model.createData(), int(model.getFrameId(robot.tip)), plain
+    return model, working_memory(model), int(model.getFrameId(robot.tip)), plain
 
 
 def walked(

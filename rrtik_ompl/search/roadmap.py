@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from functools import partial
 from io import BytesIO
 from typing import Any, Protocol
 
@@ -133,6 +134,10 @@ class Roadmap:
 
     def __repr__(self) -> str:
         return f"Roadmap({self.world.robot.name}, {self.graph.size} vertices, {len(self.graph.states)} edges)"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        kept = (self.world, self.graph.rows, self.graph.edges, self.graph.states)
+        return partial(_restored, seed=self.seed, near=self.near), kept
 
     @property
     def vertices(self) -> Matrix:

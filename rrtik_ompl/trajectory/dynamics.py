@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, not_negative, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.timing.reference import Rows
+from rrtik_ompl.poses import working_memory
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.curve import Samples
 from rrtik_ompl.trajectory.fastest import MOST, Bounds
@@ -138,7 +139,7 @@ class DynamicLimits:
 
     def _states(self, *states: Matrix) -> Iterator[tuple[Vector, Vector, Vector, Vector]]:
         model, gain = self.model, self.robot.chain.gain
-        data, tip = model.createData(), model.getFrameId(self.robot.tip)
+        data, tip = working_memory(model), model.getFrameId(self.robot.tip)
         here, none = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, np.zeros(self.robot.dof)
         still = np.zeros(model.nv)
         full = self.robot.pinocchio_configuration(states[0])

@@ -21,6 +21,7 @@ from rrtik_ompl.copies import Items, KeptHere, Once, in_notebook, shallow_copy
 from rrtik_ompl.errors import InputError, MeshWarning, Renamed, require
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
+from rrtik_ompl.poses import few_joints
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world.exact_checks import ExactChecker, one_way
@@ -77,6 +78,7 @@ class World(Rebuilt):
     ) -> None:
         self.robot, self._scene = robot, Scene() if scene is None else scene
         require(robot, Robot, "robot of a world", "use load_robot(name or file)")
+        few_joints(robot.model)
         require(self._scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
         self._obstacles = Items(self._scene.obstacles)
         self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))

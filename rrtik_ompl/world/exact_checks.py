@@ -29,6 +29,7 @@ from rrtik_ompl.collision.solids import around
 from rrtik_ompl.copies import Items, Once, shallow_copy
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
 from rrtik_ompl.fast.taken_tables import TakenTables
+from rrtik_ompl.poses import working_memory
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, Spheres, arm_cache
 
@@ -56,7 +57,7 @@ class ExactChecker:
         self._tables = TakenTables(arm.pack(bodies.whole, pairs, covers))
         self._robot, self.bodies = robot, bodies
         self._pairs, self._covers = pairs, covers
-        self._data = robot.model.createData()
+        self._data = working_memory(robot.model)
         self._approaches = Once(lambda: dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True)))
         self._containment = Once(_containment_of, bodies, pairs, covers)
 

@@ -27,6 +27,10 @@ def urdf(joints):
     return f"<robot name='r'>{links}{chain}</robot>"
 
 
+def planar(joints):
+    return rrtik.load_robot("planar", lengths=np.full(joints, 0.05))
+
+
 def straight(length):
     return rrtik.JointPath([[0.0], [length]])
 
@@ -37,6 +41,15 @@ TOO_MANY = {
     "rows of a DH table": (
         lambda: robot_from_dh("arm", [DhRow(a=0.1)] * 1_500, convention="standard"),
         "1501 are more than the 1001",
+    ),
+    "lengths of a planar arm": (
+        lambda: rrtik.load_robot("planar", lengths=np.ones(1_000_000)),
+        "1000001 are more than the 1001",
+    ),
+    "moving joints of a world": (lambda: rrtik.World(planar(1_000)), "1000 are more than the 200 .*fix some"),
+    "moving joints of inverse kinematics": (
+        lambda: rrtik.solve_ik(planar(201), rrtik.PositionGoal([5, 5, 0])),
+        "201 are more than the 200",
     ),
     "obstacles": (lambda: rrtik.Scene([rrtik.Obstacle(f"o{k}", BALL) for k in range(10_001)]), "10001 .* 10000"),
     "triangles": (
@@ -72,6 +85,16 @@ def test_the_axes_of_a_long_chain_are_those_that_its_file_says():
         step[k] = 1e-6
         moved = (robot.fk(q + step).translation - robot.fk(q - step).translation) / 2e-6
         assert moved == pytest.approx(robot.jacobian(q)[:3, k], abs=1e-8)
+
+
+@pytest.mark.parametrize("joints", [7, 200, 201])
+def test_long_arms_are_where_their_angles_say(joints):
+    robot, q = planar(joints), np.random.default_rng(1).uniform(-0.1, 0.1, joints)
+    turned = np.cumsum(q)
+    x, y = 0.05 * np.cos(turned).sum(), 0.05 * np.sin(turned).sum()
+    assert robot.fk(q).translation == pytest.approx([x, y, 0.0], abs=1e-9)
+    assert robot.jacobian(q)[:2, 0] == pytest.approx([-y, x], abs=1e-9)
+    assert robot.jacobian(q) == pytest.approx(robot.jacobian_batch(q[None])[0], abs=1e-9)
 
 
 LOAD = """

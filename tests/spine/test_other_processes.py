@@ -65,6 +65,9 @@ VALUES = {
     "SingularityReport": lambda: singularity_report(planar(), [0, 0, 0]),
     "ReachMap": lambda: rrtik.reach_map(planar(), samples=100),
     "Certificate": lambda: certificate_of(world(), plan().path),
+    "HeightField": lambda: rrtik.HeightField([[0.1, 0.2], [0.3, 0.4]], 0.1),
+    "PointCloud": lambda: rrtik.PointCloud([[0, 0, 0], [0, 0, 1]], 0.1),
+    "Roadmap": lambda: rrtik.Roadmap(world(), vertices=20, seed=1),
     "JointGoal": lambda: rrtik.JointGoal([0, 0, 0]),
     "PoseGoal": lambda: rrtik.PoseGoal(AT),
     "GoalSet": lambda: rrtik.GoalSet([rrtik.PoseGoal(AT), rrtik.PositionGoal([1, 0, 0])], "z", [1, 0, 0]),
@@ -105,6 +108,10 @@ def same(first, second):
         models = ("model", "collision", "visual")
         if not all(getattr(first, name) == getattr(second, name) for name in models):
             return False
+    if isinstance(first, rrtik.Roadmap):
+        known = (each.edges for each in (first.graph, second.graph))
+        names = ("world", "seed", "near", "vertices")
+        return np.array_equal(*known) and all(same(getattr(first, name), getattr(second, name)) for name in names)
     if isinstance(first, HeldRegions):
         return same(vars(first), vars(second))
     if isinstance(first, rrtik.World):

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.description.tree import MOST_JOINTS
+from rrtik_ompl.errors import InputError, at_most
 from rrtik_ompl.robot import Robot
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ def _arm(
     name: str, lengths: ArrayLike, limits_deg: ArrayLike | None, radius: float, tip: str, base_pose: BasePose
 ) -> Robot:
     sizes = finite_array(lengths, (None,), f"{name}: lengths")
+    at_most(len(sizes) + 1, MOST_JOINTS, f"robot '{name}': joints")
     if len(sizes) == 0 or (sizes <= 0.0).any():
         raise InputError(f"{name}: lengths must be one or more numbers greater than 0, got {sizes.tolist()}")
     given = [(-180.0, 180.0)] * len(sizes) if limits_deg is None else limits_deg

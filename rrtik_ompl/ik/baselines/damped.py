@@ -13,6 +13,7 @@ from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.goal import PositionGoal
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import shortened, twist, walked
+from rrtik_ompl.poses import working_memory
 from rrtik_ompl.robot import Robot
 
 ITERATIONS = 200
@@ -59,7 +60,7 @@ def pinocchio_iteration(robot: Robot, goal: Target, starts: Matrix) -> tuple[Mat
 
 
 def _one_start(robot: Robot, goal: Target, q: Vector) -> tuple[Vector, int]:
-    model, data = robot.model, robot.model.createData()
+    model, data = robot.model, working_memory(robot.model)
     frame = model.getFrameId(robot.tip)
     steps = 0
     while steps < STEPS:
