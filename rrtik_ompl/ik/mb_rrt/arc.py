@@ -14,7 +14,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.links import Links, directions
 from rrtik_ompl.ik.mb_rrt.run import TreeSearch
 
-NOWHERE = 1e-300  # a distance that may be divided by
+NOWHERE = 1e-150  # of a distance: a direction over a shorter one loses digits, as squares vanish
 
 
 def grow_on_arcs(links: Links, goal: ArrayLike, *, rng: np.random.Generator, passes: int = 1) -> TreeSearch:
@@ -68,7 +68,7 @@ def _edge_directions(links: Links, goals: Matrix, parents: Matrix, index: int, r
     towards = goals - parents
     distance = np.linalg.norm(towards, axis=1)
     arbitrary = directions(len(parents), links.dimension, rng)
-    axis = np.where(distance[:, None] > 0.0, towards / np.maximum(distance, NOWHERE)[:, None], arbitrary)
+    axis = np.where(distance[:, None] > NOWHERE, towards / np.maximum(distance, NOWHERE)[:, None], arbitrary)
     if index == links.count:  # the law of cosines says the same, to the square root of the rounding
         return axis
     length = float(links.lengths[index - 1])
