@@ -46,12 +46,20 @@ def load_together(names: Sequence[str]) -> None:
     A library takes LLVM half a second, once on a machine, and LLVM makes one at a time in a process.
     """
     missing = [name for name in dict.fromkeys(names) if not is_loaded(name) and _missing(name) and has_bitcode(name)]
-    shares = [missing[k :: cores()] for k in range(min(cores(), len(missing)))]
+    if len(missing) > 1:
+        _share(missing)
+    for name in names:
+        library(name)
+
+
+def _share(names: list[str]) -> None:
+    """Make libraries here and in other processes, which end with this call."""
+    shares = [names[k :: cores()] for k in range(min(cores(), len(names)))]
     others: list[subprocess.Popen[bytes]] = []
     try:
         with suppress(OSError):  # no process can be begun: all is made here
             others += [_maker(share) for share in shares[1:]]
-        for name in shares[0] if shares else ():
+        for name in shares[0]:
             library(name)
         for other in others:
             other.wait()
@@ -59,8 +67,6 @@ def load_together(names: Sequence[str]) -> None:
         for other in others:
             other.terminate()
             other.wait()
-    for name in names:
-        library(name)
 
 
 def _maker(names: list[str]) -> subprocess.Popen[bytes]:

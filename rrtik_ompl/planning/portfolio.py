@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from functools import cache
+from itertools import chain
 from types import MappingProxyType
 from typing import Any
 
@@ -59,8 +60,8 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
 def _load_kernels(problem: Problem) -> None:
     """Load what the first planner and the shortening will use: the first time on a machine that takes a while."""
     if problem.world.fast is not None:
-        first = traits_of(find_planner(members(problem)[0])).kernels if members(problem) else ()
-        load_together((*first, PROOF_KERNELS, SHORTCUT_KERNELS, PROVEN_KERNELS, TAUT_KERNELS))
+        first = [traits_of(find_planner(name)).kernels for name in members(problem)[:1]]
+        load_together((*chain.from_iterable(first), PROOF_KERNELS, SHORTCUT_KERNELS, PROVEN_KERNELS, TAUT_KERNELS))
 
 
 def _search(problem: Problem, request: Request) -> tuple[Plan, str, dict[str, int | float], float]:
