@@ -187,6 +187,12 @@ def interpreter(text: str) -> tuple[str, str]:
     return name, path
 
 
+def add_interpreters(parser: argparse.ArgumentParser) -> None:
+    """Add ``--python``, which may be repeated."""
+    named: dict[str, Any] = {"type": interpreter, "metavar": "NAME=INTERPRETER", "help": "of one peer; may be repeated"}
+    parser.add_argument("--python", action="append", default=[], **named)
+
+
 def main() -> None:
     """Measure, print the page and write it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -194,8 +200,7 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=3, help="of each family")
     parser.add_argument("--seeds", type=int, default=3, help="runs of each candidate on each problem")
     parser.add_argument("--seconds", type=float, default=10.0, help="for each run")
-    named: dict[str, Any] = {"type": interpreter, "metavar": "NAME=INTERPRETER", "help": "of one peer; may be repeated"}
-    parser.add_argument("--python", action="append", default=[], **named)
+    add_interpreters(parser)
     parser.add_argument("--poses", type=int, default=500)
     parser.add_argument("--budget", type=float, default=1.0, help="seconds for our method, seven times as many a peer")
     add_out(parser, "peers.md")

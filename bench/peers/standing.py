@@ -27,7 +27,7 @@ import numpy as np
 import rrtik_ompl as rrtik
 from bench.peers.description import NoTask, task_of
 from bench.peers.host import Host
-from bench.peers.report import PEERS, interpreter, joins
+from bench.peers.report import PEERS, add_interpreters, interpreter, joins
 from bench.shared.parts import Parts, add_options
 from bench.speed.machine import machine
 from bench.whole_calls.search import scene_files
@@ -212,8 +212,7 @@ def main() -> int:
     parser.add_argument("--problems", type=int, default=3, help="of each family")
     parser.add_argument("--seeds", type=int, default=2, help="runs of each planner on each problem")
     parser.add_argument("--seconds", type=float, default=5.0, help="for each run")
-    named: dict[str, Any] = {"type": interpreter, "metavar": "NAME=INTERPRETER", "help": "of one peer; may be repeated"}
-    parser.add_argument("--python", action="append", default=[], **named)
+    add_interpreters(parser)
     parser.add_argument("--pages", type=Path, help="a folder for pages that can be turned, one a group and planner")
     add_options(parser, "standing.md")
     options = parser.parse_args()

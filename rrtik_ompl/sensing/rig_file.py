@@ -15,8 +15,7 @@ from pydantic import Field
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.sections import Name, NotNegative, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
-from rrtik_ompl.poses import quaternion_xyzw
-from rrtik_ompl.problem_files.scene import PoseEntry
+from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 from rrtik_ompl.sensing.cameras.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
 from rrtik_ompl.sensing.rig import Rig
@@ -79,8 +78,7 @@ def save_rig(rig: Rig, path: str | os.PathLike[str]) -> list[Path]:
     entries: list[dict[str, Any]] = []
     for camera, T, file in zip(rig.cameras, rig.poses, files, strict=True):
         save_camera(camera, file)
-        pose = {"xyz": T.translation.tolist(), "quat_xyzw": quaternion_xyzw(T).tolist()}
-        entries.append({"file": file.name} | ({"pose": pose} if entries else {}))
+        entries.append({"file": file.name} | ({"pose": pose_data(T)} if entries else {}))
     sigmas = {"position_sigma": rig.position_sigma, "rotation_sigma_deg": float(np.rad2deg(rig.rotation_sigma))}
     write_yaml(target, {"version": 1, "cameras": entries} | sigmas)
     return files
