@@ -96,37 +96,34 @@ def check(
     from rrtik_ompl import JointGoal, load_path, load_problem
     from rrtik_ompl.certificates.certificate import load_certificate
     from rrtik_ompl.cli.plan_report import faults_of_motion, faults_of_path, how_proven, path_lines
+    from rrtik_ompl.trajectory import Trajectory
+    from rrtik_ompl.trajectory.load import load_motion_or_path
 
     question = load_problem(problem)
     world = question.world
     if path is not None and proof is not None:
         return _certified(question, load_path(path, world.robot), load_certificate(proof), f"{proof}")
+    route = None if path is None else load_motion_or_path(path, world.robot)  # a bad file is refused at once
     kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
     ends = {"start": question.start} | ({"goal": question.goal.q} if isinstance(question.goal, JointGoal) else {})
-    clear = {end: f"{end} is free, clearance {_millimetres(world.clearance(q))}{kept}" for end, q in ends.items()}
-    if path is None:
-        say(*(f"{question.name}: {line}" for line in clear.values()))
+    for end, q in ends.items():
+        say(f"{question.name}: {end} is free, clearance {_millimetres(world.clearance(q))}{kept}")
+    if path is None or route is None:
         suggest(command("plan", problem), command("show", problem))
         return FOUND
-    from rrtik_ompl.trajectory import Trajectory
-    from rrtik_ompl.trajectory.load import load_motion_or_path
-
-    route = load_motion_or_path(path, world.robot)
-    say(*(f"{question.name}: {line}" for line in clear.values()))
-    timed = isinstance(route, Trajectory)
     faults = faults_of_motion(question, route) if isinstance(route, Trajectory) else faults_of_path(question, route)
     if faults:
         say(*(f"{path}: {fault}" for fault in faults))
         suggest(f"look at it: {command('show', problem, path)}")
         return NOT_FOUND
+    see = f"see it: {command('show', problem, path)}"
     if isinstance(route, Trajectory):
         say(f"{path}: valid, {how_proven(question, route)}; {len(route.times)} points, {route.duration:.3f} s")
-    else:
-        say(*(f"{path}: {line}" for line in path_lines(question, route, kept)))
-    code = FOUND if isinstance(route, Trajectory) else _beside(question, route, path)
-    suggest(
-        f"see it: {command('show', problem, path)}", *([] if timed else [f"time it: {command('time', problem, path)}"])
-    )
+        suggest(see)
+        return FOUND
+    say(*(f"{path}: {line}" for line in path_lines(question, route, kept)))
+    code = _beside(question, route, path)
+    suggest(see, f"time it: {command('time', problem, path)}")
     return code
 
 
