@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.catalog import load_robot
@@ -82,10 +82,11 @@ def test_a_motion_stays_on_the_path_and_keeps_its_ends(task):
 
 @settings(max_examples=40)
 @given(tasks())
+@example((JointPath([[0.0], [3.0], [-2.0]]), RateLimits(np.array([0.01]), np.array([1.0]), np.array([10.0]))))
 def test_velocities_and_accelerations_are_the_derivatives_of_the_positions(task):
     path, limits = task
     motion = time_parameterize(path, limits)
-    step = 1e-6 * motion.duration
+    step = 1e-7 * motion.duration  # the quotient's own error grows with its square, and is seen in motions of minutes
     clock = np.linspace(2 * step, motion.duration - 2 * step, 400)
     clock = clock[np.abs(clock[:, None] - motion.times).min(axis=1) > step]  # not across a knot
     slope = (motion(clock + step).positions - motion(clock - step).positions) / (2 * step)
