@@ -13,7 +13,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.crane import WAYPOINTS
-from rrtik_tests.page_pictures import chromium, screenshot
+from rrtik_tests.page_pictures import document_of, screenshot
 
 
 def share_of(color: str, picture: np.ndarray, likeness: float) -> float:
@@ -46,8 +46,7 @@ def test_a_browser_shows_obstacles_trail_ghosts_and_a_robot_that_moves(file: Pat
 
 
 def test_the_page_reads_degrees_metres_and_the_tip_where_the_robot_has_it(file: Path, crane: Robot) -> None:
-    shown = chromium(f"{file.as_uri()}#waypoint=3", "--dump-dom").replace("\u2212", "-")
-    assert 'data-ready="yes"' in shown
+    shown = document_of(f"{file.as_uri()}#waypoint=3").replace("\u2212", "-")
     assert re.search(r">slew</td><td[^>]*>68\.8 deg</td><td[^>]*>\u2192 -57\.3<", shown)
     assert re.search(r">hoist</td><td[^>]*>0\.700 m</td>", shown)
     assert re.search(r">spin</td><td[^>]*>229\.2 deg</td>", shown)
@@ -63,7 +62,7 @@ def test_the_page_shows_the_clearance_along_the_path_and_what_is_not_proven(tmp_
     for rows, said in ((path.waypoints, "every move is proven free"), (through, "1 move not proven free (violet)")):
         target = tmp_path / "view.html"
         target.write_text(page(problem, rows), encoding="utf-8")
-        shown = chromium(target.as_uri(), "--dump-dom")
+        shown = document_of(target.as_uri())
         assert said in shown
         assert re.search(r"now [0-9.]+ mm: \w+ and \w+; least [0-9.]+ mm: \w+ and \w+", shown)
         assert shown.count('class="unproven"') == (rows is through)

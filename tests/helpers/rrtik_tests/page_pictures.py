@@ -1,34 +1,42 @@
-"""Pages in a headless Chromium; tests are skipped where there is none."""
+"""Pages in a headless Chromium as soon as they are ready; tests are skipped where there is none."""
 
 from __future__ import annotations
 
-import shutil
-import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-PANE = np.s_[50:700, 0:860]  # of a window of 1280 x 800: where the 3-D picture is
+from rrtik_tests.browser import CHROMIUM, DRAWING_3D, Browser
+
+READY = "document.documentElement.dataset.ready === 'yes'"
+DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
+SIZE = (1280, 800)
+PANE = np.s_[50:700, 0:860]  # of a window of that size: where the 3-D picture is
 
 
-def chromium(url: str, *options: str) -> str:
-    """What Chromium writes after it has shown a page."""
+@contextmanager
+def _ready_page(url: str) -> Iterator[Browser]:
+    """A page that has built itself, which takes a busy machine longer than any fixed time."""
     if CHROMIUM is None:
         pytest.skip("no chromium on PATH: pages cannot be looked at")
-    common = (
-        "--headless=new",
-        "--no-sandbox",
-        "--hide-scrollbars",
-        "--window-size=1280,800",
-        "--virtual-time-budget=8000",
-    )
-    graphics = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-    ended = subprocess.run(
-        [CHROMIUM, *common, *graphics, *options, url], capture_output=True, text=True, timeout=120, check=True
-    )
-    return ended.stdout
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
+        closing(Browser(folder, DRAWING_3D)) as browser,
+    ):
+        browser.open(url)
+        browser.size(*SIZE)
+        browser.wait(READY, seconds=100.0)
+        yield browser
+
+
+def document_of(url: str) -> str:
+    """The document of a page that has built itself."""
+    with _ready_page(url) as browser:
+        return browser.ask("document.documentElement.outerHTML")
 
 
 def screenshot(target: Path, fragment: str) -> np.ndarray:
@@ -36,5 +44,7 @@ def screenshot(target: Path, fragment: str) -> np.ndarray:
     import cv2
 
     picture = target.with_suffix(".png")
-    chromium(f"{target.as_uri()}{fragment}", f"--screenshot={picture}")
+    with _ready_page(f"{target.as_uri()}{fragment}") as browser:
+        browser.ask(DRAWN)
+        browser.screenshot(picture)
     return cv2.imread(str(picture))[PANE][..., ::-1].astype(float)
