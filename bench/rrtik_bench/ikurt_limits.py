@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_bench.ikurt import EXAMPLES, METRIC, SINGULAR, SOURCE, as_published
+from rrtik_bench.ikurt import EXAMPLES, METRIC, SINGULAR, SOURCE, STEP, THRESHOLD_ANGLE, as_published
 from rrtik_bench.report.rows import Bar, Row, all_of, exactly, judged
 from rrtik_bench.tables import Table
 from rrtik_ompl.arrays import Matrix, Vector
@@ -23,7 +23,7 @@ from rrtik_ompl.problem import Problem
 
 WRIST = "titan4_wrist"
 BEYOND = 0.5  # of a joint's range
-LETTER = Steps(0.15, 0.5, 0.99 * METRIC)
+LETTER = Steps(STEP, THRESHOLD_ANGLE, 0.99 * METRIC)
 SLOW_RULE = "to the letter"
 RULES = {
     SLOW_RULE: LETTER,

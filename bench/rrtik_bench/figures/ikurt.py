@@ -8,7 +8,7 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from rrtik_bench.figures.plane import INK, between, draw_arm, draw_scene
-from rrtik_bench.ikurt import as_published, metric_of
+from rrtik_bench.ikurt import as_published, letter_steps, repaired_search
 from rrtik_bench.ikurt_limits import (
     EVALUATIONS,
     FEW_EVALUATIONS,
@@ -21,8 +21,6 @@ from rrtik_bench.ikurt_limits import (
 )
 from rrtik_bench.report.figures import Figure
 from rrtik_ompl.goal import PoseGoal, PositionGoal
-from rrtik_ompl.ik.ikurt.metric import reach
-from rrtik_ompl.ik.ikurt.published import Steps
 from rrtik_ompl.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
@@ -63,10 +61,10 @@ def planar(drawing: Drawing, quick: bool) -> None:
     del quick
     for panel, (name, title) in zip(drawing.subplots(1, 3), PLANAR.items(), strict=True):
         problem = as_published(rrtik.load_problem(name))
-        plan = rrtik.plan(problem, "ikurt", seconds=10.0, seed=0, parameters={"jacobian": False})
+        path, _ = repaired_search(problem, 0)
         draw_scene(panel, problem.world.scene)
-        if plan.path is not None:
-            row = between(plan.path.waypoints, POSTURES)
+        if path is not None:
+            row = between(path, POSTURES)
             for k, q in enumerate(row):
                 draw_arm(panel, problem.robot, q, COLORS[0], width=0.9, strength=0.15 + 0.5 * k / POSTURES)
             draw_arm(panel, problem.robot, row[-1], COLORS[1], width=1.8)
@@ -89,15 +87,14 @@ def joint_space(drawing: Drawing, quick: bool) -> None:
     Q = np.random.default_rng(0).uniform(lower, upper, (FEW_SAMPLES if quick else SAMPLES, 3))
     blocked = Q[~problem.world.valid_batch(Q)]
     panel.plot(*blocked.T, ".", color=COLORS[1], markersize=1.5, alpha=0.25)
-    steps = Steps(0.15, 0.13 * reach(problem.robot), metric_of(problem).radius)
-    search, _ = letter_search(problem, steps, 0, FEW_EVALUATIONS if quick else EVALUATIONS)
+    search, _ = letter_search(problem, letter_steps(problem), 0, FEW_EVALUATIONS if quick else EVALUATIONS)
     search.run()
     q, parents = search.tree.grown()
     edges = np.stack([q[parents[parents >= 0]], q[parents >= 0]], axis=1)
     panel.add_collection(Line3DCollection(list(edges), colors=COLORS[0], linewidths=0.6))
-    plan = rrtik.plan(problem, "ikurt", seconds=10.0, seed=0, parameters={"jacobian": False})
-    if plan.path is not None:
-        panel.plot(*plan.path.waypoints.T, color=COLORS[2], linewidth=2.2)
+    path, _ = repaired_search(problem, 0)
+    if path is not None:
+        panel.plot(*path.T, color=COLORS[2], linewidth=2.2)
     panel.set(xlabel="theta1 [rad]", ylabel="theta2 [rad]", zlabel="theta3 [rad]")
 
 
