@@ -38,6 +38,7 @@ COLLECTION = Collection(
     also={"genetic": "ga-reb", "mbrrt": "mb-rrt", "replanning": "drrt-con", "markers": "sensing"},
     not_here=(
         "[3]: goal-biased trees and Bertram's planner; [1, ch. 5.2]: ERRT, MP-RRT; named without a definition",
+        "DRRT [8], beside DRRT-Con: the planner drrt of rrtik replan",
         "[1, ch. 4]: the figures of the orientation tests, which are lost",
     ),
 )
