@@ -15,10 +15,11 @@ from rrtik_ompl.files.text import check_target, file_name
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
-from rrtik_ompl.replanning.loop import Clock, GoalFeed, Loop
+from rrtik_ompl.replanning.loop import Clock, Loop
 from rrtik_ompl.replanning.patient import PATIENCE_SECONDS, PatientFeed
 from rrtik_ompl.replanning.record import ReplanRun, Tick, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, ReplanSettings, refuse_renamed
+from rrtik_ompl.replanning.start_and_goals import GoalFeed
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory.limits import RateLimits
 
@@ -52,7 +53,8 @@ def replan(  # noqa: D417 - the settings are described in one place
     In each tick the scene is read; if anything has moved the path is checked again, in one call; if it is blocked, it
     is repaired; then the robot goes one step, and only where that step is free now. Nothing is assumed of what
     obstacles will do, unless ``lookahead_ticks`` says so. Where there is no path the robot waits; where an obstacle
-    comes nearer than allowed the robot evades it.
+    comes nearer than allowed the robot evades it. Nobody can predict the motion of a cloud of points: it is evaded as
+    soon as it closes in.
 
     Steps are proven: whatever obstacles do in the tick, as long as none is faster than ``speed_bound``, the arm keeps
     ``margin`` and ``clearance`` in all of it. The record says which steps are not (:attr:`Tick.proven`).

@@ -11,14 +11,13 @@ from collections.abc import Callable
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.scene import Scene
 from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.moving_world import MovingWorld
 
 RANDOM_DIRECTIONS = 192  # that are compared
 SPEED_SHARES = (0.25, 1.0)  # of the highest speed, at which each direction is tried
 HORIZON_TICKS = (1, 3, 6, 12)  # ticks after which a motion is rated
-MIN_DISTANCE_SHARE = 0.9  # of the distance that there is now, which a move must leave
+MAX_LOSS_SHARE = 0.1  # of the distance to keep, or of the one that there is now, that a move may cost
 MAX_CANDIDATES = 16  # of the best motions, which are checked for self-collision
 
 
@@ -29,8 +28,7 @@ def evasion(
     step: float,
     max_change: Vector,
     distance: float,
-    near: MovingWorld,
-    later: Callable[[int], Scene],
+    ahead: Callable[[int], MovingWorld],
     alone: MotionQueries,
     rng: np.random.Generator,
 ) -> Vector | None:
@@ -46,23 +44,22 @@ def evasion(
         step: How far the robot can go in a tick [unit of the space].
         max_change: How far each joint can move in a tick, shape (n,).
         distance: To keep to every obstacle [m].
-        near: A world without self-collision, which is moved.
-        later: The scene so many ticks ahead, as predicted.
+        ahead: The world so many ticks ahead, as predicted, without self-collision. It may be the same object each time.
         alone: Checks limits and self-collision.
         rng: Random numbers.
     """
     moves = max_change * _directions(q, max_change, rng, path)
     moves *= np.minimum(step / np.linalg.norm(moves, axis=1), 1.0)[:, None]
     moves = np.vstack([np.zeros_like(q), *(speed * moves for speed in SPEED_SHARES)])
+    near = ahead(0)
     lower, upper = near.robot.lower, near.robot.upper
     ends = np.clip(q + moves, lower, upper)
-    near.move(later(0))
     middle, end = near.clearance(0.5 * (q + ends)), near.clearance(ends)
     future = np.full(len(moves), np.inf)
     for ticks in HORIZON_TICKS:
-        near.move(later(ticks))
-        future = np.minimum(future, near.clearance(np.clip(q + ticks * moves, lower, upper)))
-    usable = np.flatnonzero(np.minimum(middle, end) >= MIN_DISTANCE_SHARE * end[0])
+        future = np.minimum(future, ahead(ticks).clearance(np.clip(q + ticks * moves, lower, upper)))
+    least = end[0] - MAX_LOSS_SHARE * max(abs(end[0]), distance)
+    usable = np.flatnonzero(np.minimum(middle, end) >= least)
     enough = np.minimum(end, 2.0 * distance) if end.max() >= distance else np.zeros_like(end)
     order = usable[np.lexsort((-future[usable], -enough[usable]))][:MAX_CANDIDATES]
     free = alone.motion_valid_batch(np.tile(q, (len(order), 1)), ends[order])

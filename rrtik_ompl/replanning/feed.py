@@ -103,6 +103,7 @@ class MotionTracker:
         self._bound, self._warned = bound, set[str]()
         self._last: tuple[float, Scene] | None = None
         self._velocities: dict[str, tuple[Vector, Vector]] = {}
+        self._reshaped = set[str]()
         self.speeds: dict[str, float] = {}
 
     def update(self, time: float, scene: Scene) -> bool:
@@ -121,6 +122,7 @@ class MotionTracker:
             if not same_shape(obstacle.shape, last.shape):  # a cloud that was seen anew: its points may have moved
                 changed = True
                 self.speeds.setdefault(obstacle.name, 0.0)
+                self._reshaped.add(obstacle.name)
             changed |= obstacle.margin != last.margin
         return changed
 
@@ -136,6 +138,10 @@ class MotionTracker:
             return ahead
         moved = tuple(replace(o, pose=guessed.get(o.name, o.pose)) for o in ahead.obstacles)
         return replace(ahead, obstacles=moved)
+
+    def unforeseen(self, seconds: float) -> dict[str, float]:
+        """How far obstacles whose motion nobody can predict may go in a time [s]: clouds that are seen anew [m]."""
+        return dict.fromkeys(self._reshaped, (self._bound or 0.0) * seconds)
 
     def _measure(self, obstacle: Obstacle, old: pin.SE3, seconds: float, time: float) -> None:
         name = obstacle.name

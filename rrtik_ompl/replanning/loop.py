@@ -7,31 +7,27 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import TAU, Matrix, Vector
 from rrtik_ompl.choices import TickEvent
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import JOINT_TOLERANCE, JointGoal
-from rrtik_ompl.ik.goal_configurations import goal_configurations
+from rrtik_ompl.goal import JOINT_TOLERANCE
 from rrtik_ompl.poses import pose_row
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.feed import Feed, MotionTracker, required_distances
 from rrtik_ompl.replanning.record import ReplanRun, Tick
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
+from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
-from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
-from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld
 
-GoalFeed = Callable[[float], ArrayLike]
 Clock = Callable[[], float]
 
 TRIES = 3  # to find a path that is proven
+REACTION_TICKS = 6  # before a cloud is too near, at the speed at which it comes: then the arm evades it
 
 
 class Loop:
@@ -56,7 +52,7 @@ class Loop:
         first = problem.world.with_accuracy("exact").with_scene(scene)
         self._world = MovingWorld(first, copies=PREDICTED_PLACES if settings.lookahead_ticks else 1)
         self._near = MovingWorld(first, self_collision=False)
-        empty = Scene((), scene.attached, _held_pairs(scene))
+        empty = Scene((), scene.attached, held_pairs(scene))
         self._alone = first.with_accuracy("conservative").with_scene(empty)
         between = 0.5 * first.motion_resolution  # the margin holds between two checked configurations too
         self._kept = min(CLEARANCE, between) if settings.clearance is None else settings.clearance
@@ -65,11 +61,14 @@ class Loop:
         self._max_change = settings.max_change(robot)
         self._rng = np.random.default_rng(settings.seed)
         self.q = problem.start
-        self._goals = _goals(problem, self._alone, self._rng) if goal_feed is None else _goal(robot, goal_feed, 0.0)
+        self._goals = (
+            every_goal(problem, self._alone, self._rng) if goal_feed is None else goal_now(robot, goal_feed, 0.0)
+        )
         self._first = {o.name: o.pose for o in scene.obstacles}
+        self._left = np.nan
         self._read_scene(0.0)
         self._world.move(scene, inflation=self._distances)  # a start may be where an obstacle is only predicted
-        _check_start(self.q, scene, first, self._world)
+        check_start(self.q, scene, first, self._world)
         ends = np.vstack([self.q, self._goals])
         lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
         upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
@@ -86,25 +85,21 @@ class Loop:
             self._record(now, self.q, "arrive", {}, 0, "")
             return False
         if self._goal_feed is not None:
-            self._goals = _goal(self._problem.robot, self._goal_feed, now)
+            self._goals = goal_now(self._problem.robot, self._goal_feed, now)
         spent: dict[str, float] = {}
         changed = self._measured(spent, "sense", self._read_scene, now)
         self._measured(spent, "retarget", self._follow_goal)
         checked = self._world.checked
         free = self._measured(spent, "look", self._check) if changed or not self._planner.free else True
         event: TickEvent = "walk"
-        checked, reason = self._world.checked - checked, ""
+        checked = self._world.checked - checked
         if not free and not self._world.blocked:
             event, before = "repair" if self._planner.path is not None else "plan", self._planner.path
             free = self._measured(spent, event, self._repair)
             event = "walk" if free and self._planner.path is before else event
         here = self.q
-        if free:
-            place = self._step()
-            event, reason = (event, "") if place is not here else ("wait", "the goal is not free")
-        else:
-            event, reason, place = self._wait_or_evade()
-        path = self._planner.path
+        event, reason, place = self._go(event) if free else self._wait_or_evade()
+        self._left, path = self._distance_left(place), self._planner.path
         moves = (place != here).any()
         proven = self._measured(spent, "prove", self._proven, here[None], place[None]) if moves else None
         self._record(now, here, event, {**spent, "all": self._clock() - begin}, checked, reason, path, proven)
@@ -177,6 +172,14 @@ class Loop:
         others = self._goals[(self._goals != planner.path[-1]).any(axis=1)]
         return planner.retarget(others, self._world, stop)
 
+    def _go(self, event: TickEvent) -> tuple[TickEvent, str, Vector]:
+        """Go along the free path, or evade a cloud that closes in. Event, reason, configuration."""
+        away = self._evasion() if self._closes_in() else None
+        if away is not None:
+            return "evade", "an obstacle closes in", away
+        place = self._step()
+        return (event, "", place) if place is not self.q else ("wait", "the goal is not free", place)
+
     def _step(self) -> Vector:
         """Go a step along the path, round corners if that is free; the configuration of the robot then."""
         path, settings = self._planner.path, self._settings
@@ -189,6 +192,17 @@ class Loop:
         self._planner.advance(place, passed, self._world)
         return place
 
+    def _closes_in(self) -> bool:
+        """Whether a cloud comes nearer so fast that it will be too near soon; nothing else tells that it moves."""
+        left = self._distance_left(self.q)
+        return left < REACTION_TICKS * (self._left - left)
+
+    def _distance_left(self, q: Vector) -> float:
+        """The distance of a configuration to obstacles beyond what has to be kept [m]; NaN where all is predicted."""
+        if not self._tracker.unforeseen(0.0):
+            return np.nan
+        return float(self._ahead(0).clearance(q[None])[0]) - max(self._distances.values())
+
     def _wait_or_evade(self) -> tuple[TickEvent, str, Vector]:
         """Without a free path: wait, or evade an obstacle that is too near. Event, reason, configuration."""
         if self._world.blocked:
@@ -198,18 +212,27 @@ class Loop:
             goals = self._goals if path is None else path[-1:]
             reason = "there is no path" if self._world.valid_batch(goals).any() else "the goal is not free"
             return "wait", reason, self.q
-        place = evasion(
-            self.q, self._planner.path, step=self._settings.step, max_change=self._max_change,
-            distance=max(self._distances.values()), near=self._near, later=self._later, alone=self._alone,
-            rng=self._rng,
-        )  # fmt: skip
+        place = self._evasion()
         if place is None:
             return "wait", "an obstacle is too near, and every escape is blocked", self.q
-        self._planner.rejoin(place)
         return "evade", "an obstacle is too near", place
 
-    def _later(self, ticks: int) -> Scene:
-        return self._tracker.later(self._world.scene, ticks * self._settings.tick) if ticks else self._world.scene
+    def _evasion(self) -> Vector | None:
+        """The configuration after an evasive tick, from which the path goes on; None to stand still."""
+        place = evasion(
+            self.q, self._planner.path, step=self._settings.step, max_change=self._max_change,
+            distance=max(self._distances.values()), ahead=self._ahead, alone=self._alone, rng=self._rng,
+        )  # fmt: skip
+        if place is not None:
+            self._planner.rejoin(place)
+        return place
+
+    def _ahead(self, ticks: int) -> MovingWorld:
+        """The world without self-collision so many ticks ahead; what cannot be predicted may have come nearer."""
+        seconds, now = ticks * self._settings.tick, self._world.scene
+        scene = self._tracker.later(now, seconds) if ticks else now
+        self._near.move(scene, inflation=self._tracker.unforeseen(seconds))
+        return self._near
 
     def _arrived(self) -> bool:
         return bool((np.abs(self._goals - self.q).max(axis=1) <= JOINT_TOLERANCE).any())
@@ -235,51 +258,3 @@ class Loop:
             if not np.array_equal(o.pose.homogeneous, self._first[o.name].homogeneous)
         }
         self.run.ticks.append(Tick(now, q, event, path, poses, spent, checked, reason, proven))
-
-
-def _check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> None:
-    """Refuse a run that begins in contact, or nearer to contact than the margin.
-
-    Raises:
-        InputError: It names the pair.
-    """
-    if not world.valid(q):
-        found = f"scene feed: at its begin the robot is in collision: {world.explain(q)}"
-        raise InputError(f"{found}; move the obstacle or lower its margin")
-    if not moving.valid(q):
-        nearest = world.closest(q)
-        pair = "" if nearest is None else f" ('{nearest.first}' to '{nearest.second}': {nearest.distance:.3g} m)"
-        remedy = "lower margin, clearance or speed_bound, or raise rate"
-        raise InputError(f"start: nearer to contact than the margin{pair}; {remedy}")
-
-
-def _goals(problem: Problem, alone: World, rng: np.random.Generator) -> Matrix:
-    """Every configuration that may be the goal, also those that obstacles block now, shape (g, n).
-
-    Raises:
-        InputError: If there is none.
-    """
-    if isinstance(problem.goal, JointGoal):
-        return problem.goal.q[None]
-    found = goal_configurations(Problem(alone, problem.start, problem.goal), rng)
-    if len(found.rows) == 0:
-        raise InputError(f"goal: {found.reason}")
-    return found.rows
-
-
-def _goal(robot: Robot, goal_feed: GoalFeed, now: float) -> Matrix:
-    """The configuration of a moving goal, shape (1, n).
-
-    Raises:
-        InputError: If that is no configuration of the robot, or outside the limits.
-    """
-    q = robot.configuration(goal_feed(now), f"goal at {now:g} s")
-    if fault := robot.limit_fault(q):
-        raise InputError(f"goal at {now:g} s: {fault}")
-    return robot.onto_limits(q)[None]
-
-
-def _held_pairs(scene: Scene) -> tuple[tuple[str, str], ...]:
-    """Allowed collisions that do not concern obstacles."""
-    gone = {o.name for o in scene.obstacles}
-    return tuple(pair for pair in scene.allowed_collisions if not gone & set(pair))

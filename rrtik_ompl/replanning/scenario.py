@@ -14,8 +14,9 @@ from rrtik_ompl.problem_files.problem import ProblemFile, load_problem, problem_
 from rrtik_ompl.problem_files.run import RunSection
 from rrtik_ompl.replanning import ReplanRun, ReplanSettings, replan_with
 from rrtik_ompl.replanning.feed import Source
-from rrtik_ompl.replanning.loop import Clock, GoalFeed
+from rrtik_ompl.replanning.loop import Clock
 from rrtik_ompl.replanning.settings import refuse_renamed
+from rrtik_ompl.replanning.start_and_goals import GoalFeed
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.trajectory.limits import RateLimits
 

@@ -19,7 +19,7 @@ from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.generate import moving_problem
 from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import Box, Prism, Sphere
+from rrtik_ompl.shapes import Box, PointCloud, Prism, Sphere
 from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_tests.moving_plane import FAST, OPTIONS, box, crossing, place, plane
@@ -78,14 +78,52 @@ def test_a_robot_between_two_obstacles_that_close_in_leaves_sideways():
     walls = [box(f"wall{side}", 10.0 + 1.2 * side, 10.0, 2.0, 8.0, motion) for side, motion in inwards.items()]
     problem = plane(*walls, start=(10.0, 13.0))
     scene, ticks = problem.world.scene, 4
-    near, q = MovingWorld(problem.world, self_collision=False), problem.start
-    later, rng = (lambda ticks: scene.at(0.1 * ticks)), np.random.default_rng(0)
+    near, q, rng = MovingWorld(problem.world, self_collision=False), problem.start, np.random.default_rng(0)
+
+    def ahead(ticks):
+        near.move(scene.at(0.1 * ticks))
+        return near
+
     way = evasion(
-        q, None, step=0.5, max_change=np.full(2, 0.5), distance=0.5, near=near, later=later,
+        q, None, step=0.5, max_change=np.full(2, 0.5), distance=0.5, ahead=ahead,
         alone=World(problem.robot, Scene()), rng=rng,
     ) - q  # fmt: skip
     assert abs(way[1]) > 2.0 * abs(way[0])
     assert World(problem.robot, scene.at(0.1 * ticks)).valid(q + ticks * way)
+
+
+def test_a_robot_that_is_nearer_than_it_may_be_leaves_also_where_a_first_step_gains_little():
+    wall = box("wall", 12.0, 10.0, 2.0, 40.0)
+    problem = plane(wall, start=(10.0, 10.0))
+    near, q = MovingWorld(problem.world, self_collision=False), problem.start
+
+    def ahead(ticks):  # the margin that is wanted is more than what is left, and the wall may come
+        near.move(problem.world.scene, inflation={"wall": 1.5 + 0.2 * ticks})
+        return near
+
+    assert near.clearance(q[None])[0] > 0.0 > ahead(0).clearance(q[None])[0]
+    way = evasion(
+        q, None, step=0.01, max_change=np.full(2, 0.01), distance=1.5, ahead=ahead,
+        alone=World(problem.robot, Scene()), rng=np.random.default_rng(0),
+    ) - q  # fmt: skip
+    assert way[0] < -0.9 * 0.01
+
+
+def test_a_cloud_that_closes_in_is_evaded_before_it_is_too_near():
+    around = np.random.default_rng(0).normal(size=(500, 3))
+    ball = around / np.linalg.norm(around, axis=1, keepdims=True)
+
+    def seen(time):
+        return Scene([Obstacle("seen", PointCloud(ball + np.array([9.4 - 0.4 * time, 10, 0]), 0.02))])
+
+    problem = Problem(World(plane().robot, seen(0.0), motion_resolution=0.05), [8.0, 10.0], [8.0, 13.0])
+    slow = OPTIONS | {"step": 0.05, "max_edge": 0.2}
+    run = replan(problem, seen, speed_bound=0.4, seconds=3.0, **slow)
+    first = next(tick for tick in run.ticks if tick.event == "evade")
+    left = World(problem.robot, seen(first.time)).clearance(first.q)
+    assert first.reason == "an obstacle closes in"
+    assert left > 2.0 * 0.4 / 10.0  # farther than the cloud goes within two ticks
+    assert all(World(problem.robot, seen(tick.time)).clearance(tick.q) > 0.02 for tick in run.ticks)
 
 
 def test_an_arm_that_waits_for_its_goal_is_not_caught_between_obstacles():

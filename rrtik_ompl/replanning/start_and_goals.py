@@ -1,0 +1,68 @@
+"""Start and goals of a run of replanning, accepted or refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.ik.goal_configurations import goal_configurations
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.world import World
+from rrtik_ompl.world.moving_world import MovingWorld
+
+GoalFeed = Callable[[float], ArrayLike]
+
+
+def check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> None:
+    """Refuse a run that begins in contact, or nearer to contact than the margin.
+
+    Raises:
+        InputError: It names the pair.
+    """
+    if not world.valid(q):
+        found = f"scene feed: at its begin the robot is in collision: {world.explain(q)}"
+        raise InputError(f"{found}; move the obstacle or lower its margin")
+    if not moving.valid(q):
+        nearest = world.closest(q)
+        pair = "" if nearest is None else f" ('{nearest.first}' to '{nearest.second}': {nearest.distance:.3g} m)"
+        remedy = "lower margin, clearance or speed_bound, or raise rate"
+        raise InputError(f"start: nearer to contact than the margin{pair}; {remedy}")
+
+
+def every_goal(problem: Problem, alone: World, rng: np.random.Generator) -> Matrix:
+    """Every configuration that may be the goal, also those that obstacles block now, shape (g, n).
+
+    Raises:
+        InputError: If there is none.
+    """
+    if isinstance(problem.goal, JointGoal):
+        return problem.goal.q[None]
+    found = goal_configurations(Problem(alone, problem.start, problem.goal), rng)
+    if len(found.rows) == 0:
+        raise InputError(f"goal: {found.reason}")
+    return found.rows
+
+
+def goal_now(robot: Robot, goal_feed: GoalFeed, now: float) -> Matrix:
+    """The configuration of a moving goal, shape (1, n).
+
+    Raises:
+        InputError: If that is no configuration of the robot, or outside the limits.
+    """
+    q = robot.configuration(goal_feed(now), f"goal at {now:g} s")
+    if fault := robot.limit_fault(q):
+        raise InputError(f"goal at {now:g} s: {fault}")
+    return robot.onto_limits(q)[None]
+
+
+def held_pairs(scene: Scene) -> tuple[tuple[str, str], ...]:
+    """Allowed collisions that do not concern obstacles."""
+    gone = {o.name for o in scene.obstacles}
+    return tuple(pair for pair in scene.allowed_collisions if not gone & set(pair))
