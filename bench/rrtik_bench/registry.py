@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rrtik_bench import drrt_con, drrt_con_scenes, ikurt, ikurt_limits, titan4, titan4_screws, titan4_tracking
+from rrtik_bench import (
+    drrt_con,
+    drrt_con_scenes,
+    ikurt,
+    ikurt_limits,
+    reshaping,
+    titan4,
+    titan4_screws,
+    titan4_tracking,
+)
 from rrtik_bench.crdt import tables as crdt
 from rrtik_bench.errata import tables as errata
 from rrtik_bench.figures import crdt as crdt_figures
@@ -12,6 +21,7 @@ from rrtik_bench.figures import genetic as genetic_figures
 from rrtik_bench.figures import ikurt as ikurt_figures
 from rrtik_bench.figures import mb_rrt as mb_rrt_figures
 from rrtik_bench.figures import replanning as replanning_figures
+from rrtik_bench.figures import reshaping as reshaping_figures
 from rrtik_bench.figures import sensing as sensing_figures
 from rrtik_bench.figures import titan4 as titan4_figures
 from rrtik_bench.genetic import coding
@@ -25,12 +35,12 @@ from rrtik_bench.tables import Collection
 
 PAGES = (
     *(titan4, titan4_screws, titan4_tracking, mb_rrt, mb_rrt_beyond, genetic, coding, crdt, ikurt, ikurt_limits),
-    *(drrt_con, drrt_con_scenes, shortening),
+    *(drrt_con, drrt_con_scenes, reshaping, shortening),
     *(sensing, camera_tables, sequences, detections, errata),
 )
 DRAWN = (
     *(titan4_figures, mb_rrt_figures, genetic_figures, crdt_figures, ikurt_figures),
-    *(replanning_figures, sensing_figures),
+    *(replanning_figures, reshaping_figures, sensing_figures),
 )
 FIGURES = {name: figures for page in DRAWN for name, figures in page.FIGURES.items()}
 COLLECTION = Collection(
