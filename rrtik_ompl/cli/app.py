@@ -39,14 +39,6 @@ COMPLETING = "_RRTIK_COMPLETE"  # by which a shell asks for completions
 FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
 
-app = typer.Typer(
-    help="Plan collision-free paths for robot arms.\n\nExit 0: found or valid; 1: not; 2: bad input; 130: interrupted.",
-    add_completion=True,  # rrtik --install-completion, for bash, zsh and fish
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-
-
 PathFile = Annotated[
     Path | None, typer.Argument(help="A path: .json, .csv or .txt; or a timed motion: .json, .csv, .yaml.")
 ]
@@ -71,7 +63,6 @@ def _print_version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _options(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
@@ -220,9 +211,22 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "warmup": warmup,
     "convert": convert,
 }
-for _name, _command in COMMANDS.items():
-    app.command(_name)(_command)
-app.add_typer(markers, name="markers")
+HELP = "Plan collision-free paths for robot arms.\n\nExit 0: found or valid; 1: not; 2: bad input; 130: interrupted."
+MARKERS = "markers"  # a group of commands
+
+
+def _command_line(given: list[str]) -> typer.Typer:
+    """The command line, with no more than the command that is called: to read what each of them takes takes long."""
+    called = given[:1] if given and given[0] in {*COMMANDS, MARKERS} else [*COMMANDS, MARKERS]
+    # rrtik --install-completion, for bash, zsh and fish
+    app = typer.Typer(help=HELP, add_completion=True, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.callback()(_options)
+    for name in called:
+        if name == MARKERS:
+            app.add_typer(markers, name=name)
+        else:
+            app.command(name)(COMMANDS[name])
+    return app
 
 
 def main() -> None:
@@ -241,9 +245,9 @@ def run(arguments: list[str] | None = None) -> int:
             return _complete()
         if not given:  # the help, but no success: nothing was asked
             with redirect_stdout(sys.stderr):
-                app(args=["--help"], prog_name="rrtik", standalone_mode=False)
+                _command_line(given)(args=["--help"], prog_name="rrtik", standalone_mode=False)
             return BAD_INPUT
-        code = app(args=given, prog_name="rrtik", standalone_mode=False)
+        code = _command_line(given)(args=given, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()
         if code == INTERRUPTED:  # what typer makes of KeyboardInterrupt
             raise KeyboardInterrupt
@@ -266,7 +270,7 @@ def run(arguments: list[str] | None = None) -> int:
 def _complete() -> int:
     """Answer a shell that completes a command; typer ends that by an exit."""
     try:
-        app(prog_name="rrtik", standalone_mode=False)
+        _command_line([])(prog_name="rrtik", standalone_mode=False)
     except SystemExit:
         sys.stdout.flush()
     return FOUND

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
+import threading
 from contextlib import suppress
 
 
@@ -20,11 +22,23 @@ def main() -> None:
     signal.signal(signal.SIGINT, usual)
     code = run()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # everything is written and said
-    if code == INTERRUPTED:  # whoever interrupts does not wait until all libraries are taken down
-        with suppress(OSError):  # the reader may have gone
-            sys.stdout.flush()
-        os._exit(code)
-    sys.exit(code)
+    _end(code, everything_else=code != INTERRUPTED)
+
+
+def _end(code: int, *, everything_else: bool) -> None:
+    """End before all libraries are taken down, a tenth of a second for which nobody who waits has any use.
+
+    What was to be done at the end (``everything_else``) is done, but whoever interrupts does not wait for it.
+    """
+    if everything_else:
+        watched = sys.gettrace() is not None or sys.getprofile() is not None  # by who wants to see the end
+        if watched or any(not t.daemon and t is not threading.main_thread() for t in threading.enumerate()):
+            sys.exit(code)
+        atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # the reader may have gone
+            stream.flush()
+    os._exit(code)
 
 
 def _leave(*_: object) -> None:

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich import box
-from rich.table import Table
 
 from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
+from rrtik_ompl.cli.terminal import Table
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
@@ -109,9 +108,7 @@ def solutions_table(
     named, turned, cleared = any(names), any(turns), len(clearances) > 0
     heads = ["no.", *(["branch"] if named else []), *joint_heads(robot), "off [mm]", "off [deg]"]
     heads += ["by full turns"] * turned + ["clearance [mm]"] * cleared
-    table = Table(*heads, box=box.SIMPLE_HEAD, pad_edge=False)
-    for number, column in enumerate(table.columns):
-        column.justify = "left" if named and number == 1 else "right"
+    table = Table(*heads, right={*range(len(heads))} - ({1} if named else set()))
     for k, (q, residual) in enumerate(zip(result.solutions[:most], result.residuals[:most], strict=True)):
         cells = [str(k + 1), *([names[k]] if named else []), *_joint_cells(robot, q), *_residual_cells(residual)]
         cells += [f"+{turns[k]}"] if turned else []
@@ -123,9 +120,7 @@ def rows_table(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str
     """One row per pose of many: joints and residuals, or the reason why there is no solution; and notes."""
     noted = any(notes)
     heads = ["no.", *joint_heads(robot), "off [mm]", "off [deg]", "no solution", *(["note"] if noted else [])]
-    table = Table(*heads, box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in table.columns[: robot.dof + 3]:
-        column.justify = "right"
+    table = Table(*heads, right=range(robot.dof + 3))
     for k, (row, residual) in enumerate(zip(q, residuals, strict=True)):
         found = not reasons[k]
         cells = [*_joint_cells(robot, row), *_residual_cells(residual)] if found else [""] * (robot.dof + 2)

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich import box
-from rich.table import Table
 
+from rrtik_ompl.cli.terminal import Table
 from rrtik_ompl.goal import GoalSet, JointGoal, PositionGoal
 from rrtik_ompl.moves.text import COLUMNS, moves_document
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
@@ -30,9 +29,7 @@ SLACK = 1e-6  # share of a joint's fastest rate that rounding may add
 
 def moves_table(path: JointPath) -> Table:
     """One row per single-joint move: joint, from, to, change; degrees, or metres for a prismatic joint."""
-    table = Table(*COLUMNS, box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in (0, 2, 3, 4):
-        table.columns[column].justify = "right"
+    table = Table(*COLUMNS, right=(0, 2, 3, 4))
     for number, move in enumerate(path.moves(), start=1):
         (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
         digits = 4 if unit == "m" else 2
@@ -45,9 +42,7 @@ def waypoints_table(path: JointPath) -> Table:
     """One row per waypoint, one column per joint; degrees, or metres for a prismatic joint."""
     factors, units = zip(*map(shown_unit, path.prismatic), strict=True)
     heads = [f"{name} [{unit}]" for name, unit in zip(path.joint_names, units, strict=True)]
-    table = Table("waypoint", *heads, box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in table.columns:
-        column.justify = "right"
+    table = Table("waypoint", *heads, right=range(len(heads) + 1))
     for number, row in enumerate(path.waypoints * factors, start=1):
         table.add_row(
             str(number),
@@ -60,10 +55,9 @@ def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     """One row per joint: its largest velocity, acceleration and jerk beside their limits; degrees, or metres."""
     from rrtik_ompl.trajectory import motion_report  # whoever plans alone does not wait for it
 
-    heads = (f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit"))
-    table = Table("joint", *heads, "unit", "switches/s", box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in (*table.columns[1:-2], table.columns[-1]):
-        column.justify = "right"
+    heads = [f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit")]
+    numbers = range(1, len(heads) + 1)
+    table = Table("joint", *heads, "unit", "switches/s", right=(*numbers, len(heads) + 2))
     often = motion_report(trajectory, limits).switches
     peaks, words = trajectory.peaks(), ("jumps", "none")  # said of a peak, of a limit, that is infinite
     pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))

@@ -5,13 +5,51 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from typing import Annotated, Any
+from threading import Timer
+from typing import TYPE_CHECKING, Annotated, Any
+from unicodedata import east_asian_width
 
 import typer
 
+if TYPE_CHECKING:
+    from rich.status import Status
+
 TRAJECTORY_FORMATS = (".json", ".csv", ".yaml", ".mcap")
+SPINNER_AFTER = 0.3  # [s]; what takes no longer is done before anybody has read what it is
+GAP = "   "  # between two columns
+
+
+class Table:
+    """Rows under heads, every column as wide as it needs.
+
+    Args:
+        heads: Of the columns.
+        right: Numbers of the columns whose cells end in line.
+    """
+
+    def __init__(self, *heads: str, right: Collection[int] = ()) -> None:
+        self._rows, self._right = [heads], right
+
+    def add_row(self, *cells: str) -> None:
+        """Add a row below the others."""
+        self._rows.append(cells)
+
+    def __str__(self) -> str:
+        widths = [max(map(_width, column)) for column in zip(*self._rows, strict=True)]
+        line = "\u2500" if (sys.stdout.encoding or "").lower().startswith("utf") else "-"
+        head, *rows = (f" {GAP.join(map(self._padded, range(len(row)), row, widths))} " for row in self._rows)
+        return "\n".join(["", head, f" {line * (len(head) - 2)} ", *rows, ""])
+
+    def _padded(self, column: int, cell: str, width: int) -> str:
+        blanks = " " * (width - _width(cell))
+        return blanks + cell if column in self._right else cell + blanks
+
+
+def _width(text: str) -> int:
+    """How many places of a terminal a text takes."""
+    return sum(2 if east_asian_width(letter) in "WF" else 1 for letter in text)
 
 
 def warn(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -40,7 +78,11 @@ def drop_output() -> None:
 
 
 def say(*items: Any) -> None:
-    """Print texts and tables on standard output."""
+    """Print texts and tables, rich's too, on standard output."""
+    if all(isinstance(item, str | Table) for item in items):
+        for item in items:
+            print(item)
+        return
     from rich.console import Console
 
     # Wider than any table: where there is less room lines are broken, but no number is cut.
@@ -64,14 +106,28 @@ def command(*words: object) -> str:
 
 @contextmanager
 def progress(message: str) -> Iterator[None]:
-    """A spinner on standard error while something takes time; nothing unless that is a terminal."""
+    """A spinner on standard error if something takes time; nothing unless that is a terminal."""
     if not sys.stderr.isatty():
         yield
         return
-    from rich.console import Console
+    shown: list[Status] = []
 
-    with Console(stderr=True).status(message):
+    def show() -> None:
+        from rich.console import Console
+
+        shown.append(Console(stderr=True).status(message))
+        shown[0].start()
+
+    timer = Timer(SPINNER_AFTER, show)
+    timer.daemon = True  # nobody waits for it if the program is to end
+    timer.start()
+    try:
         yield
+    finally:
+        timer.cancel()
+        timer.join()
+        for status in shown:
+            status.stop()
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, frozen
+from rrtik_ompl.arrays import Mask, Matrix, distinct, frozen
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.collision.cloud_solid import CloudSolid
@@ -47,7 +47,7 @@ class Containment:
         own = body_arrays(bodies)
         listed = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         holding = np.full(len(bodies), -np.inf)  # [m] around the middle of a hollow body that may hold others
-        for k in np.unique(listed).tolist():
+        for k in distinct(listed).tolist():
             if _has_inside(bodies[k]):
                 holding[k] = bodies[k].geometry.aabb_radius
         both_ways = np.concatenate([listed, listed[:, ::-1]])
@@ -58,14 +58,14 @@ class Containment:
         self.pairs: list[tuple[int, int]] = list(zip(outer.tolist(), inner.tolist(), strict=True))
         self.ways = np.where(may_hold, np.cumsum(may_hold) - 1, -1).reshape(2, -1).T
         self._outer_joint, self._inner_joint = own.joints[outer], own.joints[inner]
-        held = np.unique(inner)
+        held = distinct(inner)
         points = _end_points([bodies[k].geometry for k in held.tolist()], own.halves[held])
         placed = points @ own.placements[held, :3, :3].transpose(0, 2, 1) + own.placements[held, None, :3, 3]
         self._points = placed[np.searchsorted(held, inner)]
         self._to_outer = np.linalg.inv(own.placements)[outer]
         self._centres, self._halves = own.centres[outer], own.halves[outer] + ROUNDING
         everywhere = np.array([[0.0, 0.0, 0.0, np.inf]])
-        hollow = np.unique(outer).tolist()
+        hollow = distinct(outer).tolist()
         self._covers = {o: everywhere if covers is None else covers[o] for o in hollow}
         self._meshes = {o: bodies[o].geometry for o in hollow}
 
@@ -163,7 +163,7 @@ def _extremes(key: SameObject) -> Matrix:
     """The vertices of a mesh or a convex solid that are farthest along the axes, shape (6, 3); 0 of other kinds."""
     if is_mesh(key.geometry):
         vertices, triangles = mesh_arrays(key.geometry)
-        points = vertices[np.unique(triangles)]
+        points = vertices[distinct(triangles)]
     elif isinstance(key.geometry, coal.ConvexBase):
         points = np.array(key.geometry.points()).reshape(-1, 3)
     else:

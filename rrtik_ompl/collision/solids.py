@@ -10,7 +10,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import LARGEST, Matrix, Vector
+from rrtik_ompl.arrays import LARGEST, Matrix, Vector, distinct
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 
@@ -107,7 +107,7 @@ def around(geometry: Any) -> Any:
 @lru_cache(maxsize=128)
 def _around(key: SameObject) -> Any:
     vertices, triangles = mesh_arrays(key.geometry)
-    used = vertices[np.unique(triangles)]
+    used = vertices[distinct(triangles)]
     if len(used) < 4 or not _thickness(used) >= FLATTEST * _extent(used):
         return key.geometry
     return hull(used)

@@ -10,7 +10,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.moves.axis_cut import cut_parts, double_axis_cut
 from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.rules import long_enough
-from rrtik_ompl.moves.values import Values, lattice_size
+from rrtik_ompl.moves.values import Values, lattice_size, within_travel
 from rrtik_ompl.transitions import edge_keys, merge_moves, transitions
 from rrtik_ompl.world.motion_queries import BatchedMotionQueries, no_stop
 
@@ -51,8 +51,17 @@ class BestRoute:
         """What is to be made small: moves, then travel; a gain of rounding is none."""
         if route is None:
             return NONE, np.inf
-        travel = float((np.abs(np.diff(route, axis=0)) @ self._costs).sum())
-        return transitions(route), round(travel, DIGITS)
+        return transitions(route), self._travel(route)
+
+    def _of_less_travel(self, values: Values, start: Vector, goal: Vector) -> Values:
+        """Those values that a route between two ends can take with no more travel than the best one."""
+        if self.route is None:
+            return values
+        left = within_travel(values, start, goal, self._costs, self._travel(self.route))
+        return [v[:1] for v in values] if left is None else left
+
+    def _travel(self, route: Matrix) -> float:
+        return round(float((np.abs(np.diff(route, axis=0)) @ self._costs).sum()), DIGITS)
 
     def cut(self, route: Matrix, axes: Sequence[int] | None = None) -> Matrix:
         """The published double axis cut of a free route: on long ones it gains much more in a second than a lattice.
@@ -67,23 +76,30 @@ class BestRoute:
         """Cuts of parts of a free route that get longer: much of what the cut of the whole gains, much sooner."""
         return self._confirmed_cut(cut_parts(route, self._queries.in_time, stop=self._queries.stop), route)
 
-    def search(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
+    def search(self, values: Values, start: Vector, goal: Vector, *, shorter: bool = False) -> Matrix | None:
         """The best route between a start and a goal on a lattice of values, if there is one.
+
+        With ``shorter`` one of as many moves and more travel than the best so far need not be found.
 
         Raises:
             OutOfTime: If it is time to stop.
         """
+        values = self._of_less_travel(values, start, goal) if shorter else values
         found = self._lattice_route(values, start, goal)
         if found is not None:
             self.take(found)
         return found
 
-    def replace(self, route: Matrix, first: int, last: int, values: Values) -> None:
+    def replace(self, route: Matrix, first: int, last: int, values: Values, *, shorter: bool = False) -> None:
         """Take in a free route whose waypoints from ``first`` to ``last`` are replaced by the best part on a lattice.
+
+        With ``shorter`` as in :meth:`search`.
 
         Raises:
             OutOfTime: If it is time to stop.
         """
+        if shorter and last - first == len(route) - 1:  # where a part begins or ends moves may become one
+            values = self._of_less_travel(values, route[0], route[-1])
         part = self._lattice_route(values, route[first], route[last])
         if part is not None:
             whole = merge_moves(np.vstack([route[:first], part, route[last + 1 :]]), tolerance=0.0)

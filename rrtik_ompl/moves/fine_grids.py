@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, distinct
 from rrtik_ompl.moves.clearance_levels import Level
 from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.rules import long_enough
@@ -92,7 +92,7 @@ class FineGrids:
         values, each = values_of(np.array([start, goal])), self._each(nodes)
         for joint in self.joints:
             more = spread_values(float(self.lower[joint]), float(self.upper[joint]), each, rng)
-            values[joint] = np.union1d(values[joint], more)
+            values[joint] = distinct(np.append(values[joint], more))
         return values
 
     def _values_near(self, route: Matrix, nodes: int, rng: np.random.Generator) -> Values:
@@ -101,7 +101,7 @@ class FineGrids:
         for joint in self.joints:
             own, (low, high) = values[joint], (float(self.lower[joint]), float(self.upper[joint]))
             aside = NEAR * (high - low) * spread_values(-1.0, 1.0, max(each // len(own), 1), rng)
-            values[joint] = np.union1d(own, np.clip(np.add.outer(own, aside).ravel(), low, high))
+            values[joint] = distinct(np.append(own, np.clip(np.add.outer(own, aside).ravel(), low, high)))
         return values
 
     def _each(self, nodes: int) -> int:

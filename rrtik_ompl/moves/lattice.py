@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector, distinct
 from rrtik_ompl.world.motion_queries import MotionsFree
 
 Costs: TypeAlias = NDArray[np.float64]  # one number for each configuration of a lattice
@@ -39,7 +39,7 @@ class MoveLattice:
     """
 
     def __init__(self, values: Sequence[Vector], motions_free: MotionsFree, costs: Vector) -> None:
-        self.values = [np.unique(v) for v in values]
+        self.values = [distinct(v) for v in values]
         # Joints that rest have no axis: an array has 64 at most.
         self._joints = [joint for joint, v in enumerate(self.values) if len(v) > 1] or [0]
         self._varied = [self.values[joint] for joint in self._joints]

@@ -244,7 +244,7 @@ class MoveSearch:
             start, goal = self.pairs[int(self._rng.choice(promising))]
             values = self._with_spread(np.array([start, goal]), joints)
             if lattice_size(values) <= self._most_nodes:
-                self._best.search(values, start, goal)
+                self._best.search(values, start, goal, shorter=self.proven)
 
     def _around(self, route: Matrix) -> None:
         """The values of a part of a route and further ones of some joints."""
@@ -265,7 +265,7 @@ class MoveSearch:
                 last = self._window(before, 0)
                 part = before[: last + 1]
                 near = near_values(part, float(width), self._lower, self._upper, NEAR_NODES)
-                self._best.replace(before, 0, last, near)
+                self._best.replace(before, 0, last, near, shorter=self.proven)
                 if self.route is before:
                     break
 

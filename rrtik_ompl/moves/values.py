@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, distinct
 
 MOST_VALUES = 64  # of one joint; with more of them the shift at random does more
 STEPS_ASIDE = 4  # new values on each side of a known one
@@ -18,7 +18,7 @@ Values: TypeAlias = list[Vector]  # for each joint, ascending
 
 def values_of(rows: Matrix) -> Values:
     """The values that each joint takes in rows, shape (k, n)."""
-    return [np.unique(column) for column in rows.T]
+    return [distinct(column) for column in rows.T]
 
 
 def lattice_size(values: Sequence[Vector]) -> int:
@@ -52,7 +52,7 @@ def with_spread(
         count = min(each - len(values[joint]), MOST_VALUES)
         if count > 0:
             more = spread_values(float(lower[joint]), float(upper[joint]), count, rng)
-            found[joint] = np.union1d(values[joint], more)
+            found[joint] = distinct(np.append(values[joint], more))
     return found
 
 
@@ -67,15 +67,33 @@ def near_values(route: Matrix, width: float, lower: Vector, upper: Vector, most_
         most_nodes: Largest size.
     """
     values = values_of(route)
-    free = [np.setdiff1d(v, ends) for v, ends in zip(values, route[[0, -1]].T, strict=True)]
+    free = [v[(v != ends[0]) & (v != ends[1])] for v, ends in zip(values, route[[0, -1]].T, strict=True)]
     best = values
     for count in range(1, STEPS_ASIDE + 1):
         aside = width * 0.5 ** np.arange(count)
         steps = np.outer(upper - lower, np.concatenate([-aside, aside]))
         moved = [np.add.outer(f, step).ravel() for f, step in zip(free, steps, strict=True)]
         moved = [np.clip(m, low, high) for m, low, high in zip(moved, lower, upper, strict=True)]
-        wider = [np.union1d(v, m) for v, m in zip(values, moved, strict=True)]
+        wider = [distinct(np.append(v, m)) for v, m in zip(values, moved, strict=True)]
         if lattice_size(wider) > most_nodes:
             break
         best = wider
     return best
+
+
+def within_travel(values: Values, start: Vector, goal: Vector, costs: Vector, most: float) -> Values | None:
+    """The values that a route of no more than some travel can take; None if there is no such route.
+
+    Args:
+        values: For each joint; those of start and goal are among them.
+        start: Where the route begins, shape (n,).
+        goal: Where it ends.
+        costs: Cost of each joint's travel, shape (n,).
+        most: Travel of the whole route.
+    """
+    low, high = np.minimum(start, goal), np.maximum(start, goal)
+    spare = most - float(costs @ (high - low))
+    if spare < 0.0:
+        return None
+    aside = [2.0 * cost * np.maximum(a - v, v - b) for v, a, b, cost in zip(values, low, high, costs, strict=True)]
+    return [v[way <= spare] for v, way in zip(values, aside, strict=True)]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, bounded_array, finite_array, frozen, number_rows, positive
+from rrtik_ompl.arrays import Matrix, bounded_array, distinct, finite_array, frozen, number_rows, positive
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.shapes.shape import Shape
@@ -76,7 +76,7 @@ class Mesh(Shape):
     @property
     def bounding_radius(self) -> float:
         """Distance of its farthest vertex from its origin [m]."""
-        return float(np.linalg.norm(self.vertices[np.unique(self.triangles)], axis=1).max())
+        return float(np.linalg.norm(self.vertices[distinct(self.triangles)], axis=1).max())
 
     def surface(self) -> Triangles:
         """Its triangles."""

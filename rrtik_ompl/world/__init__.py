@@ -292,7 +292,8 @@ class World(Rebuilt):
         mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
         starts, ends = one_way(starts[mask], ends[mask])
         counts = step_counts(starts, ends, self.weights, self.motion_resolution)
-        mask[mask] = free = self._checks.motions_free(starts, ends, counts)
+        proving = self._proven_clearance is not None
+        mask[mask] = free = self._checks.motions_free(starts, ends, counts, to_be_proven=proving)
         if self._proven_clearance is not None:
             mask[mask] = self.prover.proven(starts[free], ends[free], clearance=self._proven_clearance)
         return mask

@@ -116,12 +116,20 @@ class ExactChecker:
             free[answers == UNDECIDED] = apart
         return free
 
-    def motions_free(self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64]) -> Mask:
-        """Which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,)."""
+    def motions_free(
+        self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64], *, to_be_proven: bool = False
+    ) -> Mask:
+        """Which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,).
+
+        Of those that have to be proven too, what the kernels leave undecided counts as free: coal takes longer to say
+        so than a proof, which settles it.
+        """
         sides = self._robot.joint_values(starts), self._robot.joint_values(ends)
         answers = self.fast.classify_edges(*sides, steps)
         free: Mask = answers == FREE
-        if not self.conservative:
+        if not self.conservative and to_be_proven:
+            free |= answers == UNDECIDED
+        elif not self.conservative:
             for k in np.flatnonzero(answers == UNDECIDED):
                 free[k] = self._motion_free_by_coal(starts[k], ends[k], int(steps[k]))
         return free

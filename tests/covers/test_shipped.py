@@ -50,14 +50,16 @@ def test_the_store_gives_back_what_was_written_and_is_always_the_same(tmp_path):
         shipped.write_store(covers, tmp_path / name)
         covers = dict(reversed(covers.items()))
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
-    found = shipped._stored(tmp_path / "one.npz")
-    assert found.keys() == covers.keys()
-    assert all(np.array_equal(found[key], covers[key]) for key in covers)
+    assert shipped._stored(tmp_path / "one.npz").keys() == covers.keys()
+    assert all(np.array_equal(shipped.shipped_cover(key, tmp_path / "one.npz"), covers[key]) for key in covers)
 
 
 def test_a_missing_or_damaged_store_is_an_empty_one(tmp_path):
     (tmp_path / "cut.npz").write_bytes(shipped.STORE.read_bytes()[:1000])
     assert shipped._stored(tmp_path / "cut.npz") == shipped._stored(tmp_path / "absent.npz") == {}
+    keys = np.zeros((1, 32), dtype=np.uint8)
+    np.savez(tmp_path / "spoilt.npz", keys=keys, ends=np.array([3]), packed=np.zeros(3, dtype=np.uint8))
+    assert shipped.shipped_cover("00" * 32, tmp_path / "spoilt.npz") is None
 
 
 def test_the_store_is_small():

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.moves.lattice import MoveLattice
 from rrtik_ompl.moves.search import MoveSearch
+from rrtik_ompl.moves.values import within_travel
 from rrtik_ompl.transitions import lower_bound, route_length, single_joint, transitions
 from rrtik_tests.mazes import GridWorld
 
@@ -64,6 +65,25 @@ def test_the_best_route_on_a_lattice_is_the_one_of_an_exhaustive_search(
         assert len(route) == 1 or single_joint(route)
         assert (len(route) - 1, route_length(route)) == expected
         assert world.motion_valid_batch(route[:-1], route[1:]).all()
+
+
+@given(mazes(), st.lists(st.floats(0.5, 4.0), min_size=3, max_size=3), st.floats(0.0, 3.0))
+def test_a_lattice_of_the_values_within_a_travel_has_the_same_best_route(
+    case: tuple[GridWorld, np.ndarray, np.ndarray], dear: list[float], spare: float
+) -> None:
+    world, start, goal = case
+    dof, costs = len(start), np.array(dear[: len(start)])
+    values = [np.arange(GRID, dtype=float)] * dof
+    best = MoveLattice(values, world.motion_valid_batch, costs).best_route(start, goal, range(dof))
+    travel = np.inf if best is None else float((np.abs(np.diff(best, axis=0)) @ costs).sum())
+    direct = float(costs @ np.abs(goal - start))
+    assert within_travel(values, start, goal, costs, direct - 0.1) is None
+    left = within_travel(values, start, goal, costs, direct + spare)
+    assert left is not None
+    few = MoveLattice(left, world.motion_valid_batch, costs).best_route(start, goal, range(dof))
+    if travel <= direct + spare:
+        assert few is not None
+        assert (few == best).all()
 
 
 @given(mazes(), st.integers(0, 100))

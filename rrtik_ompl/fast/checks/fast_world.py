@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector, distinct
 from rrtik_ompl.collision.bodies import Body, by_motion, pair_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.checks import inputs, reference_distances
@@ -92,7 +92,7 @@ class FastWorld:
         kept = by_motion(bodies, tuple(pairs))[0]
         clear = partners(bodies, kept)
         moving = alike(bodies, clear)
-        standing = [k for k in np.unique(pair_array(kept)).tolist() if bodies[k].joint == 0]
+        standing = [k for k in distinct(pair_array(kept)).tolist() if bodies[k].joint == 0]
         self._pairs = kept
         solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
         same = like._arm if like is not None and like._joints == self._joints else None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Vector
+from rrtik_ompl.arrays import Mask, Vector, distinct
 from rrtik_ompl.collision.bodies import Body, pair_array
 from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.fast.tables.layout import PAIR_INTS, PAIR_ONE, PAIR_OTHER, PAIRS
@@ -71,7 +71,7 @@ class ArmTables:
 def partners(bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> dict[int, Mask]:
     """For each moving body that a pair names the bodies that it must not touch, shape (bodies,)."""
     listed = pair_array(pairs)
-    named = [k for k in np.unique(listed).tolist() if bodies[k].joint > 0]
+    named = [k for k in distinct(listed).tolist() if bodies[k].joint > 0]
     row = np.full(len(bodies), -1)
     row[named] = np.arange(len(named))
     found = np.zeros((len(named), len(bodies)), dtype=bool)

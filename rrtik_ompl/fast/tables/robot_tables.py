@@ -290,7 +290,8 @@ def _enclosing_ball(numbers: bytes) -> Vector:
     centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
     best, radius = centre, np.inf
     for step in range(1, 41):
-        depths = np.linalg.norm(centres - centre, axis=1) + radii
+        away = centres - centre
+        depths = np.sqrt(np.add.reduce(away * away, axis=1)) + radii
         farthest = int(np.argmax(depths))
         if depths[farthest] < radius:
             best, radius = centre, float(depths[farthest])
