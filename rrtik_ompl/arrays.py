@@ -28,7 +28,9 @@ def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
 def distinct(values: ArrayLike) -> NDArray[Any]:
     """The different ones of some numbers, ascending: as ``numpy.unique``, which takes longer for few, and to load."""
     ordered = np.sort(np.asarray(values), axis=None)
-    return ordered[np.append(True, ordered[1:] != ordered[:-1])] if len(ordered) > 1 else ordered
+    first = np.ones(len(ordered), dtype=bool)
+    np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
+    return ordered[first]
 
 
 def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> NDArray[np.float64]:

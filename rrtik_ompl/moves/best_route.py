@@ -36,32 +36,29 @@ class BestRoute:
     ) -> None:
         self._queries, self._costs, self._order, self._smallest_move = queries, costs, order, smallest_move
         self.route: Matrix | None = None
+        self._rank: tuple[int, float] = NONE, np.inf  # of the route
 
     @property
     def moves(self) -> int:
         """Of the route; more than any number if there is none."""
-        return NONE if self.route is None else transitions(self.route)
+        return self._rank[0]
 
     def take(self, route: Matrix) -> None:
         """Take in a free route, shape (k, n); it is kept if it is better."""
         if self._gains(route):
-            self.route = route
+            self.route, self._rank = route, self.rank(route)
 
-    def rank(self, route: Matrix | None) -> tuple[int, float]:
+    def rank(self, route: Matrix) -> tuple[int, float]:
         """What is to be made small: moves, then travel; a gain of rounding is none."""
-        if route is None:
-            return NONE, np.inf
-        return transitions(route), self._travel(route)
+        travel = float((np.abs(np.diff(route, axis=0)) @ self._costs).sum())
+        return transitions(route), round(travel, DIGITS)
 
     def _of_less_travel(self, values: Values, start: Vector, goal: Vector) -> Values:
         """Those values that a route between two ends can take with no more travel than the best one."""
         if self.route is None:
             return values
-        left = within_travel(values, start, goal, self._costs, self._travel(self.route))
+        left = within_travel(values, start, goal, self._costs, self._rank[1])
         return [v[:1] for v in values] if left is None else left
-
-    def _travel(self, route: Matrix) -> float:
-        return round(float((np.abs(np.diff(route, axis=0)) @ self._costs).sum()), DIGITS)
 
     def cut(self, route: Matrix, axes: Sequence[int] | None = None) -> Matrix:
         """The published double axis cut of a free route: on long ones it gains much more in a second than a lattice.
@@ -104,10 +101,10 @@ class BestRoute:
         if part is not None:
             whole = merge_moves(np.vstack([route[:first], part, route[last + 1 :]]), tolerance=0.0)
             if self._gains(whole) and self._confirmed(whole, route):
-                self.route = whole
+                self.route, self._rank = whole, self.rank(whole)
 
     def _gains(self, route: Matrix) -> bool:
-        return self.rank(route) < self.rank(self.route) and long_enough(route, self._smallest_move)
+        return self.rank(route) < self._rank and long_enough(route, self._smallest_move)
 
     def _confirmed_cut(self, found: Matrix, route: Matrix) -> Matrix:
         """The cut of a route if it is free, else the route. That is found out even when it is time to stop."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cached_property
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.world import World
@@ -11,18 +11,31 @@ from rrtik_ompl.world.kept_clearance import CLEARANCE, Room, room_between
 PREFERRED_CLEARANCE = 0.01  # [m] of single-joint moves, which a person may follow by hand
 
 
-class Level(NamedTuple):
-    """A form of a world.
+class Level:
+    """A form of a world, made when it is first asked for.
 
     Attributes:
         clearance: What motions are proven to keep from obstacles [m].
-        searched: A form whose searches in kernels keep more than that in steps.
-        proving: The same, where motions have to be proven.
+
+    Args:
+        world: As it is.
+        clearance: See above; None where nothing is proven.
+        searched: What searches in kernels keep in steps [m].
     """
 
-    clearance: float
-    searched: World
-    proving: World
+    def __init__(self, world: World, clearance: float | None, searched: float) -> None:
+        self._world, self._kept, self._searched = world, clearance, searched
+        self.clearance = 0.0 if clearance is None else clearance
+
+    @cached_property
+    def searched(self) -> World:
+        """A form whose searches in kernels keep more than the clearance in steps."""
+        return self._world.with_clearance(self._searched)
+
+    @cached_property
+    def proving(self) -> World:
+        """The same, where motions have to be proven."""
+        return self.searched if self._kept is None else self.searched.proving(self._kept)
 
 
 def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> list[Level]:
@@ -35,16 +48,11 @@ def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> lis
     """
     room = roomiest(world, ends, clearance)
     if room is None:
-        return [Level(0.0, world, world)]
+        return [Level(world, None, 0.0)]
     kept = sorted({room.kept, min(room.kept, CLEARANCE), 0.0}, reverse=True)
-    return [_level(world, each, min(room.searched, each + min(each, CLEARANCE))) for each in kept]
+    return [Level(world, each, min(room.searched, each + min(each, CLEARANCE))) for each in kept]
 
 
 def roomiest(world: World, ends: Matrix, clearance: float | None) -> Room | None:
     """As :func:`room_between`, with a centimetre where nothing is said."""
     return room_between(world, ends, PREFERRED_CLEARANCE if clearance is None else clearance)
-
-
-def _level(world: World, kept: float, searched: float) -> Level:
-    roomy = world.with_clearance(searched)
-    return Level(kept, roomy, roomy.proving(kept))
