@@ -103,7 +103,13 @@ def single_joint(waypoints: ArrayLike, tolerance: float = 0.0) -> bool:
 
 def route_length(waypoints: ArrayLike) -> float:
     """Sum of the Euclidean lengths of the edges of a route, shape (k, n) [rad, or m for sliding joints]."""
-    return float(np.linalg.norm(np.diff(_rows(waypoints), axis=0), axis=1).sum())
+    return length_of(_rows(waypoints))
+
+
+def length_of(rows: Matrix) -> float:
+    """As :func:`route_length`, of waypoints that are known to be numbers."""
+    edges = rows[1:] - rows[:-1]
+    return float(np.sqrt((edges * edges).sum(axis=1)).sum())
 
 
 def routes(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the letter of [1]

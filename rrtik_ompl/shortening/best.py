@@ -14,7 +14,7 @@ from rrtik_ompl.shortening.random_cut import PULLS, WAYPOINTS, kernel_search, ra
 from rrtik_ompl.shortening.retraction import STEPS, retract
 from rrtik_ompl.shortening.sequential import sequential_cut
 from rrtik_ompl.shortening.task import Task
-from rrtik_ompl.transitions import route_length
+from rrtik_ompl.transitions import length_of, route_length
 from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels
 
 STARTS = 3  # random shortcuts end in different classes of routes
@@ -41,7 +41,7 @@ def best_in_time(route: Matrix, task: Task) -> Matrix:
         seed = STARTS + rounds
         found = _taut(_cut(best, task, seed, ROUND_TRIES, PULLS), task, world, seed, ROUND_CHECKS)
         rounds += 1
-        idle = idle + 1 if route_length(found) > (1.0 - LEAST_GAIN) * route_length(best) else 0
+        idle = idle + 1 if length_of(found) > (1.0 - LEAST_GAIN) * length_of(best) else 0
         best = task.better(best, found)
         task.report(best)
     return best

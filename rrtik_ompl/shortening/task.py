@@ -11,7 +11,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.fast.search.shortcut_layout import KERNELS
 from rrtik_ompl.moves.axis_cut import axis_moves
 from rrtik_ompl.moves.rules import MoveRules
-from rrtik_ompl.transitions import edge_keys, route_length, transitions
+from rrtik_ompl.transitions import edge_keys, length_of, transitions
 from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, Stop, has_kernels
 
 
@@ -149,7 +149,7 @@ class Task:
 
     def rank(self, route: Matrix) -> tuple[float, float]:
         """What is to be made small: the length, after the number of moves where one joint moves at a time."""
-        return (float(transitions(route)) if self.one_joint else 0.0), route_length(route)
+        return (float(transitions(route)) if self.one_joint else 0.0), length_of(route)
 
     def better(self, *routes: Matrix) -> Matrix:
         """The best of several routes, the first of equal ones."""

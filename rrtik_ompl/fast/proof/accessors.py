@@ -45,8 +45,8 @@ cloud_poses_of: Callable[[ProofTable], int] = field_reader(layout.CLOUD_POSES)
 
 # Function (array, number) that reads one number of a record.
 frame_of_solid: Callable[[int, int], int] = int_column(layout.SOLID_SIZE, layout.SOLID_FRAME)
-first_corner_of: Callable[[int, int], int] = int_column(layout.SOLID_SIZE, layout.FIRST_CORNER)
-end_corner_of: Callable[[int, int], int] = int_column(layout.SOLID_SIZE, layout.END_CORNER)
+first_block_of: Callable[[int, int], int] = int_column(layout.SOLID_SIZE, layout.FIRST_BLOCK)
+end_block_of: Callable[[int, int], int] = int_column(layout.SOLID_SIZE, layout.END_BLOCK)
 kind_of_solid: Callable[[int, int], int] = int_column(layout.SOLID_SIZE, layout.SOLID_KIND)
 frame_of_sweep: Callable[[int, int], int] = int_column(layout.SWEEP_SIZE, layout.SWEEP_FRAME)
 base_of_sweep: Callable[[int, int], int] = int_column(layout.SWEEP_SIZE, layout.SWEEP_BASE)

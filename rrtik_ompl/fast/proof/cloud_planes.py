@@ -19,7 +19,7 @@ from rrtik_ompl.fast.proof.accessors import (
     cloud_poses_of,
     clouds_of,
     corners_of,
-    first_corner_of,
+    first_block_of,
     kind_of_solid,
     size_at,
     sizes_at,
@@ -28,9 +28,9 @@ from rrtik_ompl.fast.proof.accessors import (
 )
 from rrtik_ompl.fast.proof.frames import carried, turned, turned_back
 from rrtik_ompl.fast.proof.layout import ProofTable
-from rrtik_ompl.fast.proof.planes import SHORTEST, best_plane
+from rrtik_ompl.fast.proof.planes import SHORTEST, best_plane, corner_at
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import bits, field, first_bit, set_double, set_int
+from rrtik_ompl.fast.simd.lanes import bits, field, first_bit, set_double, set_int, set_wide_lanes, spread_wide
 from rrtik_ompl.fast.simd.vectors import along
 from rrtik_ompl.fast.tables.cloud_layout import CloudTable, PointBlocks
 
@@ -96,24 +96,29 @@ def points_in_box(points: PointBlocks, block: int, axes: Any, middle: Any, half:
 
 @inlined
 def put_corner(table: ProofTable, other: int, number: int, poses: int, pose: int, p: Any) -> None:
-    """Let a point of a cloud be a corner of the solid that stands for it."""
+    """Let a point of a cloud be a corner of the solid that stands for it, the only one if it is a block's first."""
     p = carried(poses, pose, (np.float64(p[0]), np.float64(p[1]), np.float64(p[2])))
-    corners, place = corners_of(table), 3 * (first_corner_of(solids_of(table), other) + number)
+    corners, block = corners_of(table), first_block_of(solids_of(table), other) + number // WIDTH
+    lane = number % WIDTH
     for axis in range(3):
-        set_double(corners, place + axis, p[axis])
+        if lane == 0:
+            set_wide_lanes(corners, 3 * block + axis, spread_wide(p[axis]))
+        else:
+            set_double(corners, (3 * block + axis) * WIDTH + lane, p[axis])
 
 
 @inlined
 def count_corners(table: ProofTable, other: int, count: int) -> None:
     """Say how many corners the solid that stands for a cloud has."""
     solids = solids_of(table)
-    set_int(solids, layout.SOLID_SIZE * other + layout.END_CORNER, first_corner_of(solids, other) + count)
+    end = first_block_of(solids, other) + (count + WIDTH - 1) // WIDTH
+    set_int(solids, layout.SOLID_SIZE * other + layout.END_BLOCK, end)
 
 
 @inlined
 def towards(table: ProofTable, one: int, other: int, seen: int, places: Any) -> Any:
     """A unit vector from the first corner of the solid that stands for a cloud to the other solid."""
-    corner = vector_at(corners_of(table), 3 * first_corner_of(solids_of(table), other))
+    corner = corner_at(corners_of(table), first_block_of(solids_of(table), other), 0)
     way = minus(carried(seen, places[0], box_middle(table, one)), corner)
     length = sqrt(dot(way, way))
     return scaled(way, 1.0 / length) if length > SHORTEST else (0.0, 0.0, 1.0)

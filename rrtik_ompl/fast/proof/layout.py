@@ -7,7 +7,7 @@ from typing import NewType
 ProofTable = NewType("ProofTable", int)
 
 # Joints: PARENTS: frame that carries each joint · SLIDING: whether it slides · JOINTS: records of float64 (below)
-# Solids: SOLIDS: records of int32 · SIZES: records of float64 · CORNERS: float64, three each
+# Solids: SOLIDS: records of int32 · SIZES: records of float64 · CORNERS: float64, blocks (below)
 # Sweeps: a body seen from a frame that it moves in. SWEEPS: records of int32 · REACHES: JOINT_COUNT float64 each
 # Pairs: PAIRS: records of int32, those of whole bodies first · MARGINS: what each keeps [m], rounding included
 JOINT_COUNT, PARENTS, SLIDING, JOINTS, SOLIDS, SIZES, CORNERS = range(7)
@@ -31,9 +31,10 @@ JOINT_SIZE = 15
 TURN, SHIFT, JOINT_AXIS = 0, 9, 12
 # Frame (doubles): rotation row by row, origin.
 FRAME_SIZE = 12
-# Solid (ints): frame, corners from, to, kind.
+# Corners (doubles): x, y and z of as many corners as there are lanes; the last block of a solid is filled up.
+# Solid (ints): frame, blocks of corners from, to, kind.
 SOLID_SIZE = 4
-SOLID_FRAME, FIRST_CORNER, END_CORNER, SOLID_KIND = range(4)
+SOLID_FRAME, FIRST_BLOCK, END_BLOCK, SOLID_KIND = range(4)
 CONVEX_SOLID, HALF_SPACE, WHOLE_BODY, UNKNOWN = range(4)  # a whole body, or several, has a ball and a box, no corners
 CLOUD = 4  # and its number among the clouds; its corners are the points that are compared at the moment
 # Sizes (doubles): bounding ball; axes of the box row by row, its middle along them, its half sides; radius of the disc

@@ -12,8 +12,10 @@ from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.cloud_frames import cloud_bodies, cloud_poses
+from rrtik_ompl.fast.proof.corners import corner_blocks, corners_in
 from rrtik_ompl.fast.proof.groups import BLOCK
 from rrtik_ompl.fast.proof.packing import NOTHING, ProofPairs, sizes_of, solid_kind
+from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.cloud_tables import cloud_table
 from rrtik_ompl.fast.tables.solid_tables import ConvexSolid, convex_solids, placed_bodies
 
@@ -43,13 +45,13 @@ class MovedObstacles:
         owners = {solid: place[body] for solid, body in sorted(solids.items()) if body in place}
         self._solids, self._owners = (np.array(list(some), dtype=np.int64) for some in (owners, owners.values()))
         records = packed.table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)[self._solids]
-        counts = records[:, layout.END_CORNER] - records[:, layout.FIRST_CORNER]
-        spans = [np.arange(*ends) for ends in records[:, [layout.FIRST_CORNER, layout.END_CORNER]].tolist()]
-        self._corner_places = np.concatenate([np.zeros(0, dtype=np.int64), *spans])
-        self._corner_owners = np.repeat(self._owners, counts)
+        counts = records[:, layout.END_BLOCK] - records[:, layout.FIRST_BLOCK]
+        spans = [np.arange(*ends) for ends in records[:, [layout.FIRST_BLOCK, layout.END_BLOCK]].tolist()]
+        self._block_places = np.concatenate([np.zeros(0, dtype=np.int64), *spans])
+        self._block_owners = np.repeat(self._owners, counts)
         self._half = records[:, layout.SOLID_KIND] == layout.HALF_SPACE
         self._sizes: Matrix = packed.table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)[self._solids]
-        self._corners: Matrix = packed.table[layout.CORNERS].reshape(-1, 3)[self._corner_places]
+        self._blocks: NDArray[np.float64] = packed.table[layout.CORNERS].reshape(-1, 3, WIDTH)[self._block_places]
         sides = [(row, place[k]) for row, pair in enumerate(packed.bodies.tolist()) for k in pair if k in place]
         self._pairs: NDArray[np.int64] = np.array(sides, dtype=np.int64).reshape(-1, 2)
         obstacles = np.array([bodies[k].margin for k in self._numbers])
@@ -76,8 +78,8 @@ class MovedObstacles:
         rows[:, _DISC_AXIS] = _turned(turn, rows[:, _DISC_AXIS])
         rows[:, layout.DISC] += self._half * (rows[:, _DISC_AXIS] * shift).sum(axis=1)
         packed.table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)[self._solids] = rows
-        corners = _turned(turns[self._corner_owners], self._corners) + shifts[self._corner_owners]
-        packed.table[layout.CORNERS].reshape(-1, 3)[self._corner_places] = corners
+        blocks = turns[self._block_owners] @ self._blocks + shifts[self._block_owners][:, :, None]
+        packed.table[layout.CORNERS].reshape(-1, 3, WIDTH)[self._block_places] = blocks
         self._put_clouds(bodies)
 
     def _put_clouds(self, bodies: Sequence[Body]) -> None:
@@ -107,7 +109,7 @@ class MovedSolids:
         self._packed, table = packed, packed.table
         self._records = table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)
         self._sizes = table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)
-        self._corners = table[layout.CORNERS].reshape(-1, 3)
+        self._blocks = table[layout.CORNERS].reshape(-1, 3, WIDTH)
         self._left = len(packed.firsts) if packed.groups else NO_LIMIT  # moves until neighbours are better found anew
         self._groups: dict[int, list[int]] = {}
         for group, members in enumerate(packed.groups):
@@ -132,8 +134,8 @@ class MovedSolids:
         whole = [own] if end - first > len(own) else []
         groups = [*whole, *((solid,) for solid in own)]
         self._sizes[first:end] = sizes_of(groups, pose[:, :3, :3].repeat(len(groups), axis=0))
-        corners = slice(self._records[parts[0], layout.FIRST_CORNER], self._records[parts[-1], layout.END_CORNER])
-        self._corners[corners] = np.concatenate([solid.corners for solid in own])
+        blocks = slice(self._records[parts[0], layout.FIRST_BLOCK], self._records[parts[-1], layout.END_BLOCK])
+        self._blocks[blocks] = corner_blocks([solid.corners for solid in own])
         for group in self._groups.get(number, ()):
             members, place = self._packed.groups[group], self._packed.firsts[-1] + group
             if len(members) > BLOCK:  # what is around what was there and what is new is around all
@@ -152,7 +154,7 @@ class MovedSolids:
         """A solid as it stands in the table."""
         record, sizes = self._records[number], self._sizes[number]
         return ConvexSolid(
-            self._corners[record[layout.FIRST_CORNER] : record[layout.END_CORNER]],
+            corners_in(self._blocks[record[layout.FIRST_BLOCK] : record[layout.END_BLOCK]]),
             disc=float(sizes[layout.DISC]),
             axis=sizes[_DISC_AXIS],
             radius=float(sizes[layout.ROUND]),

@@ -15,6 +15,7 @@ from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.cloud_frames import cloud_bodies, cloud_poses
+from rrtik_ompl.fast.proof.corners import block_count, corner_blocks
 from rrtik_ompl.fast.proof.groups import Members, compared_as_one, group_rows
 from rrtik_ompl.fast.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
 from rrtik_ompl.fast.tables.cloud_tables import cloud_table
@@ -266,7 +267,8 @@ def _solid_arrays(
     """The arrays of all solids: a body of several parts comes before these, as a whole; groups of bodies come last."""
     numbers: list[tuple[int, ...]] = []
     solids: list[Sequence[ConvexSolid]] = []
-    corners, count = [np.zeros((0, 3))], 0
+    corners: list[Matrix] = []
+    count = 0
     owners: list[int] = []
     for k, (body, own) in enumerate(zip(bodies, parts, strict=True)):
         if len(own) > 1:
@@ -274,10 +276,10 @@ def _solid_arrays(
             numbers.append((body.joint, 0, 0, WHOLE_BODY if known else UNKNOWN))
             solids.append(own)
         for solid in own:
-            numbers.append((body.joint, count, count + len(solid.corners), solid_kind(body, solid)))
+            numbers.append((body.joint, count, count + block_count(solid.corners), solid_kind(body, solid)))
             solids.append((solid,))
             corners.append(solid.corners)
-            count += len(solid.corners)
+            count += block_count(solid.corners)
         owners += [k] * (len(numbers) - len(owners))
     turns = body_arrays(bodies).placements[owners, :3, :3]
     for members in groups:
@@ -290,5 +292,5 @@ def _solid_arrays(
     return {
         layout.SOLIDS: records,
         layout.SIZES: sizes_of(solids, turns),
-        layout.CORNERS: np.concatenate(corners),
+        layout.CORNERS: corner_blocks(corners),
     }

@@ -13,8 +13,8 @@ from rrtik_ompl.fast.checks.gjk import dot, minus, nearest_on_triangle, scaled
 from rrtik_ompl.fast.proof import layout
 from rrtik_ompl.fast.proof.accessors import (
     corners_of,
-    end_corner_of,
-    first_corner_of,
+    end_block_of,
+    first_block_of,
     size_at,
     sizes_at,
     solids_of,
@@ -22,13 +22,51 @@ from rrtik_ompl.fast.proof.accessors import (
 )
 from rrtik_ompl.fast.proof.frames import carried, turned_back
 from rrtik_ompl.fast.proof.layout import ProofTable
-from rrtik_ompl.fast.simd.compiled import inlined, kernel
+from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
+from rrtik_ompl.fast.simd.lanes import bits, choose, double_at, first_bit, rounded_sum, spread_wide, wide_lanes_at
+from rrtik_ompl.fast.simd.wide_lanes import highest_of_wide, lowest_of_wide
 
 MOST_STEPS = 20
 CONVERGED = 1e-7  # [m]
 SHORTEST = 1e-9  # [m] of a vector that has a direction
 UPRIGHT = 1e-12  # sine of the angle to a disc's axis, below which the disc has no height
 LOWEST = -1e18
+NO_BLOCK = 1e9  # more than there are
+
+
+@inlined
+def corner_at(corners: int, block: int, lane: int) -> Any:
+    """One corner of a block."""
+    place = 3 * WIDTH * block + lane
+    return double_at(corners, place), double_at(corners, place + WIDTH), double_at(corners, place + 2 * WIDTH)
+
+
+@inlined
+def heights(corners: int, block: int, way: Any) -> Any:
+    """How far the corners of a block are along a vector, a lane each."""
+    x, y, z = (
+        wide_lanes_at(corners, 3 * block),
+        wide_lanes_at(corners, 3 * block + 1),
+        wide_lanes_at(corners, 3 * block + 2),
+    )
+    return rounded_sum(rounded_sum(x * way[0], y * way[1]), z * way[2])
+
+
+@inlined
+def highest_corner(corners: int, first: int, end: int, way: Any) -> Any:
+    """The first corner of some blocks that is farthest along a vector. Here lanes hold corners."""
+    best = heights(corners, first, way)
+    if end - first == 1:
+        return corner_at(corners, first, first_bit(bits(best >= highest_of_wide(best))))
+    where = spread_wide(float(first))
+    for block in range(first + 1, end):
+        height = heights(corners, block, way)
+        higher = height > best
+        best = choose(higher, height, best)
+        where = choose(higher, spread_wide(float(block)), where)
+    top = best >= highest_of_wide(best)
+    block = lowest_of_wide(choose(top, where, spread_wide(NO_BLOCK)))
+    return corner_at(corners, int(block), first_bit(bits(top & (where <= block))))
 
 
 @kernel
@@ -36,12 +74,7 @@ def farthest(table: ProofTable, solid: int, seen: int, place: int, way: Any) -> 
     """The point of a solid's core that is farthest along a unit vector; the solid's frame is at a place of ``seen``."""
     corners, solids = corners_of(table), solids_of(table)
     own = turned_back(seen, place, way)
-    best, first, where = LOWEST, first_corner_of(solids, solid), first_corner_of(solids, solid)
-    for corner in range(first, end_corner_of(solids, solid)):
-        height = dot(vector_at(corners, 3 * corner), own)
-        if height > best:
-            best, where = height, corner
-    p = vector_at(corners, 3 * where)
+    p = highest_corner(corners, first_block_of(solids, solid), end_block_of(solids, solid), own)
     radius = size_at(table, solid, layout.DISC)
     if radius > 0.0:
         axis = sizes_at(table, solid, layout.DISC_AXIS)
@@ -117,12 +150,12 @@ def best_plane(table: ProofTable, one: int, other: int, seen: int, places: Any, 
 
 
 @kernel
-def ball_gap(table: ProofTable, one: int, other: int, seen: int, places: Any) -> Any:
+def ball_gap(table: ProofTable, one: int, other: int, seen: int, places: Any, wanted: float) -> Any:
     """A lower bound of the gap between the ball of one solid, on the chord between its ends, and another solid.
 
     Returns:
-        The larger of two gaps, to the ball of the other solid on its chord and, if that stands still, to its box [m];
-        and a unit vector from the other solid to the first one.
+        The larger of two gaps, to the ball of the other solid on its chord and, if that stands still, to its box [m],
+        or the first if it is above ``wanted``; and, if none is, a unit vector from the other solid to the first one.
     """
     centre = sizes_at(table, one, layout.BALL_CENTRE)
     p, q = carried(seen, places[0], centre), carried(seen, places[1], centre)
@@ -142,6 +175,8 @@ def ball_gap(table: ProofTable, one: int, other: int, seen: int, places: Any) ->
         spread = 0.5 * (sqrt(dot(first_chord, first_chord)) + sqrt(dot(second_chord, second_chord)))
     distance = sqrt(dot(apart, apart))
     gap, way = distance - spread - size_at(table, other, layout.BALL_RADIUS), apart
+    if gap - size_at(table, one, layout.BALL_RADIUS) > wanted:
+        return gap - size_at(table, one, layout.BALL_RADIUS), way
     if still:
         to_box = outside_box(table, other, turned_back_point(seen, places[2], p), turned_back_point(seen, places[2], q))
         length = sqrt(dot(to_box, to_box))

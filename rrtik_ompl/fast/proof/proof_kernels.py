@@ -138,7 +138,7 @@ def apart(table: ProofTable, pair: int, begin: int, end: int, width: float) -> i
     if others == layout.HALF_SPACE:
         above = mine == layout.CONVEX_SOLID and beyond_half_space(table, one, other, seen, places) > wanted
         return layout.BY_PLANE if above else layout.OPEN
-    gap, way = ball_gap(table, one, other, seen, places)
+    gap, way = ball_gap(table, one, other, seen, places, wanted)
     if gap > wanted:
         return layout.BY_BALL
     if mine != layout.CONVEX_SOLID or others == layout.WHOLE_BODY:
@@ -196,7 +196,7 @@ def beyond(table: ProofTable, pair: int, begin: int, end: int, width: float) -> 
     wanted = kept + sagitta(table, one_sweep_of(pairs, pair), width)
     wanted += sagitta(table, other_sweep_of(pairs, pair), width)
     seen, places = placed(table, pair, begin, end)
-    gap, _ = ball_gap(table, one, other, seen, places)
+    gap, _ = ball_gap(table, one, other, seen, places, wanted)
     if gap > wanted:
         return 1
     return 0 if gap > kept and width > PATIENT else -1

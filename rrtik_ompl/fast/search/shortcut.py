@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +13,11 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search import shortcut_layout
 from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.memory import table
+from rrtik_ompl.fast.tables.memory import PlannedTable, TablePlan
 
 SPARE_WAYPOINTS = 256  # room for more than at the beginning
 TRIES_PER_CALL = 256  # of the kernel, until the caller may stop it
+_GIVEN = [shortcut_layout.MOTIONS, shortcut_layout.COUNT, shortcut_layout.RANDOM, shortcut_layout.RESOLVE]
 
 
 class ShortcutSearch:
@@ -59,37 +61,16 @@ class ShortcutSearch:
             raise InputError("waypoints to shorten: expected a route of two or more that kernels can check")
         if lengths.min(initial=0.0) < 0.0:
             raise InputError("shortcut search: weights of the length must not be negative")
-        capacity = len(rows) + SPARE_WAYPOINTS
-        route = np.zeros((capacity, dof))
-        route[: len(rows)] = rows
         self._kernels = kernels
         self._motions, self._dof = motions, dof  # its tables live as long as this search
-        self.table = table(
-            {
-                shortcut_layout.MOTIONS: motions.address,
-                shortcut_layout.METRIC: lengths * lengths,
-                shortcut_layout.PROBABILITIES: np.array([share, pull]),
-                shortcut_layout.ROUTE: route,
-                shortcut_layout.ARC_LENGTHS: np.zeros(capacity),
-                shortcut_layout.ENDS: np.zeros((2, dof)),
-                shortcut_layout.QUESTION_STARTS: np.zeros((shortcut_layout.MAX_QUESTIONS, dof)),
-                shortcut_layout.QUESTION_ENDS: np.zeros((shortcut_layout.MAX_QUESTIONS, dof)),
-                shortcut_layout.COUNT: len(rows),
-                shortcut_layout.CAPACITY: capacity,
-                shortcut_layout.RANDOM: seed % 2**62,
-                shortcut_layout.TRIES: 0,
-                shortcut_layout.MAX_TRIES: NO_LIMIT,
-                shortcut_layout.FAILURES: 0,
-                shortcut_layout.PATIENCE: NO_LIMIT,
-                shortcut_layout.GAINS: 0,
-                shortcut_layout.RESOLVE: int(asking),
-                shortcut_layout.QUESTIONS: 0,
-                shortcut_layout.ANSWERED: shortcut_layout.NO_ANSWER,
-                shortcut_layout.FIRST: 0,
-                shortcut_layout.SECOND: 0,
-                shortcut_layout.CUTS: 0,
-            }
-        )
+        plan = _plan(len(rows) + SPARE_WAYPOINTS, dof)
+        self.table = made = PlannedTable(plan)
+        for place in plan.spans if plan.blank is None else ():  # a page's file shall be the same each time
+            made[place][:] = 0.0
+        made.header[_GIVEN] = motions.address, len(rows), seed % 2**62, int(asking)
+        made[shortcut_layout.METRIC][:] = lengths * lengths
+        made[shortcut_layout.PROBABILITIES][:] = share, pull
+        made[shortcut_layout.ROUTE][: rows.size] = rows.ravel()
 
     @property
     def address(self) -> int:
@@ -169,3 +150,22 @@ class ShortcutSearch:
     def _rows(self, place: int, count: int) -> Matrix:
         flat: Vector = self.table[place]
         return flat[: count * self._dof].reshape(-1, self._dof).copy()
+
+
+@lru_cache(maxsize=256)
+def _plan(capacity: int, dof: int) -> TablePlan:
+    """The table of a search with room for so many waypoints."""
+    questions = shortcut_layout.MAX_QUESTIONS * dof
+    arrays = {
+        shortcut_layout.METRIC: dof,
+        shortcut_layout.PROBABILITIES: 2,
+        shortcut_layout.ROUTE: capacity * dof,
+        shortcut_layout.ARC_LENGTHS: capacity,
+        shortcut_layout.ENDS: 2 * dof,
+        shortcut_layout.QUESTION_STARTS: questions,
+        shortcut_layout.QUESTION_ENDS: questions,
+    }
+    numbers = dict.fromkeys({*range(shortcut_layout.CUTS + 1)} - arrays.keys(), 0)
+    numbers |= dict.fromkeys((shortcut_layout.MAX_TRIES, shortcut_layout.PATIENCE), NO_LIMIT)
+    numbers |= {shortcut_layout.CAPACITY: capacity, shortcut_layout.ANSWERED: shortcut_layout.NO_ANSWER}
+    return TablePlan(arrays, numbers)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-
-import numpy as np
+from functools import lru_cache
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.search.taut import layout
 from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.memory import table
+from rrtik_ompl.fast.tables.memory import PlannedTable, TablePlan
 
 FIRST_STEP = 0.3  # of what straightens a bend
 CHECKS_PER_CALL = 64  # of the kernel, until the caller may stop it
@@ -37,21 +36,9 @@ class Tightening:
         if kernels is None or len(rows) < 2 or not motions.fast.covered(motions.joint_values(rows)):
             raise InputError("waypoints to pull taut: expected a route of two or more that kernels can check")
         self._kernels, self._motions, self._dof = kernels, motions, dof
-        self._table = table(
-            {
-                layout.MOTIONS: motions.address,
-                layout.ROUTE: rows.copy(),
-                layout.POINT: np.zeros(dof),
-                layout.STEPS: np.full(len(rows), FIRST_STEP),
-                layout.HINTS: np.full((len(rows), 2 * layout.HINT_SIZE), -1.0),
-                layout.COUNT: len(rows),
-                layout.RANDOM: seed % 2**62,
-                layout.BEND: 1,
-                layout.CHECKS: 0,
-                layout.SWEEPS: 0,
-                layout.MOVED: 0,
-            }
-        )
+        self._table = made = PlannedTable(_plan(len(rows), dof))
+        made.header[[layout.MOTIONS, layout.RANDOM]] = motions.address, seed % 2**62
+        made[layout.ROUTE][:], made[layout.STEPS][:], made[layout.HINTS][:] = rows.ravel(), FIRST_STEP, -1.0
 
     @property
     def waypoints(self) -> Matrix:
@@ -84,3 +71,12 @@ class Tightening:
     def intact(self) -> bool:
         """Whether no kernel has written beyond the memory of the route or what it works on."""
         return self._table.intact() and self._motions.intact()
+
+
+@lru_cache(maxsize=256)
+def _plan(count: int, dof: int) -> TablePlan:
+    """The table of a route of so many waypoints."""
+    arrays = {layout.ROUTE: count * dof, layout.POINT: dof, layout.STEPS: count}
+    arrays[layout.HINTS] = 2 * layout.HINT_SIZE * count
+    numbers = {layout.MOTIONS: 0, layout.COUNT: count, layout.RANDOM: 0, layout.BEND: 1, layout.CHECKS: 0}
+    return TablePlan(arrays, {**numbers, layout.SWEEPS: 0, layout.MOVED: 0})
