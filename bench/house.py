@@ -38,7 +38,7 @@ from house_imports import (
 )
 
 KERNEL_DECORATORS = {"kernel", "entry", "inlined", "intrinsic", "overload", "type_callable", "lower_builtin"}
-INTRINSICS = ("rrtik_ompl/fast/simd/lanes.py", "rrtik_ompl/fast/simd/access.py")  # what kernels are made of
+INTRINSICS = tuple(f"rrtik_ompl/fast/simd/{name}.py" for name in ("lanes", "wide_lanes", "access"))  # kernels' words
 COMMANDS = REPOSITORY / LIBRARY / "cli"  # each option of a command is a parameter, and the caller is typer
 PACKAGE_TABLES = REPOSITORY / "tests" / "house" / "package_tables.yaml"
 MODULES_WITHOUT_TABLE = 1
