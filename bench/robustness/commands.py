@@ -15,7 +15,7 @@ import numpy as np
 import typer
 
 from bench.robustness.spoilt_files import FILES, spoilt, write
-from rrtik_ompl.cli.app import BAD_INPUT, FOUND, NOT_FOUND, app, run
+from rrtik_ompl.cli.app import BAD_INPUT, FOUND, NOT_FOUND, command_line, run
 
 # Servers and minutes: a page that is served, sessions, campaigns and tables that are measured.
 NEEDED = {"show": ("--html", "page.html"), "reproduce": ("--list",)}
@@ -52,7 +52,7 @@ class UnfitAnswer(Exception):
 def commands() -> dict[tuple[str, ...], list[Any]]:
     """Every command with its parameters, as the parser has them."""
     found: dict[tuple[str, ...], list[Any]] = {}
-    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+    for name, command in typer.main.get_command(command_line([])).commands.items():  # type: ignore[attr-defined]
         under = getattr(command, "commands", None)
         found |= {(name,): command.params} if under is None else {(name, k): each.params for k, each in under.items()}
     return {name: parameters for name, parameters in found.items() if name[0] not in LEFT_OUT}

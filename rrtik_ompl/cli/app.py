@@ -215,7 +215,7 @@ HELP = "Plan collision-free paths for robot arms.\n\nExit 0: found or valid; 1: 
 MARKERS = "markers"  # a group of commands
 
 
-def _command_line(given: list[str]) -> typer.Typer:
+def command_line(given: list[str]) -> typer.Typer:
     """The command line, with no more than the command that is called: to read what each of them takes takes long."""
     called = given[:1] if given and given[0] in {*COMMANDS, MARKERS} else [*COMMANDS, MARKERS]
     # rrtik --install-completion, for bash, zsh and fish
@@ -245,9 +245,9 @@ def run(arguments: list[str] | None = None) -> int:
             return _complete()
         if not given:  # the help, but no success: nothing was asked
             with redirect_stdout(sys.stderr):
-                _command_line(given)(args=["--help"], prog_name="rrtik", standalone_mode=False)
+                command_line(given)(args=["--help"], prog_name="rrtik", standalone_mode=False)
             return BAD_INPUT
-        code = _command_line(given)(args=given, prog_name="rrtik", standalone_mode=False)
+        code = command_line(given)(args=given, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()
         if code == INTERRUPTED:  # what typer makes of KeyboardInterrupt
             raise KeyboardInterrupt
@@ -270,7 +270,7 @@ def run(arguments: list[str] | None = None) -> int:
 def _complete() -> int:
     """Answer a shell that completes a command; typer ends that by an exit."""
     try:
-        _command_line([])(prog_name="rrtik", standalone_mode=False)
+        command_line([])(prog_name="rrtik", standalone_mode=False)
     except SystemExit:
         sys.stdout.flush()
     return FOUND
