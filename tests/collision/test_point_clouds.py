@@ -7,10 +7,11 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.certificates.write import certificate_of
+from rrtik_ompl.collision.bodies import link_bodies
 from rrtik_ompl.collision.cloud_solid import cloud_gap, cloud_solid, nearest_of_cloud
 from rrtik_ompl.collision.digests import scene_digest
 from rrtik_ompl.collision.shape_table import pieces
-from rrtik_ompl.collision.solids import bvh, measured
+from rrtik_ompl.collision.solids import bvh, is_mesh, measured, mesh_arrays
 from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.fast import COLLIDING, FREE
 from rrtik_ompl.fast.tables import cloud_layout
@@ -20,6 +21,7 @@ from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
 
 ARMS = ("panda", "ur5", "titan4")
+RADIUS = 0.005  # [m] of the points of walls
 NEARLY = 1e-4  # [m] of margins and rounding
 
 
@@ -78,6 +80,45 @@ def test_kernels_agree_with_the_reference_and_leave_next_to_nothing_open(name):
     assert not certain[answers == COLLIDING].any()
     assert ((answers != FREE) & (answers != COLLIDING)).mean() < 0.05
     assert fast.intact()
+
+
+def walls_beside(robot, q, rng):
+    """Two walls of points, each some millimetres from touching the arm or in it, and else wholly on one side of it."""
+    frames, corners = robot.joint_frames(q[None])[0], []
+    for body in link_bodies(robot):
+        shape = body.geometry
+        if is_mesh(shape) or hasattr(shape, "points"):
+            place = frames[body.joint] @ body.placement.homogeneous
+            points = mesh_arrays(shape)[0] if is_mesh(shape) else shape.points()
+            corners.append(np.asarray(points).reshape(-1, 3) @ place[:3, :3].T + place[:3, 3])
+    corners, turn = np.concatenate(corners), pin.exp3(rng.normal(scale=2.0, size=3))
+    along = 0.006 * np.arange(-20, 21)
+    x, y = (each.ravel() for each in np.meshgrid(along, along))
+    walls = [
+        corners[np.argmax(corners @ way[:, 2])] + np.column_stack([x, y, 0 * x + RADIUS + gap]) @ way.T
+        for way, gap in zip((turn, turn[:, [2, 0, 1]]), rng.uniform(-0.002, 0.004, 2), strict=True)
+    ]
+    return PointCloud(np.concatenate(walls), RADIUS)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", ["panda", "ur5"])
+def test_kernels_are_right_at_contact_with_walls_of_points(name):
+    robot, rng, answers = rrtik.load_robot(name), np.random.default_rng(11), []
+    for q in sample(robot, 12, 30):
+        world = World(robot, Scene([Obstacle("walls", walls_beside(robot, q, rng))]))
+        near = np.clip(
+            q + rng.normal(scale=[[0.0], [0.003], [0.01], [0.03]], size=(4, robot.dof)), robot.lower, robot.upper
+        )
+        if world.fast is None:  # the walls stand in the base
+            continue
+        found, certain = world.fast.classify(robot.joint_values(near)), world._certificate().free(near)
+        assert certain[found == FREE].all()
+        assert not certain[found == COLLIDING].any()
+        answers.extend(zip(found, certain, strict=True))
+    found, certain = np.array(answers).T
+    assert 0.1 < certain.mean() < 0.9
+    assert ((found != FREE) & (certain != 0)).mean() < 0.05  # what is free is told to be
 
 
 @pytest.mark.kernels

@@ -33,7 +33,7 @@ from rrtik_ompl.fast.simd.lanes import (
     spread,
     square_root,
 )
-from rrtik_ompl.fast.simd.vectors import squared
+from rrtik_ompl.fast.simd.vectors import along, squared
 from rrtik_ompl.fast.tables import cloud_layout as layout
 from rrtik_ompl.fast.tables.cloud_layout import LEAF, BoxGroups, CloudTable, PointBlocks
 
@@ -68,6 +68,16 @@ def points_in_reach(points: PointBlocks, block: int, low: Any, high: Any) -> int
         z = coordinates_at(points, block, 2, part)
         inside = (x <= high[0]) & (x >= low[0]) & (y <= high[1]) & (y >= low[1]) & (z <= high[2]) & (z >= low[2])
         found |= bits(inside) << (WIDTH * part)
+    return found
+
+
+@inlined
+def points_below(points: PointBlocks, block: int, normal: Any, height: float) -> int:
+    """The points of a block, as bits, that lie below a plane. Here lanes hold points."""
+    found = 0
+    for part in range(PARTS):
+        x, y = coordinates_at(points, block, 0, part), coordinates_at(points, block, 1, part)
+        found |= bits(along(normal, x, y, coordinates_at(points, block, 2, part)) < height) << (WIDTH * part)
     return found
 
 
