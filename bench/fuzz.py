@@ -11,40 +11,48 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
+import gc
 import json
+import mmap
 import os
 import resource
 import signal
+import struct
 import tempfile
 import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from bench.robustness import calls, commands, spoilt_files
+from bench.robustness import bad_inputs, calls, commands, spoilt_files, values
+from bench.robustness.spoilt_files import Drawn
 from rrtik_ompl.errors import RrtikError
 from rrtik_ompl.fast import warm_up
+from rrtik_ompl.viewer.serve import PageServer
 
-BATCH = 200  # calls of a child
-KINDS = {spoilt_files.read_one: 0.3, commands.call_one: 0.1, calls.call_one: 0.6}  # and their shares
+BATCH = 5000  # calls of a child
+KINDS = ((spoilt_files.draw, 0.25), (commands.draw, 0.3), (calls.draw, 1.0))  # up to which share each is drawn
 MEMORY_BYTES = 4 << 30  # that the calls of a child may take beside what its parent has
 PROCESSOR_SECONDS = 30.0  # of a call
 WALL_SECONDS = 1200.0  # of a call; what waits uses no processor time, and a busy machine is no hang
+PLACE = struct.Struct("q")  # of the call that a child is at
 
 
-def call(seed: int, folder: Path) -> None:
-    """Make the call of a number; ``folder/now`` says what it is."""
+def draw(seed: int) -> Drawn:
+    """The call of a number."""
     rng = np.random.default_rng(seed)
-    rng.choice(np.array(list(KINDS)), p=list(KINDS.values()))(rng, folder)
+    place = rng.random()
+    return next(kind for kind, end in KINDS if place < end)(rng)
 
 
-def outcome(seed: int, folder: Path) -> str | None:
+def outcome(drawn: Drawn, folder: Path) -> str | None:
     """What is wrong with the outcome of a call; None if it is an answer, or an error of ours in one line."""
     try:
-        call(seed, folder)
+        drawn.make(folder)
     except RrtikError as error:
         return None if str(error).isprintable() and str(error) else f"an error that cannot be shown: {str(error)!r}"
     except MemoryError:
@@ -64,8 +72,8 @@ def _address_space() -> int:
     return 0
 
 
-def _child(first: int, count: int, folder: Path, write: int) -> None:
-    """Make calls; one line of JSON each to a pipe."""
+def _child(first: int, count: int, folder: Path, write: int, at: mmap.mmap) -> None:
+    """Make calls; to a pipe one line of JSON for each that something is wrong with."""
     most = _address_space() + MEMORY_BYTES
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -75,47 +83,50 @@ def _child(first: int, count: int, folder: Path, write: int) -> None:
         signal.signal(name, signal.SIG_DFL)  # ends the child, whatever it is in
     for number in (1, 2):
         os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+    setattr(PageServer, "wait", lambda _: None)  # noqa: B010 - Ctrl-C is pressed as soon as a page is served
     for seed in range(first, first + count):
+        PLACE.pack_into(at, 0, seed)
         signal.setitimer(signal.ITIMER_PROF, PROCESSOR_SECONDS)
         signal.setitimer(signal.ITIMER_REAL, WALL_SECONDS)
-        os.write(write, (json.dumps([seed, outcome(seed, folder)]) + "\n").encode())
+        wrong = outcome(drawn := draw(seed), folder)
+        if wrong is not None:
+            os.write(write, (json.dumps([seed, f"{wrong} | {drawn.said()[:300]}"]) + "\n").encode())
     os._exit(0)
 
 
 def run(first: int, count: int, folder: Path) -> Iterator[tuple[int, str]]:
     """Numbers of calls and what is wrong with them, of ``count`` calls from ``first`` on."""
     prepare()
-    end = first + count
+    end, at = first + count, mmap.mmap(-1, PLACE.size)
+    gc.collect()
+    gc.freeze()  # what a child never looks at, it never copies
     while first < end:
         read, write = os.pipe()
+        last = min(first + BATCH, end)
         child = os.fork()
         if child == 0:
             os.close(read)
-            _child(first, min(BATCH, end - first), folder, write)
+            _child(first, last - first, folder, write, at)
         os.close(write)
         with os.fdopen(read) as lines:
             for line in lines:
                 seed, wrong = json.loads(line)
-                first = seed + 1
-                if wrong is not None:
-                    yield seed, f"{wrong} | {_now(folder)}"
+                yield seed, wrong
         status = os.waitpid(child, 0)[1]
+        first = last
         if status != 0:
+            (lost,) = PLACE.unpack_from(at)
             hangs = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGALRM, signal.SIGPROF)
-            yield first, f"{'hang' if hangs else f'crash, status {status}'} | {_now(folder)}"
-            first += 1
+            yield lost, f"{'hang' if hangs else f'crash, status {status}'} | {draw(lost).said()[:300]}"
+            first = lost + 1
 
 
+@cache
 def prepare() -> None:
-    """Make what no call shall wait for: the values that are given, and all kernels."""
-    calls.corpus(), calls.functions(), commands.commands()
+    """Make what no call shall wait for: the values that are given, all kernels, and what commands load."""
+    calls.functions(), values.every(), commands.commands()
     warm_up(lambda _: None)
-
-
-def _now(folder: Path) -> str:
-    """What the child was at, or nearly: it may be further than its last line."""
-    note = folder / "now"
-    return note.read_text()[:300] if note.exists() else ""
+    bad_inputs.prepare()
 
 
 def main() -> None:

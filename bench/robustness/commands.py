@@ -7,20 +7,19 @@ import io
 import os
 from collections.abc import Iterator
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import typer
 
-from bench.robustness.spoilt_files import FILES, spoilt, write
+from bench.robustness.spoilt_files import FILES, Drawn, spoilt, write
 from rrtik_ompl.cli.app import BAD_INPUT, FOUND, NOT_FOUND, command_line, run
 
 # Servers and minutes: a page that is served, sessions, campaigns and tables that are measured.
 NEEDED = {"show": ("--html", "page.html"), "reproduce": ("--list",)}
 FORBIDDEN = {"pilot": ("--simulated", "--scenario", "--camera"), "reproduce": ("--all",), "bench": ("--scheduler",)}
-LEFT_OUT = {"warmup"}
 SHORT = ("0.2", "0", "-1", "nan", "x", "", "3")  # where a good number means work
 WORKING = {"--seconds", "--samples", "--runs", "--restarts", "--frames", "--views", "--jobs", "--ghosts", "--improve"}
 WORKING |= {"--columns", "--rows", "--rate", "--cell"}
@@ -55,25 +54,48 @@ def commands() -> dict[tuple[str, ...], list[Any]]:
     for name, command in typer.main.get_command(command_line([])).commands.items():  # type: ignore[attr-defined]
         under = getattr(command, "commands", None)
         found |= {(name,): command.params} if under is None else {(name, k): each.params for k, each in under.items()}
-    return {name: parameters for name, parameters in found.items() if name[0] not in LEFT_OUT}
+    return found
 
 
-def call_one(rng: np.random.Generator, folder: Path) -> None:
-    """Call a command, most often with good files beside a spoilt one; ``folder/now`` says how.
+def draw(rng: np.random.Generator) -> Drawn:
+    """A command, most often with good files beside a spoilt one.
 
-    Raises:
-        UnfitAnswer: If it ends with another code than 0, 1 or 2, says nothing of bad input, or says it in another way
-            than in lines of its own.
+    Making it raises :class:`UnfitAnswer` if it ends with another code than 0, 1 or 2, says nothing of bad input, or
+    says it in another way than in lines of its own.
     """
-    os.chdir(folder)
     bad = FILE_NAMES[rng.integers(len(FILES))] if rng.random() < 0.5 else ""
-    for file, text in [(file, text) for file, (text, _) in FILES.items()] + [("suite.yaml", SUITE)]:
-        write(folder / file, spoilt(rng, text) if file == bad else text)
+    files = {**{file: text for file, (text, _) in FILES.items()}, "suite.yaml": SUITE}
+    if bad:
+        files[bad] = spoilt(rng, files[bad])
     names = list(commands())
     name = names[rng.integers(len(names))]
     words = [*name, *_words(rng, name[0], commands()[name]), *NEEDED.get(name[0], ())]
-    (folder / "now").write_text(f"rrtik {words!r}"[:2000], errors="backslashreplace")
+    beside = f" {bad}: {files[bad]}" if bad else ""
+    return Drawn(lambda: f"rrtik {words!r}"[:2000] + beside, partial(_call, words, files))
+
+
+def _call(words: list[str], files: dict[str, str], folder: Path) -> None:
+    os.chdir(folder)
+    for name, text in files.items():
+        _put(folder / name, text)
     judge(*said(words))
+
+
+def _put(file: Path, text: str) -> None:
+    """Write a file, unless it is known to be as it shall be: most are, and writing takes longer than most commands."""
+    with contextlib.suppress(OSError):
+        if _WRITTEN.get(file) == (text, *_mark(file)):
+            return
+    write(file, text)
+    _WRITTEN[file] = (text, *_mark(file))
+
+
+def _mark(file: Path) -> tuple[int, int, int]:
+    found = file.stat()
+    return found.st_mtime_ns, found.st_ino, found.st_size
+
+
+_WRITTEN: dict[Path, tuple[str, int, int, int]] = {}
 
 
 def said(words: list[str]) -> tuple[int, str]:
@@ -89,7 +111,7 @@ def judge(code: int, errors: str) -> None:
     """Refuse an answer that is none.
 
     Raises:
-        UnfitAnswer: See :func:`call_one`.
+        UnfitAnswer: See :func:`draw`.
     """
     lines = errors.removesuffix("\n").split("\n") if errors else []
     if code not in (FOUND, NOT_FOUND, BAD_INPUT):

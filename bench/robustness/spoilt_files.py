@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -71,16 +73,30 @@ def spoilt(rng: np.random.Generator, text: str) -> str:
     return text
 
 
+class Drawn(NamedTuple):
+    """A call that is drawn, and not made yet.
+
+    Attributes:
+        said: What it is, in a few words; asked only of calls that something is wrong with.
+        make: Makes it, in a folder.
+    """
+
+    said: Callable[[], str]
+    make: Callable[[Path], object]
+
+
 def write(file: Path, text: str) -> None:
     """Write a text, half letters too."""
     file.write_bytes(text.encode("utf-8", errors="surrogatepass"))
 
 
-def read_one(rng: np.random.Generator, folder: Path) -> None:
-    """Spoil a file and read it; ``folder/now`` says what it holds."""
+def draw(rng: np.random.Generator) -> Drawn:
+    """A file that is spoilt and read."""
     name = list(FILES)[rng.integers(len(FILES))]
-    text, load = FILES[name]
-    text = spoilt(rng, text)
+    text = spoilt(rng, FILES[name][0])
+    return Drawn(lambda: f"{name}: {text}", partial(_read, name, text))
+
+
+def _read(name: str, text: str, folder: Path) -> None:
     write(folder / name, text)
-    (folder / "now").write_text(f"{name}: {text}", errors="backslashreplace")
-    load(folder / name)
+    FILES[name][1](folder / name)

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from typer.core import TyperOption
 
+import rrtik_ompl as rrtik
 from bench import fuzz
-from bench.robustness import commands, spoilt_files
+from bench.robustness import calls, commands, spoilt_files
+from bench.robustness.spoilt_files import Drawn
 from rrtik_ompl.errors import InputError
 
 CALLS = 400
@@ -48,11 +50,11 @@ BREAKS = {
 
 @pytest.mark.parametrize("break_", BREAKS)
 def test_the_fuzz_sees_what_is_wrong_and_goes_on(monkeypatch, tmp_path, break_):
-    def call(seed, folder):
+    def call(seed):
         if seed == 1:
             exec(break_, {"os": os, "time": time})
 
-    monkeypatch.setattr(fuzz, "call", call)
+    monkeypatch.setattr(fuzz, "draw", lambda seed: Drawn(lambda: "", lambda folder: call(seed)))
     monkeypatch.setattr(fuzz, "PROCESSOR_SECONDS", 1.0)
     monkeypatch.setattr(fuzz, "WALL_SECONDS", 5.0 if "sleep" in break_ else 1200.0)
     ((seed, wrong),) = fuzz.run(0, 4, tmp_path)
@@ -60,7 +62,7 @@ def test_the_fuzz_sees_what_is_wrong_and_goes_on(monkeypatch, tmp_path, break_):
 
 
 def test_who_waits_uses_no_processor_time_and_is_no_hang(monkeypatch, tmp_path):
-    monkeypatch.setattr(fuzz, "call", lambda seed, folder: time.sleep(1.5))
+    monkeypatch.setattr(fuzz, "draw", lambda seed: Drawn(lambda: "", lambda folder: time.sleep(1.5)))
     monkeypatch.setattr(fuzz, "PROCESSOR_SECONDS", 1.0)
     assert list(fuzz.run(0, 1, tmp_path)) == []
 
@@ -85,18 +87,25 @@ def test_answers_of_commands_are_judged(case):
             commands.judge(code, errors)
 
 
-def test_every_command_is_drawn_but_those_that_compile():
+def test_every_command_is_drawn():
     from rrtik_ompl.cli.app import COMMANDS
 
-    assert {name for name, *_ in commands.commands()} == {*COMMANDS, "markers"} - {"warmup"}
+    assert {name for name, *_ in commands.commands()} == {*COMMANDS, "markers"}
     assert commands.said(["check", "none.yaml"])[0] == 2
+
+
+def test_every_public_name_is_drawn():
+    drawn = {name for name, *_ in calls.functions()}
+    named = {name for name in rrtik.__all__ if callable(getattr(rrtik, name))}
+    assert named <= drawn
+    assert {"plan_batch", "view", "replan", "GoalSampler"} <= drawn
 
 
 def test_spoilt_files_are_most_often_refused(tmp_path):
     refused = 0
     for seed in range(60):
         try:
-            spoilt_files.read_one(np.random.default_rng(seed), tmp_path)
+            spoilt_files.draw(np.random.default_rng(seed)).make(tmp_path)
         except InputError:
             refused += 1
     assert 20 < refused < 60
