@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rrtik_ompl.errors import InputError, at_most
 
@@ -14,8 +15,45 @@ Matrix: TypeAlias = NDArray[np.float64]  # shape (m, n)
 Mask: TypeAlias = NDArray[np.bool_]  # shape (m,)
 
 TAU = 2.0 * np.pi  # [rad] a full turn
+MOST_NUMBERS = 100_000_000  # of one array, 0.8 GB; whoever has more asks in parts
+BLOCK_ROWS = 16_384  # that a batch computes at a time
 MOST_ROWS = 1_000_000  # waypoints of a path, times of a motion
 LARGEST = 1e6  # [m] or [rad]; numbers beyond are a slip of the pen, and the kernels' float32 cannot hold them
+
+
+_LISTS = frozenset((list, tuple))
+
+
+def in_blocks(work: Callable[..., NDArray[Any]], *rows: NDArray[Any]) -> NDArray[Any]:
+    """``work`` of many rows, block by block, so that it needs little memory beyond its answer.
+
+    Args:
+        work: What makes rows of some rows, of arrays of equal length.
+        rows: These arrays.
+    """
+    count = len(rows[0])
+    if count <= BLOCK_ROWS:
+        return work(*rows)
+    answer: NDArray[Any] | None = None
+    for begin in range(0, count, BLOCK_ROWS):
+        part = work(*(each[begin : begin + BLOCK_ROWS] for each in rows))
+        answer = room((count, *part.shape[1:]), part.dtype) if answer is None else answer
+        answer[begin : begin + BLOCK_ROWS] = part
+    assert answer is not None
+    return answer
+
+
+def room(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
+    """Memory for an answer.
+
+    Raises:
+        InputError: If this machine has not so much.
+    """
+    try:
+        return np.empty(shape, dtype)
+    except MemoryError:
+        size = np.dtype(dtype).itemsize * float(np.prod([float(n) for n in shape])) / 1e9
+        raise InputError(f"the answer takes {size:.1f} GB, more than this machine has left; ask in parts") from None
 
 
 def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
@@ -46,6 +84,8 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
     """
     # Most are floats already, and to ask what else they may be takes longer than all other questions.
     array = values if type(values) is np.ndarray and values.dtype == np.float64 else _as_floats(values, what)
+    if array.size > MOST_NUMBERS:
+        raise too_many(array.size, what)
     if array.shape != shape and not _has_shape(array, shape):
         wanted = ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
         raise InputError(f"{what}: expected an array of shape ({wanted}), got shape {array.shape}")
@@ -58,19 +98,56 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
 
 
 def _as_floats(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Numbers given by a user as float64; the one place that says what is a number.
+
+    Raises:
+        InputError: If they are none (truths, texts and complex numbers are none), or too many.
+    """
     try:
-        if np.iscomplexobj(values):
-            raise TypeError("complex numbers")
-        return np.asarray(values, dtype=np.float64)
+        if (count := _count(values)) > MOST_NUMBERS:
+            raise too_many(count, what)
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiuO" or (isinstance(values, list | tuple) and _has_truths(values)):
+            raise TypeError("not numbers")
+        return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{what}: expected numbers, got {_short(values)}") from error
+    except MemoryError:
+        raise InputError(f"{what}: too many numbers for the memory of this machine; give them in parts") from None
+
+
+def _count(values: object) -> int:
+    """How many members a value given by a user has, before they are copied; 0 if it does not say."""
+    if isinstance(values, np.ndarray):
+        return values.size
+    try:
+        return len(values)  # type: ignore[arg-type]
+    except (TypeError, OverflowError):
+        return MOST_NUMBERS + 1 if isinstance(values, range) else 0
+
+
+def _has_truths(values: list[Any] | tuple[Any, ...]) -> bool:
+    """Whether True or False is among numbers, which numpy takes for 1 and 0."""
+    kinds = set(map(type, values))
+    if bool in kinds or np.bool_ in kinds:
+        return True
+    if np.ndarray in kinds and any(type(each) is np.ndarray and each.dtype == np.bool_ for each in values):
+        return True
+    return not kinds.isdisjoint(_LISTS) and any(_has_truths(each) for each in values if type(each) in _LISTS)
+
+
+def too_many(count: int, what: str) -> InputError:
+    """The error for more numbers than a call takes."""
+    return InputError(f"{what}: {count} are more numbers than the {MOST_NUMBERS} of one call; give them in parts")
 
 
 def dimensions(values: object) -> int:
     """How many dimensions a value given by a user has; 0 for nested lists that make no array."""
+    if not isinstance(values, np.ndarray) and _count(values) > MOST_NUMBERS:
+        return 0
     try:
         return np.ndim(values)  # type: ignore[arg-type]
-    except ValueError:
+    except (ValueError, MemoryError):
         return 0
 
 
@@ -108,12 +185,49 @@ def number_rows(values: ArrayLike, what: str) -> NDArray[np.float64]:
     """Numbers given by a user as rows, one row or several; neither their number nor that they are finite is checked.
 
     Raises:
-        InputError: If they are not numbers.
+        InputError: If they are not numbers, or too many.
     """
-    try:
-        return np.array(values, dtype=np.float64, ndmin=2, copy=None)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{what}: expected numbers, got {_short(values)}") from error
+    array = values if type(values) is np.ndarray and values.dtype == np.float64 else _as_floats(values, what)
+    if array.size > MOST_NUMBERS:
+        raise too_many(array.size, what)
+    return array if array.ndim >= 2 else array.reshape(1, -1)
+
+
+def filled_rows(values: ArrayLike, columns: int, what: str) -> Matrix:
+    """As :func:`finite_array`, of one row at least, shape (k, columns).
+
+    Raises:
+        InputError: If they are no such rows.
+    """
+    rows = finite_array(values, (None, columns), what)
+    if len(rows) == 0:
+        raise InputError(f"{what}: at least one row is needed")
+    return rows
+
+
+def places(values: ArrayLike, count: int, what: str) -> NDArray[np.int64]:
+    """Numbers of rows given by a user, of ``count`` rows, shape (k,).
+
+    Raises:
+        InputError: If they are no whole numbers from 0 to ``count - 1``.
+    """
+    array = finite_array(values, (None,), what)
+    if (array != np.floor(array)).any() or array.min(initial=0) < 0 or array.max(initial=0) >= count:
+        raise InputError(f"{what} must be whole numbers from 0 to {count - 1}")
+    return array.astype(np.int64)
+
+
+def truths(values: ArrayLike, what: str) -> Mask:
+    """Truths given by a user, or 0 and 1 in their place, as one row, shape (n,).
+
+    Raises:
+        InputError: If they are neither.
+    """
+    array = np.asarray(values) if isinstance(values, list | tuple | np.ndarray) and dimensions(values) else None
+    if array is None or array.dtype != np.bool_:
+        array = number_rows(values, what)
+    mask: Mask = array.reshape(-1).astype(bool)
+    return mask
 
 
 def finite_number(value: ArrayLike, what: str) -> float:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from inspect import signature
+from itertools import islice
 from types import UnionType
 from typing import Any, NoReturn, get_args
+
+MOST_MEMBERS = 1_000_000  # of a list that is given
 
 
 def _restored(kind: type[RrtikError], args: tuple[Any, ...], attributes: dict[str, Any]) -> RrtikError:
@@ -129,6 +133,23 @@ def require(value: object, kind: type | UnionType, what: str, remedy: str = "") 
         raise InputError(f"{what} must be of type {wanted}, got {type(value).__name__}{hint}")
 
 
+def called(value: object, what: str, *arguments: str) -> None:
+    """Refuse an argument that cannot be called with so many arguments, which are named.
+
+    Raises:
+        InputError: It names the argument, and what was found.
+    """
+    wanted = f"{what}: expected a function of {' and '.join(arguments) or 'no arguments'}"
+    if not callable(value):
+        raise InputError(f"{wanted}, got {type(value).__name__}")
+    try:
+        signature(value).bind(*arguments)
+    except TypeError as error:
+        raise InputError(f"{wanted}: {error}") from None
+    except ValueError:  # some that are built in do not say
+        return
+
+
 def name_of(value: object, what: str) -> str:
     """A name of a link, joint or solid: text that can be shown and written to a file.
 
@@ -154,15 +175,18 @@ def at_most(count: float, limit: float, what: str, remedy: str = "") -> None:
         raise InputError(f"{what}: {shown} are more than the {limit:.0f} that are allowed{hint}")
 
 
-def listed(values: object, what: str) -> tuple[Any, ...]:
+def listed(values: object, what: str, most: int = MOST_MEMBERS) -> tuple[Any, ...]:
     """The members of a list, or of anything else that has members, but of a text.
 
     Raises:
-        InputError: If it has none.
+        InputError: If it has none, or more than ``most``; of what never ends no more are taken.
     """
     if isinstance(values, str) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{what} must be a list, got {type(values).__name__}")
-    return tuple(values)
+    members = tuple(islice(values, most + 1))
+    if len(members) > most:
+        raise InputError(f"{what}: more than the {most} members that are allowed")
+    return members
 
 
 class MeshWarning(UserWarning):

@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, number_rows, positive
 from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, listed, require
 from rrtik_ompl.poses import rigid, rotation_angles
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion, WithinTolerances
@@ -22,7 +22,7 @@ from rrtik_ompl.tip_distance import metres_per_radian
 from rrtik_ompl.units import wrapped
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
-NO_BOX = frozen([0.0, 0.0, 0.0])
+NO_BOX, MOST = frozen([0.0, 0.0, 0.0]), 100_000  # goals of a set
 
 
 def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
@@ -61,8 +61,9 @@ class JointGoal:
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Largest joint error of each row of Q, shape (m,) [rad or m]."""
-        errors: Vector = np.abs(joint_difference(robot, np.atleast_2d(Q), self.q)).max(axis=1)
-        return errors
+        require(robot, Robot, "robot of a goal")
+        rows = finite_array(number_rows(Q, "configurations"), (None, len(self.q)), "configurations")
+        return np.asarray(np.abs(joint_difference(robot, rows, self.q)).max(axis=1))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """Which rows of Q are at the goal, shape (m,)."""
@@ -144,11 +145,11 @@ class GoalSet:
     def __init__(
         self, members: Iterable[AnyPart], free_rotation_axis: FrameAxis | None = None, box: ArrayLike = NO_BOX
     ) -> None:
-        goals = tuple(map(_with_poses, members)) if isinstance(members, Iterable) else ()
+        goals = tuple(map(_with_poses, listed(members, "goal set", MOST))) if isinstance(members, Iterable) else ()
         if not goals or not all(isinstance(goal, PoseGoal | PositionGoal | TaskRegion) for goal in goals):
             kinds = "a list of at least one pose or position or region of the tip"
             raise InputError(f"goal: a set is {kinds}; of configurations plan to each, or take PoseGoal(robot.fk(q))")
-        if free_rotation_axis not in (None, "x", "y", "z"):
+        if free_rotation_axis is not None and str(free_rotation_axis) not in ("x", "y", "z"):
             raise InputError(f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}; or a TaskRegion")
         sides = finite_array(box, (3,), "goal box")
         if (sides < 0.0).any():
@@ -169,12 +170,12 @@ class GoalSet:
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """Which rows of Q are at one of the parts, shape (m,)."""
-        inside: Mask = np.any([part.satisfied(robot, Q) for part in self.parts], axis=0)
-        return inside
+        return np.asarray(np.any([part.satisfied(robot, Q) for part in self.parts], axis=0))
 
     def member_at(self, robot: Robot, q: ArrayLike) -> int | None:
         """Number of the member that a configuration, shape (dof,), reaches, from 0, the nearest of several; or None."""
-        each = self.member_errors(robot, np.atleast_2d(q))[:, 0]
+        require(robot, Robot, "robot of a goal")
+        each = self.member_errors(robot, robot.configuration(q)[None])[:, 0]
         reached = [bool((errors <= tolerances(part)).all()) for errors, part in zip(each, self.parts, strict=True)]
         away = np.where(reached, each[:, 0] + metres_per_radian(robot) * each[:, 1], np.inf)
         return int(away.argmin()) if any(reached) else None
@@ -220,8 +221,7 @@ class MultiGoal:
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Distances of all tips together for each row of Q, shape (m,) [m]; see :meth:`GoalSet.distance`."""
-        total: Vector = np.sum([part.distance(arm, Q) for arm, part in self.each(robot)], axis=0)
-        return total
+        return np.asarray(np.sum([part.distance(arm, Q) for arm, part in self.each(robot)], axis=0))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """In which rows of Q all tips are at their goals, shape (m,)."""

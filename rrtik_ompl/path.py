@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, number_rows, positive, usable_waypoints
+from rrtik_ompl.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive, truths, usable_waypoints
 from rrtik_ompl.copies import as_value, in_notebook
 from rrtik_ompl.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
@@ -69,7 +69,7 @@ class JointPath:
         joint_names = (f"joint{k + 1}" for k in range(count)) if joint_names is None else joint_names
         names = tuple(name_of(name, "a joint of a path") for name in listed(joint_names, "joint names of a path"))
         given = (np.zeros(count) if mask is None else mask for mask in (prismatic, continuous))
-        sliding, endless = (number_rows(mask, "mask of a path's joints").reshape(-1).astype(bool) for mask in given)
+        sliding, endless = (truths(mask, "mask of a path's joints") for mask in given)
         if not len(names) == count == sliding.size == endless.size:
             raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
         _fill(self, frozen(rows), names, frozen(sliding, bool), robot_name, frozen(endless, bool))
@@ -87,8 +87,8 @@ class JointPath:
             InputError: If the rows do not have one value per joint of the robot.
         """
         require(robot, Robot, "robot of a path")
-        rows = np.asarray(waypoints)
-        if rows.dtype != np.float64 or rows.shape[1:] != (robot.dof,) or not np.isfinite(rows).all():
+        rows: Matrix = waypoints if isinstance(waypoints, np.ndarray) else np.empty(0)
+        if rows.dtype != np.float64 or rows.shape[1:] != (robot.dof,) or not np.isfinite(rows[:MOST_ROWS]).all():
             rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
         kinds = frozen(robot.prismatic, bool), frozen(robot.continuous, bool)
         rows = frozen(usable_waypoints(robot.onto_limits(rows)))
@@ -222,6 +222,7 @@ class JointPath:
             >>> rrtik.load_certificate("path.json").clearance
             0.001
         """
+        require(proof, bool, "proof")
         document, ending = self.document(), known_ending(path, FORMATS, "path")
         if proof:
             known_ending(path, FORMATS[:1], "path with its proof")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from threading import get_ident
 from types import MappingProxyType
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, finite_number, number_rows
+from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, finite_number, in_blocks, number_rows, room
 from rrtik_ompl.copies import as_value, itself
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.poses import MOST_MOVING, cross_products, joint_motions
@@ -122,10 +122,10 @@ class Robot:
         Raises:
             InputError: If the number of values is not ``dof`` or one of them is not finite.
         """
-        array = np.asarray(values, dtype=object) if isinstance(values, (list, tuple)) else np.asarray(values)
-        if array.ndim == 1 and len(array) != self.dof:
+        array = np.asarray(values, dtype=object) if isinstance(values, (list, tuple)) else values
+        if isinstance(array, np.ndarray) and array.ndim == 1 and len(array) != self.dof:
             joints = f"robot '{self.name}' has {self.dof} joints ({', '.join(self.joint_names)})"
-            hint = "; a position of the tip is PositionGoal([x, y, z])" if what == "goal" and len(array) == 3 else ""
+            hint = "; a position of the tip: PositionGoal([x, y, z])" if str(what) == "goal" and len(array) == 3 else ""
             raise InputError(f"{what}: {joints}, but {len(array)} values were given{hint}")
         return finite_array(values, (self.dof,), what).copy()
 
@@ -179,7 +179,7 @@ class Robot:
         """Move values any distance outside onto the limits. Shape as given. InputError if they are no such numbers."""
         try:
             return np.asarray(np.minimum(np.maximum(q, self.lower), self.upper))
-        except (TypeError, ValueError, OverflowError):
+        except (TypeError, ValueError, OverflowError, MemoryError):
             raise InputError(f"values of robot '{self.name}': expected {self.dof} numbers, or rows of them") from None
 
     def joint_values(self, Q: ArrayLike) -> Matrix:
@@ -202,7 +202,7 @@ class Robot:
         """Pose in the world of every Pinocchio joint frame, world first. Shape (m, joints + 1, 4, 4)."""
         rows = self._rows(Q)
         values = self.joint_values(rows)
-        frames = np.empty((len(rows), len(self.chain.parent) + 1, 4, 4))
+        frames = room((len(rows), len(self.chain.parent) + 1, 4, 4))
         frames[:, 0] = np.eye(4)
         motions = joint_motions(self.chain.axis, self.chain.prismatic, values)
         for k, parent in enumerate(self.chain.parent):
@@ -211,7 +211,7 @@ class Robot:
 
     def fk_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Forward kinematics of Q, shape (m, dof): T_world_tip, or of another frame or link. Shape (m, 4, 4)."""
-        return self._poses(self._rows(Q), self._frame_id(frame))
+        return in_blocks(partial(self._poses, frame=self._frame_id(frame)), self._rows(Q))
 
     def _poses(self, rows: Matrix, frame: int, joint_frames: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Poses of a frame for configurations, shape (m, dof): of few by Pinocchio. Shape (m, 4, 4)."""
@@ -239,7 +239,7 @@ class Robot:
 
     def jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Geometric Jacobians of a batch, as :meth:`jacobian`, for Q of shape (m, dof). Shape (m, 6, dof)."""
-        return self.fk_jacobian_batch(Q, frame)[1]
+        return in_blocks(lambda rows: self.fk_jacobian_batch(rows, frame)[1], self._rows(Q))
 
     def fk_jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> tuple[Matrix, Matrix]:
         """:meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""

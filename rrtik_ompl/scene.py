@@ -38,6 +38,8 @@ class ConstantVelocity:
         Raises:
             InputError: If it has left the world by then.
         """
+        require(start, pin.SE3, "pose of an obstacle", "use rrtik_ompl.pose(xyz, quat_xyzw)")
+        time = finite_number(time, "time of a motion")
         if not abs(time) * float(np.abs(self.velocity).max()) <= LARGEST:
             raise InputError(f"motion: at {time:g} s an obstacle of velocity {self.velocity.tolist()} m/s is far away")
         return pin.SE3(start.rotation, start.translation + time * self.velocity)

@@ -15,9 +15,11 @@ from rrtik_ompl.benchmark.sources import build, file_source, from_plain
 from rrtik_ompl.benchmark.suite import Entrant, Suite
 from rrtik_ompl.benchmark.suite_file import NONE, SHORTENINGS
 from rrtik_ompl.choices import SuiteShortening, one_of
-from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError, require
+from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError, listed, require
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto, options_of, refuse_options
 from rrtik_ompl.ompl_bridge.planner_options import is_safe
+
+MOST_PROBLEMS = 100_000
 
 
 def plan_batch(
@@ -65,7 +67,7 @@ def plan_batch(
     """
     if isinstance(problems, str | os.PathLike) or not isinstance(problems, Iterable):
         raise InputError(f"problems must be a list of names or files, got {problems!r:.80}")
-    problems = list(problems)
+    problems = listed(problems, "problems", MOST_PROBLEMS)
     for k, each in enumerate(problems):
         require(each, str | os.PathLike, f"problems[{k}]", "give a name or a file; save_problem() writes one")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")

@@ -130,7 +130,7 @@ def _processor() -> str:
 
 def _held(file: Path, suite: Suite, about: Mapping[str, Any], resume: bool) -> set[records.Key]:
     """Which runs are done already."""
-    if not file.is_file() or file.stat().st_size == 0:
+    if not os.path.isfile(file) or file.stat().st_size == 0:
         return set()
     head, done = records.read_head(file), {records.key_of(record) for record in records.read_records(file)}
     if not done:  # it never began, as where a scheduler did not answer

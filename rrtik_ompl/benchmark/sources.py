@@ -88,7 +88,7 @@ def folder_sources(folder: Path, robot: str | None) -> list[Source]:
     Raises:
         InputError: If there is none, or no such folder.
     """
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise InputError(f"--problems {folder}: no such folder; check the path")
     found = sorted(file for ending in ("yaml", "yml") for file in folder.rglob(f"*.{ending}"))
     found = [file for file in found if not file.name.startswith("request")]

@@ -25,7 +25,7 @@ from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.task import straight, task
 from rrtik_ompl.cli.terminal import ProblemName, command, drop_output, note, prepare_streams, say, suggest, warn
-from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.errors import RrtikError, printable
 from rrtik_ompl.files import notice
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
@@ -277,7 +277,7 @@ def _complete() -> int:
 
 
 def _fail(message: str) -> int:
-    print(f"rrtik: {message}", file=sys.stderr)
+    print(f"rrtik: {printable(message)}", file=sys.stderr)
     return BAD_INPUT
 
 

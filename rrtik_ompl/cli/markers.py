@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
@@ -181,7 +182,7 @@ def sense(
     from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
     from rrtik_ompl.sensing.sensor import Sensor
 
-    alone = Path(source[0]).is_dir() if independent is None else independent
+    alone = os.path.isdir(source[0]) if independent is None else independent
     eye = _camera_or_rig(source, camera, rig)
     sensor = Sensor(eye, load_marker_map(marker_map), smooth=not alone, sigmas=sigmas)
     view = None

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, finite_array, number_rows, positive
+from rrtik_ompl.arrays import Matrix, dimensions, finite_array, number_rows, positive
 from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.constraints.held_region import ANYWHERE
 from rrtik_ompl.errors import InputError, require
@@ -120,7 +120,7 @@ def orientation_of(pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | N
     bounds = _anywhere()
     bounds[3:] = 0.0
     placed = rigid(pose, "orientation_of: pose")
-    if np.ndim(tolerances_deg) == 0:
+    if dimensions(tolerances_deg) == 0:
         tolerance = _tilt(tolerances_deg, "orientation_of: tolerances_deg")
         return TaskRegion(placed, bounds, orientation_tolerance=tolerance, frame=frame)
     angles = finite_array(tolerances_deg, (3,), "orientation_of: tolerances_deg")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -39,7 +40,7 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
     name = unquote(rest) if scheme else rest
     name = name.lstrip("/") if scheme in ("package", "model") else name  # package:///NAME is a common slip
     candidates = _in_packages(name, roots) if scheme in ("package", "model") else _beside(name, folder)
-    found = next((path for path in candidates if path.is_file()), None)
+    found = next((path for path in candidates if os.path.isfile(path)), None)
     if found is None:
         package = name.partition("/")[0]
         remedy = f"give packages=[the folder that holds '{package}']" if scheme in ("package", "model") else "check it"
@@ -53,7 +54,7 @@ def package_folder(name: str, folder: Path, packages: Iterable[Path]) -> Path | 
     """The folder of a package: in ``packages`` or one of them, in ``folder`` or any above it; None if there is none."""
     roots = [*packages, folder, *folder.parents]
     found = (root if root.name == name else root / name for root in roots)
-    return next((each for each in found if name and each.is_dir()), None)
+    return next((each for each in found if name and os.path.isdir(each)), None)
 
 
 def _in_packages(name: str, roots: Iterable[Path]) -> Iterator[Path]:

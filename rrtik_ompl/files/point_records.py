@@ -64,9 +64,10 @@ def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int |
     Raises:
         InputError: If a row is too short or has something else.
     """
-    lines = [line for line in data.decode("ascii", "replace").replace(",", " ").splitlines() if line.strip()]
-    if not lines:
+    plain = data.replace(b",", b" ") if b"," in data else data
+    if not plain or plain.isspace():
         return np.zeros((0, len(columns or ())))
+    lines = io.TextIOWrapper(io.BytesIO(plain), "ascii", errors="replace")  # read line by line: all at once take memory
     try:
         rows = np.loadtxt(lines, usecols=columns, ndmin=2, max_rows=most, dtype=np.float64)
     except ValueError as error:

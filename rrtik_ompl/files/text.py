@@ -37,15 +37,17 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
     file_name(path)
     try:
         with open(path, "rb") as file:
-            data = file.read(limit + 1)
+            length = os.fstat(file.fileno()).st_size  # 0 of devices and pipes
+            data = file.read(limit + 1) if length <= limit else b""
     except FileNotFoundError:
         raise InputError(f"{path}: no such file{_similar(Path(path))}") from None
     except IsADirectoryError:
         raise InputError(f"{path}: this is a folder; give a file") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    if len(data) > limit:
-        raise InputError(f"{path}: larger than {limit // 2**20} MiB, the most that is read")
+    if max(length, len(data)) > limit:
+        shown = f"{length // 2**20} MiB, more" if length else "larger"
+        raise InputError(f"{path}: {shown} than {limit // 2**20} MiB, the most that is read")
     return data
 
 
@@ -168,7 +170,11 @@ def check_target(path: Path | None, endings: tuple[str, ...]) -> None:
         return
     if path.suffix.lower() not in endings:
         raise InputError(f"{path}: unknown ending '{path.suffix}'; use {', '.join(endings)}")
-    if path.is_dir():
+    try:
+        folder = path.is_dir()
+    except OSError as error:  # the name is too long
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    if folder:
         raise InputError(f"{path}: this is a folder; give a file name")
     if not path.parent.is_dir():
         raise InputError(f"{path}: folder '{path.parent}' does not exist; create it")

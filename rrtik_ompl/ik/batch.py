@@ -13,6 +13,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_ne
 from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.description.joint_weights import weighted_difference
+from rrtik_ompl.errors import require
 from rrtik_ompl.fast.threads import cores, in_threads
 from rrtik_ompl.goal import PoseGoal, joint_difference, tolerances
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
@@ -90,6 +91,7 @@ def solve_ik_batch(
         (50, 7)
     """
     check_world(world, robot)
+    require(method, str, "method of inverse kinematics", "see list_ik_methods()")
     load_kernels(robot)
     targets = finite_array(poses, (None, 4, 4), "poses")
     posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")

@@ -83,6 +83,7 @@ def solve_ik(
         InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
     """
     check_world(world, robot)
+    one_of(get_args(IkMethod), method, METHOD)
     load_kernels(robot)
     begin = time.monotonic()
     limit, random = not_negative(seconds, "seconds"), RandomStream(seed)

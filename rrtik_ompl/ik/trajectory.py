@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, positive
+from rrtik_ompl.arrays import Mask, Matrix, Vector, dimensions, finite_array, frozen, not_negative, positive
 from rrtik_ompl.choices import FrameAxis, GeneticPreset, IkMethod, TrajectoryIkMethod, one_of
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError
@@ -165,8 +165,7 @@ def solve_ik_trajectory(
 
 
 def _checked(poses: ArrayLike) -> Matrix:
-    shape = np.shape(poses)
-    rows = finite_array(poses, (None, 4, 4) if len(shape) == 3 else (None, 3), "poses")
+    rows = finite_array(poses, (None, 4, 4) if dimensions(poses) == 3 else (None, 3), "poses")
     if len(rows) == 0:
         raise InputError("poses: a trajectory needs at least one point")
     if rows.ndim == 3:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 
 from rrtik_ompl import catalog
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.ompl_bridge.planner_files import is_planner_file, planner_of_file
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, ompl_planners
@@ -27,7 +27,12 @@ def list_planners() -> tuple[str, ...]:
 
 
 def is_auto(name: str) -> bool:
-    """Whether a name means the portfolio, which is no class."""
+    """Whether a name means the portfolio, which is no class.
+
+    Raises:
+        InputError: If it is no name.
+    """
+    require(name, str, "name of a planner", "see list_planners()")
     return name.lower() == AUTO
 
 

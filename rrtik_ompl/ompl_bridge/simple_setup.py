@@ -9,7 +9,7 @@ from ompl import base as ob
 from ompl import geometric as og
 
 from rrtik_ompl.arrays import Vector
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.region_constraint import projected_space
@@ -89,6 +89,7 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
         >>> si.getStateDimension()
         6
     """
+    require(so2, bool, "so2")
     if isinstance(world_or_problem, World):
         return _information(world_or_problem, *world_or_problem.robot.finite_range(), so2)
     if not isinstance(world_or_problem, Problem):

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, positive, whole_number
-from rrtik_ompl.choices import ProofMode
+from rrtik_ompl.arrays import Vector, dimensions, finite_array, positive, whole_number
+from rrtik_ompl.choices import ProofMode, one_of
 from rrtik_ompl.errors import InputError, ProblemError, require
 from rrtik_ompl.fast.threads import in_threads
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_options import is_safe
-from rrtik_ompl.planning import RESTARTS, plan
+from rrtik_ompl.planning import PROOF_MODES, RESTARTS, plan
 from rrtik_ompl.planning.batches import Query, plans_together
 from rrtik_ompl.planning.outcome import Plan
 from rrtik_ompl.problem import Problem
@@ -68,9 +68,11 @@ def plan_many(
         [True, True, True]
     """
     require(world, World, "world of plan_many", "use World(robot, scene)")
+    one_of(PROOF_MODES, proof, "proof")
+    require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
     dof = world.robot.dof
     wanted = _goals(goals, dof)
-    rows = finite_array(starts, (dof,) if np.ndim(starts) == 1 else (None, dof), "starts")
+    rows = finite_array(starts, (dof,) if dimensions(starts) == 1 else (None, dof), "starts")
     rows = np.broadcast_to(rows, (len(wanted), dof)) if rows.ndim == 1 else rows
     if len(rows) != len(wanted):
         raise InputError(f"plan_many: as many starts as goals are needed, got {len(rows)} and {len(wanted)}")

@@ -79,7 +79,7 @@ def _robot(name: FilePath, request: RequestMessage) -> Robot:
     if Path(name).suffix.lower() == ".urdf":
         semantics = Path(name).with_suffix(".srdf")
         joints = [c.joint_name for c in request.goal_constraints[0].joint_constraints]
-        if semantics.is_file():
+        if os.path.isfile(semantics):
             options = {"srdf": str(semantics), "group": request.group_name}
         elif joints:
             options = {"joints": joints}

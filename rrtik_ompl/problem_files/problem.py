@@ -121,7 +121,7 @@ def _is_motion_bench_maker(data: Mapping[str, Any]) -> bool:
 
 def _read(path: Path) -> YamlDocument:
     """The content of a problem file; whoever names a path alone is told what is missing."""
-    document = None if path.suffix.lower() in ONLY_PATHS and path.is_file() else read_yaml(path)
+    document = None if path.suffix.lower() in ONLY_PATHS and os.path.isfile(path) else read_yaml(path)
     if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
         name = path.name
         raise InputError(f"{path}: a path, not a problem; name its problem before it: rrtik check PROBLEM {name}")

@@ -10,9 +10,9 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen, positive, whole_number
 from rrtik_ompl.copies import as_value, in_one_line
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, at_most
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.text import known_ending, write_bytes, write_text
 
@@ -80,6 +80,8 @@ class ReachMap:
 
     def centres(self, axis: int) -> Vector:
         """Middles of the cells along an axis, shape (n,) [m]."""
+        axis = whole_number(axis, "axis of a reachability map")
+        at_most(axis, 2, "axis of a reachability map", "0 is x, 1 is y, 2 is z")
         middles: Vector = self.corner[axis] + self.size * (np.arange(self.values.shape[axis]) + 0.5)
         return middles
 

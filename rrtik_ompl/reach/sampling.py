@@ -10,7 +10,8 @@ from collections.abc import Callable
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen, positive, whole_number
-from rrtik_ompl.errors import InputError, UnknownNameError, at_most
+from rrtik_ompl.choices import one_of
+from rrtik_ompl.errors import InputError, at_most
 from rrtik_ompl.reach.grid_map import ReachMap
 from rrtik_ompl.reach.measures import MEASURES
 from rrtik_ompl.robot import Robot
@@ -62,11 +63,10 @@ def reach_map(
         ('orientations', 3)
     """
     check_world(world, robot)
-    if measure not in MEASURES:
-        raise UnknownNameError("measure of reach", measure, MEASURES)
-    axis = axis or ("x" if robot.planar else "z")
-    if axis not in ("x", "y", "z"):
-        raise InputError(f"axis must be x, y or z, got {axis!r}")
+    measure = one_of(MEASURES, measure, "measure of reach")
+    axis = ("x" if robot.planar else "z") if axis is None else axis
+    if not isinstance(axis, str) or axis not in ("x", "y", "z"):
+        raise InputError(f"axis must be x, y or z, got {axis!r:.80}")
     count = whole_number(samples, "samples", 1)
     at_most(count, MOST_SAMPLES, "samples")
     rng = np.random.default_rng(whole_number(seed, "seed"))
@@ -124,6 +124,8 @@ def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float
     rng = np.random.default_rng(0)
     tips = robot.fk_batch(rng.uniform(*robot.finite_range(), (PROBE, robot.dof)))[:, :3, 3] - base
     reach = PROBE_MARGIN * float(np.linalg.norm(tips, axis=1).max())
+    if reach == 0.0:
+        raise InputError(f"robot '{robot.name}': no joint moves its tip, so there is nothing to map; name another tip")
     size = reach / CELLS if cell is None else positive(cell, "cell")
     margin = 0.5 * (PROBE_MARGIN - 1.0) * reach
     low, high = (np.floor if k == 0 else np.ceil for k in (0, 1))

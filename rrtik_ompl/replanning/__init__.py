@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from rrtik_ompl.arrays import positive
 from rrtik_ompl.choices import Replanner
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import called, require
 from rrtik_ompl.files.text import check_target, file_name
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.drrt_con import DrrtCon
@@ -119,10 +119,9 @@ def replan_with(
     """
     require(settings, ReplanSettings, "settings", "use ReplanSettings(step=..., rate=...)")
     require(problem, Problem, "problem to replan", "use Problem(world, start, goal) or load_scenario(name)")
-    if goal_feed is not None and not callable(goal_feed):
-        raise InputError(f"goal_feed: expected a function of time [s], got {type(goal_feed).__name__}")
-    if not callable(clock):
-        raise InputError(f"clock: expected a function that gives a time [s], got {type(clock).__name__}")
+    if goal_feed is not None:
+        called(goal_feed, "goal_feed", "time [s]")
+    called(clock, "clock")
     if record is not None:
         check_target(file_name(record), (".json",))
     source = problem.world.scene if scene_feed is None else scene_feed

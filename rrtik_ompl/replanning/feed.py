@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.extent import farthest
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, called, require
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import same_shape
 
@@ -40,8 +40,9 @@ def feed_of(source: Source) -> Feed:
     if isinstance(source, Scene):
         return source.at
     if callable(source):
+        called(source, "scene feed", "time [s]")
         return _checked(source)
-    if isinstance(source, Iterable):
+    if isinstance(source, Iterable) and getattr(source, "ndim", 1) > 0:
         return Stream(source)
     raise InputError(f"scene feed: expected a scene, a function of time or pairs, got {type(source).__name__}")
 

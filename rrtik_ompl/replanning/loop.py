@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector
+from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_number
 from rrtik_ompl.choices import TickEvent
 from rrtik_ompl.goal import JOINT_TOLERANCE
 from rrtik_ompl.poses import pose_row
@@ -46,7 +46,7 @@ class Loop:
         goal_feed: GoalFeed | None,
         clock: Clock = time.perf_counter,
     ) -> None:
-        self._clock = clock
+        self._clock: Clock = lambda: finite_number(clock(), "clock: what it gives")
         robot, scene = problem.robot, feed(0.0)
         self._problem, self._feed, self._settings, self._goal_feed = problem, feed, settings, goal_feed
         first = problem.world.with_accuracy("exact").with_scene(scene)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.arrays import TAU, Vector, not_negative, positive, whole_number
-from rrtik_ompl.choices import Replanner
-from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.choices import Replanner, one_of
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.fast.search.connect_lengths import connect_lengths
 from rrtik_ompl.problem_files.run import RENAMED
 from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts
@@ -70,8 +70,7 @@ class ReplanSettings:
     def __post_init__(self) -> None:
         if self.limits is not None:
             require(self.limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
-        if self.planner not in PLANNERS:
-            raise UnknownNameError("replanner", str(self.planner), PLANNERS)
+        one_of(PLANNERS, self.planner, "replanner")
         rate = positive(self.rate, "rate", "give ticks a second, such as 50")
         if rate > MAX_RATE:
             raise InputError(f"rate must be {MAX_RATE:g} Hz or less, got {rate:g}")

@@ -11,9 +11,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_array, positive, whole_number
+from rrtik_ompl.arrays import TAU, Matrix, Vector, filled_rows, finite_array, positive, whole_number
 from rrtik_ompl.collision.digests import robot_digest, world_digest
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, called, require
 from rrtik_ompl.fast.search.roadmap.graph import KernelGraph
 from rrtik_ompl.fast.search.roadmap.layout import BLOCKED, KERNELS, UNKNOWN
 from rrtik_ompl.files.named_arrays import NamedArrays
@@ -182,6 +182,8 @@ class Roadmap:
 
         Joints without limits are turned by whole turns, so that the first start lies on the roadmap.
         """
+        called(stop, "stop of a roadmap")
+        starts, goals = (filled_rows(rows, self.world.robot.dof, "ends of a route") for rows in (starts, goals))
         turns = self._turns(starts[0])
         if not turns.any():
             return self.graph.route(starts, goals, stop)
@@ -194,7 +196,8 @@ class Roadmap:
 
     def learn(self, path: Matrix) -> None:
         """Make a free path, shape (k, dof), part of the roadmap, as far as it lies in its box."""
-        self.graph.learn(path - self._turns(path[0]))
+        rows = filled_rows(path, self.world.robot.dof, "path to learn")
+        self.graph.learn(rows - self._turns(rows[0]))
 
     def _turns(self, start: Vector) -> Vector:
         """The whole turns of joints without limits that lie between the roadmap and a configuration, shape (dof,)."""

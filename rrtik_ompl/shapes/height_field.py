@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import LARGEST, Matrix, frozen, length, number_rows, positive, whole_number
+from rrtik_ompl.arrays import LARGEST, Matrix, finite_number, frozen, length, number_rows, positive, whole_number
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.shapes.box_pile import BoxPile, few_enough, merged
@@ -84,7 +84,7 @@ class HeightField(BoxPile):
             raise InputError(f"{what}: {highest:g} m is too far away; check their unit")
         rows = np.where(finite, rows, np.nan)
         side, lowest = length(cell, f"{what}: cell"), float(np.nanmin(rows))
-        bottom = lowest - side if floor is None else float(floor)
+        bottom = lowest - side if floor is None else finite_number(floor, f"{what}: floor")
         if not bottom < lowest:
             raise InputError(f"{what}: floor must be below the lowest height of {lowest:g} m, got {bottom:g}")
         object.__setattr__(self, "heights", frozen(rows))
@@ -111,7 +111,7 @@ class HeightField(BoxPile):
         )
 
     def coarser(self, factor: int) -> HeightField:
-        """Cells that are so many times as wide, each as high as the highest of those in it.
+        """Cells that are so many times as wide, the whole grid at most, each as high as the highest of those in it.
 
         Raises:
             InputError: If the factor is no whole number of at least 1.
@@ -120,7 +120,7 @@ class HeightField(BoxPile):
             >>> rrtik.HeightField([[0.0, 0.2], [0.1, 0.3]], cell=0.5).coarser(2).heights
             array([[0.3]])
         """
-        step = whole_number(factor, "factor of a coarser grid", 1)
+        step = min(whole_number(factor, "factor of a coarser grid", 1), max(self.heights.shape))
         grown = np.pad(self.heights, [(0, -size % step) for size in self.heights.shape], constant_values=np.nan)
         blocks = grown.reshape(grown.shape[0] // step, step, -1, step)
         highest = np.where(np.isnan(blocks), -np.inf, blocks).max(axis=(1, 3))

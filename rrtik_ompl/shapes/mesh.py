@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, bounded_array, distinct, finite_array, frozen, number_rows, positive
+from rrtik_ompl.arrays import Matrix, bounded_array, dimensions, distinct, finite_array, frozen, number_rows, positive
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.shapes.shape import Shape
@@ -50,7 +50,7 @@ class Mesh(Shape):
         what = f"mesh {source}" if source else "mesh"
         points = bounded_array(vertices, (None, 3), f"{what}: vertices")
         rows = number_rows(triangles, f"{what}: triangles")
-        if np.ndim(triangles) != 2 or rows.shape[1] != 3 or len(rows) == 0:
+        if dimensions(triangles) != 2 or rows.shape[1] != 3 or len(rows) == 0:
             raise InputError(f"{what}: needs at least one triangle (three vertex numbers each); export it triangulated")
         at_most(len(rows), MOST_TRIANGLES, f"{what}: triangles", "simplify it")
         numbers = finite_array(rows, (None, 3), f"{what}: triangles")

@@ -9,7 +9,18 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import LARGEST, Mask, Vector, bounded_array, frozen, length, not_negative, number_rows, positive
+from rrtik_ompl.arrays import (
+    LARGEST,
+    Mask,
+    Vector,
+    bounded_array,
+    frozen,
+    length,
+    not_negative,
+    number_rows,
+    positive,
+    truths,
+)
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import CloudWarning, InputError, at_most, require
 from rrtik_ompl.shapes.point_tree import PointTree, extremes, point_tree
@@ -178,6 +189,9 @@ class PointCloud(_Kept, Shape):
         Raises:
             InputError: If none is left.
         """
+        chosen = truths(chosen, f"{what}: points to keep")
+        if len(chosen) != len(self.points):
+            raise InputError(f"{what}: there are {len(self.points)} points, but the mask has {len(chosen)}")
         if not chosen.any():
             raise InputError(f"{what}: none of the {len(self.points)} points is left; leave the obstacle out")
         return self if chosen.all() else PointCloud(self.points[chosen], self.radius)
@@ -185,7 +199,7 @@ class PointCloud(_Kept, Shape):
 
 def known_choice(invalid: Invalid, what: str) -> None:
     """Refuse what does not say whether numbers that are not finite are refused or dropped."""
-    if invalid not in ("refuse", "drop"):
+    if not isinstance(invalid, str) or invalid not in ("refuse", "drop"):
         raise InputError(f"{what}: invalid must be 'refuse' or 'drop', got {invalid!r}")
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix, positive, whole_number
 from rrtik_ompl.choices import ShorteningMethod, one_of
 from rrtik_ompl.description.joint_weights import weights_of
-from rrtik_ompl.errors import InputError, PathWarning, require
+from rrtik_ompl.errors import InputError, PathWarning, called, require
 from rrtik_ompl.moves.axis_cut import double_axis_cut
 from rrtik_ompl.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.moves.rules import MoveRules
@@ -163,6 +163,12 @@ def shorten(
     """
     require(path, JointPath, "path to shorten", "a plan has one if plan.found")
     require(rules, MoveRules | None, "rules of a path to shorten")
+    require(one_joint, bool | None, "one_joint")
+    require(method, str, "shortening method", "such as 'auto'")
+    if on_better is not None:
+        called(on_better, "on_better", "a path")
+    if stop is not None:
+        called(stop, "stop")
     single = _single(path, method, one_joint) or rules is not None
     chosen = _checked(path, problem, method, seconds, checks, seed, single, clearance)
     head, tail = _parts(path.waypoints, rules)

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.catalog import robot_from_entry
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.sections import Name, NotNegative, Numbers, Positive, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name, known_ending, write_text
@@ -68,6 +68,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
         True
     """
     known_ending(file, (".json",), "task plan")
+    require(plan, TaskPlan, "plan of a task", "use Task(stages).plan(world, start)")
     if not plan.paths:
         raise InputError("task plan: it has no motion to save" + (f": {plan.reason}" if plan.reason else ""))
     folder = file_name(file).parent

@@ -94,6 +94,7 @@ class Straight:
 
     def goal(self, tip: pin.SE3) -> pin.SE3:
         """The pose at the end for a pose of the tip at the beginning (SE3)."""
+        require(tip, pin.SE3, "pose of the tip", "use robot.fk(q)")
         if self.by is not None:
             shift = tip.rotation @ self.by if self.frame == "tip" else self.by
             return pin.SE3(tip.rotation, tip.translation + shift)

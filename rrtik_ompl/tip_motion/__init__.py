@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, dimensions, not_negative, positive, whole_number
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import InputError, listed, require
 from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.path import JointPath
@@ -214,7 +214,7 @@ def linear(
 
     def rails(begin: pin.SE3) -> list[Rail]:
         stations = [begin]
-        for k, each in enumerate(poses):
+        for k, each in enumerate(listed(poses, "poses")):
             stations.append(_goal(each, stations[-1], f"poses[{k}]"))
         if len(stations) < 2:
             raise InputError("poses: a motion of the tip needs at least one pose to go to")

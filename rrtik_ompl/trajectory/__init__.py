@@ -89,6 +89,7 @@ def time_parameterize(
         True
     """
     require(path, JointPath, "path to time", "a plan has one if plan.found")
+    require(world, World | None, "world", "use World(robot, scene)")
     bounds = RateLimits.of(limits) if isinstance(limits, Robot) else limits
     require(bounds, RateLimits, "limits of a path to time", "use RateLimits.of(robot)")
     bounds = bounds.for_joints(path.waypoints.shape[1])
@@ -99,7 +100,7 @@ def time_parameterize(
     if clearance is not None:
         not_negative(clearance, "clearance")
     arm = limits if isinstance(limits, Robot) else None if world is None else world.robot
-    wanted = (tip_speed, tip_acceleration, torque, payload or None)
+    wanted = (tip_speed, tip_acceleration, torque, not_negative(payload, "payload") or None)
     more = None
     if any(option is not None for option in wanted):
         more = DynamicLimits.of(

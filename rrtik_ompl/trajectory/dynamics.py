@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, not_negative, positive
+from rrtik_ompl.arrays import Matrix, Vector, dimensions, finite_array, not_negative, positive
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.timing.reference import Rows
 from rrtik_ompl.poses import working_memory
@@ -206,7 +206,7 @@ def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
             )
         return own
     given: Any = torque
-    row = finite_array(given, () if np.ndim(given) == 0 else (robot.dof,), f"torque limits of robot '{robot.name}'")
+    row = finite_array(given, () if dimensions(given) == 0 else (robot.dof,), f"torque limits of robot '{robot.name}'")
     if (row <= 0.0).any():
         raise InputError(f"torque limits: expected numbers greater than 0, got {np.min(row):g}")
     return np.broadcast_to(row, (robot.dof,)).astype(np.float64)

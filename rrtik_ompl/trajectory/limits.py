@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.arrays import Matrix, Vector, dimensions, finite_array, frozen, number_rows, whole_number
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.robot import Robot
@@ -95,11 +95,25 @@ class RateLimits:
         return cls(part * v, part * a, part * j)
 
     def along(self, directions: Matrix) -> tuple[Vector, Vector, Vector]:
-        """Limits of the speed along straight lines, its acceleration and jerk, for directions of shape (m, n)."""
+        """Limits of the speed along straight lines, its acceleration and jerk, for directions of shape (m, n).
+
+        Raises:
+            InputError: If these are no such rows, or of another number of joints.
+        """
+        directions = finite_array(directions, (None, None), "directions")
+        self._fits(directions.shape[1])
         with np.errstate(divide="ignore", over="ignore"):
             steep = 1.0 / np.abs(directions)
-            v, a, j = ((row * steep).min(axis=1) for row in (self.velocity, self.acceleration, self.jerk))
+            v, a, j = (
+                (row * steep).min(axis=1, initial=np.inf) for row in (self.velocity, self.acceleration, self.jerk)
+            )
         return v, a, j
+
+    def _fits(self, count: int) -> None:
+        """Refuse a number of joints that the limits are not for."""
+        if len(self.velocity) not in (1, count):
+            given = len(self.velocity)
+            raise InputError(f"limits: there are {count} joints, but limits for {given}; give one, or one a joint")
 
     def for_joints(self, count: int) -> RateLimits:
         """The same limits for so many joints: limits of one number each are those of all joints.
@@ -107,17 +121,23 @@ class RateLimits:
         Raises:
             InputError: If they are for another number of joints.
         """
-        if len(self.velocity) not in (1, count):
-            given = len(self.velocity)
-            raise InputError(f"limits: there are {count} joints, but limits for {given}; give one, or one a joint")
+        self._fits(whole_number(count, "number of joints", 1))
         return RateLimits(*(np.broadcast_to(row, (count,)) for row in (self.velocity, self.acceleration, self.jerk)))
 
     def slowing(self, velocity: Vector, acceleration: Vector, jerk: Vector | None = None) -> float:
-        """Factor by which a motion with these peaks must be slowed to keep the limits; 1 if it keeps them already."""
-        shares = [(velocity / self.velocity).max(), (acceleration / self.acceleration).max()]
-        if jerk is not None:
-            limited = np.isfinite(self.jerk)
-            shares.append((jerk[limited] / self.jerk[limited]).max(initial=0.0))
+        """Factor by which a motion with these peaks must be slowed to keep the limits; 1 if it keeps them already.
+
+        Raises:
+            InputError: If these are not one number a joint.
+        """
+        shares = []
+        peaks = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+        for (name, peak), limit in zip(peaks.items(), (self.velocity, self.acceleration, self.jerk), strict=True):
+            if peak is not None or name != "jerk":
+                row = number_rows(np.nan if peak is None else peak, f"peaks of {name}").reshape(-1)
+                self._fits(len(row))
+                kept = finite_array(np.where(np.isfinite(limit), row, 0.0), (None,), f"peaks of {name}")
+                shares.append((kept / limit).max(initial=0.0))
         factors = [float(share) ** (1.0 / power) for power, share in enumerate(shares, start=1)]
         return 1.0 if max(shares) <= 1.0 else max(factors) * ROUNDING_MARGIN
 
@@ -140,13 +160,11 @@ def default_words(robot: Robot, given: Collection[str] = ()) -> str:
 
 def _row(values: ArrayLike, name: str) -> Vector:
     """Positive numbers, infinity allowed, shape (n,) or (1,)."""
-    try:
-        row = np.atleast_1d(np.asarray(values))
-    except ValueError:  # lists of unequal lengths
-        row = np.empty((1, 0))
-    if row.ndim != 1 or row.size == 0 or row.dtype.kind not in "iuf" or not (row > 0.0).all():
-        raise InputError(f"{name} limits: expected numbers greater than 0, one per joint, got {str(row.tolist())[:60]}")
-    return row.astype(np.float64)
+    row: Vector = number_rows(values, f"{name} limits").reshape(-1)
+    if dimensions(values) > 1 or row.size == 0 or not (row > 0.0).all():
+        shown = str(row[:20].tolist())[:60]
+        raise InputError(f"{name} limits: expected numbers greater than 0, one per joint, got {shown}")
+    return row
 
 
 def _of_robot(robot: Robot, given: ArrayLike | None, name: str, own: Vector, default: Vector) -> Vector:

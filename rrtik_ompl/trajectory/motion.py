@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, places, positive
 from rrtik_ompl.copies import as_value, in_notebook
 from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.files.text import write_text
@@ -183,7 +183,7 @@ class Trajectory:
     def at_set_points(self, knots: NDArray[np.int64]) -> Trajectory:
         """The same motion, known at these knots alone: limits are judged there."""
         found = Trajectory(self.times, self.positions, self.velocities, self.accelerations, **self._names())
-        object.__setattr__(found, "set_points", frozen(knots, np.int64))
+        object.__setattr__(found, "set_points", frozen(places(knots, len(self.times), "set points"), np.int64))
         return found
 
     def path(self) -> JointPath:
@@ -263,8 +263,8 @@ class Trajectory:
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        ending = written_ending(file)
-        at = slice(None) if self.set_points is None else self.set_points
+        require(accelerations, bool, "accelerations of a file")
+        ending, at = written_ending(file), slice(None) if self.set_points is None else self.set_points
         state = State(self.positions[at], self.velocities[at], self.accelerations[at])
         clock, state = (self.times[at], state) if rate is None else self.sampled(rate)
         columns = [(column + 0.0).tolist() for column in (clock, *state)]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, called, require
 from rrtik_ompl.files.text import write_text
 
 if TYPE_CHECKING:
@@ -78,6 +78,8 @@ def view(
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
 
+    called(on_ready, "on_ready", "an address")
+    require(title, str | None, "title of a page")
     text = page(shown, path, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still)
     if html is not None:
         write_text(html, text)

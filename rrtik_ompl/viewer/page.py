@@ -15,7 +15,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, listed
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.tasks import TaskPlan
@@ -84,7 +84,8 @@ def page(
     if isinstance(path, TaskPlan):
         subject = subject_of_task(shown, path)
     else:
-        subject = subject_of(shown, path, before, ghosts, tuple(marks)) if run is None else subject_of_run(shown, run)
+        more = listed(marks, "marks")
+        subject = subject_of(shown, path, before, ghosts, more) if run is None else subject_of_run(shown, run)
     recording, frame = draw(subject)
     heading = _title(subject) if title is None else title
     told = story_of(subject, frame, heading)

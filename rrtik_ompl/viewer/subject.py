@@ -127,6 +127,13 @@ FRAME_RATE = 30.0  # [1/s] of a timed motion
 MOST_FRAMES = 900
 
 
+def _drawn(marks: tuple[Mark, ...]) -> tuple[Mark, ...]:
+    """The marks that have something to draw."""
+    for mark in marks:
+        require(mark, Mark, "mark of a view", "see rrtik_ompl.viewer.drawing.marks")
+    return tuple(mark for mark in marks if len(mark.faces))
+
+
 def subject_of(
     shown: Showable,
     path: ShownPath | None = None,
@@ -149,7 +156,7 @@ def subject_of(
     """
     if before is not None and path is None:
         raise InputError("view: there is a path before, but none after it; give the path to show too")
-    marks = tuple(mark for mark in marks if len(mark.faces))
+    marks = _drawn(marks)
     if isinstance(shown, Scene):
         if path is not None or ghosts is not None:
             raise InputError("view: a path needs a robot; show a problem, a world or a robot instead of a scene alone")

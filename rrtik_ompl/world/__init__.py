@@ -5,12 +5,13 @@ from __future__ import annotations
 import copy
 import warnings
 from dataclasses import replace
+from functools import partial
 from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, finite_array, not_negative, positive
+from rrtik_ompl.arrays import MOST_NUMBERS, Mask, Matrix, finite_array, in_blocks, not_negative, positive
 from rrtik_ompl.choices import Accuracy, one_of
 from rrtik_ompl.collision.bodies import by_motion, colliding_pairs, link_bodies, scene_bodies
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
@@ -184,7 +185,7 @@ class World(Rebuilt):
         Raises:
             InputError: If Q has the wrong shape or a value that is not finite.
         """
-        return self._free(self._rows(Q, 2))
+        return in_blocks(self._free, self._rows(Q, 2))
 
     def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether the straight motion from a to b, shape (dof,) each, is valid; the same answer from b to a."""
@@ -192,7 +193,7 @@ class World(Rebuilt):
 
     def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
         """Which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
-        return self._motions_free(*self._both_ends(A, B))
+        return in_blocks(self._motions_free, *self._both_ends(A, B))
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
@@ -203,7 +204,8 @@ class World(Rebuilt):
 
         ``clearance`` [m] is kept from every obstacle on top of its margin. What grazes an obstacle cannot be proven.
         """
-        return self.prover.proven(*self._both_ends(A, B), clearance=not_negative(clearance, "clearance"))
+        proven = partial(self.prover.proven, clearance=not_negative(clearance, "clearance"))
+        return in_blocks(proven, *self._both_ends(A, B))
 
     def prove(
         self, waypoints: ArrayLike, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None
@@ -274,11 +276,11 @@ class World(Rebuilt):
 
     def _rows(self, Q: ArrayLike, dimensions: int) -> Matrix:
         """Checked configurations as rows, shape (m, dof)."""
-        rows = np.asarray(Q, dtype=np.float64) if isinstance(Q, np.ndarray) and Q.dtype.kind in "fiub" else None
+        plain = isinstance(Q, np.ndarray) and Q.dtype.kind in "fiu" and Q.size <= MOST_NUMBERS
+        rows = np.asarray(Q, dtype=np.float64) if plain else None
         if rows is None or rows.ndim != dimensions or rows.shape[-1] != self.robot.dof or not np.isfinite(rows).all():
-            if dimensions == 1:
-                return self.robot.configuration(Q)[None]
-            rows = finite_array(Q, (None, self.robot.dof), f"configurations of robot '{self.robot.name}'")
+            what = f"configurations of robot '{self.robot.name}'"
+            rows = self.robot.configuration(Q) if dimensions == 1 else finite_array(Q, (None, self.robot.dof), what)
         return np.atleast_2d(rows)
 
     def _free(self, rows: Matrix) -> Mask:

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, not_negative
+from rrtik_ompl.arrays import Mask, Matrix, bounded_array, not_negative
 from rrtik_ompl.collision.bodies import Body, link_bodies, scene_bodies
 from rrtik_ompl.collision.cloud_solid import cloud_gap, cloud_solid
 from rrtik_ompl.errors import require
@@ -51,7 +51,9 @@ def without_robot(
     """
     require(cloud, PointCloud, "cloud")
     require(robot, Robot, "robot", "use load_robot(name or file)")
-    kept, place = not_negative(margin, "margin"), pin.SE3.Identity() if pose is None else rigid(pose, "pose of a cloud")
+    require(scene, Scene | None, "scene", "use Scene(obstacles, attached)")
+    kept = not_negative(bounded_array(margin, (), "margin"), "margin")
+    place = pin.SE3.Identity() if pose is None else rigid(pose, "pose of a cloud")
     frames = robot.joint_frames(robot.configuration(q)[None])[0]
     held = [] if scene is None else [body for body in scene_bodies(robot, scene) if body.kind == "attached"]
     bodies = (*link_bodies(robot), *held)

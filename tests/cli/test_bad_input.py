@@ -386,3 +386,10 @@ def test_the_api_raises_one_line_of_ours(call, fragments):
 
 def test_the_table_is_long_enough():
     assert len(COMMAND_LINE) + len(API) >= 60
+
+
+def test_letters_that_steer_a_terminal_are_spelt_out_in_every_line(capsys):
+    assert run(["plan", "planar3_a", "--proof", "\x1b[2J"]) == 2
+    said = capsys.readouterr().err
+    assert "\\x1b[2J" in said
+    assert said.rstrip("\n").isprintable()

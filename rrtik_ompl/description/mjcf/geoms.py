@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -89,7 +90,7 @@ def meshes_of(root: Element, settings: Settings, folder: Path, where: str) -> di
             raise InputError(f"{where}: mesh {path.name} has a scale of 0; every axis needs another number")
         if path.suffix.lower() not in MESH_SUFFIXES:
             raise InputError(f"{where}: mesh {path.name} is of no kind that can be read; export it as STL or OBJ")
-        if not path.is_file():
+        if not os.path.isfile(path):
             raise MissingFileError(f"{where}: mesh file '{path}' does not exist; check meshdir and the name")
         reference = Element("mesh", {"pos": mesh.get("refpos", "0 0 0"), "quat": mesh.get("refquat", "1 0 0 0")})
         back = settings.placement(reference, where).inverse()

@@ -48,8 +48,8 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
         InputError: See :func:`robot_from_moveit`.
     """
     home = Path(folder)
-    config = home / "config" if (home / "config").is_dir() else home
-    if not config.is_dir():
+    config = home / "config" if os.path.isdir(home / "config") else home
+    if not os.path.isdir(config):
         raise InputError(f"{folder}: no such folder; give a MoveIt configuration folder")
     packages = package_roots(given.get("packages", ()))
     named = _assistant(home, config)
@@ -57,7 +57,7 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
     urdf = given.get("urdf") or _urdf(home, config, named, packages)
     found: dict[str, Any] = {"urdf": Path(urdf), "srdf": Path(srdf)}
     limits = given.get("joint_limits") or config / "joint_limits.yaml"
-    if given.get("joint_limits") or Path(limits).is_file():
+    if given.get("joint_limits") or os.path.isfile(limits):
         found["joint_limits"] = Path(limits)
     if given.get("group") is None and given.get("joints") is None:
         found["group"] = _group(home, config, found, packages, given.get("xacro_args"))
@@ -66,7 +66,7 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
 
 def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
     """What the setup assistant wrote about the URDF and the SRDF: ``{"urdf": {..}, "srdf": {..}}``."""
-    file = next((each for each in (home / ASSISTANT, config.parent / ASSISTANT) if each.is_file()), None)
+    file = next((each for each in (home / ASSISTANT, config.parent / ASSISTANT) if os.path.isfile(each)), None)
     if file is None:
         return {}
     document = read_yaml(file)
@@ -78,7 +78,7 @@ def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
 
 def _srdf(home: Path, config: Path, named: Mapping[str, Any]) -> Path:
     relative = named.get("srdf", {}).get("relative_path")
-    if isinstance(relative, str) and (home / relative).is_file():
+    if isinstance(relative, str) and os.path.isfile(home / relative):
         return home / relative
     return _only(config, ("*.srdf", "*.srdf.xacro"), "SRDF", "srdf") or _missing(config, "SRDF", "srdf")
 
@@ -89,7 +89,7 @@ def _urdf(home: Path, config: Path, named: Mapping[str, Any], packages: Iterable
         return own
     package, relative = (named.get("urdf", {}).get(key) for key in ("package", "relative_path"))
     where = package_folder(package, home.resolve(), packages) if isinstance(package, str) else None
-    if where is not None and isinstance(relative, str) and (where / relative).is_file():
+    if where is not None and isinstance(relative, str) and os.path.isfile(where / relative):
         return where / relative
     own = _only(config, ("*.urdf.xacro",), "URDF", "urdf")
     if own is None and isinstance(package, str):
@@ -136,7 +136,7 @@ def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Pa
 def _solved(config: Path, semantics: Srdf) -> set[str]:
     """Groups for which ``kinematics.yaml`` names a solver."""
     file = config / "kinematics.yaml"
-    if not file.is_file():
+    if not os.path.isfile(file):
         return set()
     document = read_yaml(file)
     top, found = parameters(document, "robot_description_kinematics")

@@ -14,11 +14,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, at_most
 from rrtik_ompl.files.text import write_bytes
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 VIDEO_ENDINGS = (".mp4", ".avi", ".webm", ".mkv", ".mov", ".m4v")
+MOST_CAMERAS = 1_000_000  # their numbers, which OpenCV also adds hundreds to
 MAX_FILE_BYTES = 512 * 1024 * 1024
 
 
@@ -44,7 +45,7 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     file = Path(path)
     try:
         size = file.stat().st_size
-        if not file.is_file() or size > MAX_FILE_BYTES:
+        if not os.path.isfile(file) or size > MAX_FILE_BYTES:
             raise InputError(f"{path}: is not an image file of at most 512 MiB")
         data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
     except OSError as error:
@@ -84,7 +85,7 @@ def pictures_from(source: str | os.PathLike[str] | int) -> Iterator[Picture]:
         yield from _device(int(str(source)))
         return
     path = Path(source)
-    if path.is_dir():
+    if os.path.isdir(path):
         files = sorted(f for f in path.iterdir() if f.suffix.lower() in IMAGE_ENDINGS)
         if not files:
             raise InputError(f"{source}: no images in this folder; they end in {', '.join(IMAGE_ENDINGS)}")
@@ -100,7 +101,7 @@ class CameraLostError(InputError):
 
 
 def _video(path: Path) -> Iterator[Picture]:
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InputError(f"{path}: no such file; check the name")
     with _opened(str(path)) as capture:
         if not capture.isOpened():
@@ -115,6 +116,7 @@ def _video(path: Path) -> Iterator[Picture]:
 
 
 def _device(number: int) -> Iterator[Picture]:
+    at_most(number, MOST_CAMERAS, "number of a camera")
     with _opened(number) as capture:
         if not capture.isOpened():
             raise InputError(f"camera {number} cannot be opened; is it plugged in, free, and yours to read?")

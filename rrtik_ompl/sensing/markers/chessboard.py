@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.arrays import LARGEST, Matrix, frozen
 from rrtik_ompl.errors import InputError
 
+SMALLEST_SIDE = 1e-6  # [m] of a square or a marker
 PIECE = 2  # squares along a side
 
 
@@ -35,7 +36,7 @@ class Chessboard:
     square: float
 
     def __post_init__(self) -> None:
-        if self.columns < 4 or self.rows < 4 or not self.square > 0.0:
+        if self.columns < 4 or self.rows < 4 or not SMALLEST_SIDE <= self.square <= LARGEST:
             raise InputError(
                 f"a chessboard has at least 4 x 4 squares of a positive side, got {self.columns} x {self.rows} "
                 f"of {self.square:g} m; squares are counted, not the corners between them"
@@ -50,7 +51,11 @@ class Chessboard:
     def corners(self, gray: NDArray[np.uint8]) -> tuple[Matrix, Matrix]:
         """Points on the board [m], shape (k, 3), and their pixels, shape (k, 2); none if the board is not found."""
         pattern = (self.columns - 1, self.rows - 1)
-        found, pixels = cv2.findChessboardCornersSB(gray, pattern, flags=cv2.CALIB_CB_ACCURACY)
+        try:
+            found, pixels = cv2.findChessboardCornersSB(gray, pattern, flags=cv2.CALIB_CB_ACCURACY)
+        except cv2.error:  # its copies take more memory than there is
+            size = " x ".join(map(str, gray.shape[::-1]))
+            raise InputError(f"a picture of {size} pixels is too large to find a chessboard in; scale it") from None
         if not found or pixels is None:
             return np.zeros((0, 3)), np.zeros((0, 2))
         found_at = np.reshape(pixels, (-1, 2)).astype(np.float64)

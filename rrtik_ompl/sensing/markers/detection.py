@@ -14,9 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.arrays import LARGEST, Matrix, frozen
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.sensing.markers.alignment import Look, aligned_corners
+from rrtik_ompl.sensing.markers.chessboard import SMALLEST_SIDE
 
 DICTIONARIES = {
     **{f"{bits}x{bits}_{size}": f"DICT_{bits}X{bits}_{size}" for bits in (4, 5, 6, 7) for size in (50, 100, 250, 1000)},
@@ -173,8 +174,8 @@ def charuco_board(columns: int, rows: int, square: float, marker: float, diction
     Raises:
         InputError: If a side is not positive, a marker does not fit its square, or the dictionary is too small.
     """
-    if columns < 3 or rows < 3 or not 0.0 < marker < square:
-        raise InputError("a board needs at least 3 x 3 squares, and markers smaller than the squares")
+    if columns < 3 or rows < 3 or not SMALLEST_SIDE <= marker < square <= LARGEST:
+        raise InputError("a board needs at least 3 x 3 squares, and markers of 1 um and more, smaller than the squares")
     if columns * rows // 2 > len(_table(dictionary).bytesList):
         raise InputError(f"dictionary {dictionary} has too few markers for a board of {columns} x {rows} squares")
     return cv2.aruco.CharucoBoard((columns, rows), square, marker, _table(dictionary))
