@@ -204,8 +204,8 @@ class World(Rebuilt):
 
         ``clearance`` [m] is kept from every obstacle on top of its margin. What grazes an obstacle cannot be proven.
         """
-        proven = partial(self.prover.proven, clearance=not_negative(clearance, "clearance"))
-        return in_blocks(proven, *self._both_ends(A, B))
+        kept = not_negative(clearance, "clearance")
+        return in_blocks(partial(self.prover.proven, clearance=kept), *self._both_ends(A, B))
 
     def prove(
         self, waypoints: ArrayLike, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None
@@ -276,8 +276,7 @@ class World(Rebuilt):
 
     def _rows(self, Q: ArrayLike, dimensions: int) -> Matrix:
         """Checked configurations as rows, shape (m, dof)."""
-        plain = isinstance(Q, np.ndarray) and Q.dtype.kind in "fiu" and Q.size <= MOST_NUMBERS
-        rows = np.asarray(Q, dtype=np.float64) if plain else None
+        rows = Q if isinstance(Q, np.ndarray) and Q.dtype == np.float64 and Q.size <= MOST_NUMBERS else None
         if rows is None or rows.ndim != dimensions or rows.shape[-1] != self.robot.dof or not np.isfinite(rows).all():
             what = f"configurations of robot '{self.robot.name}'"
             rows = self.robot.configuration(Q) if dimensions == 1 else finite_array(Q, (None, self.robot.dof), what)
