@@ -1,11 +1,12 @@
 """What proofs compare as one at first: bodies of one joint, and obstacles that stand near each other.
 
-A ball and a box around all of them answer for many pairs at once, wherever an arm is far from a part of the scene.
+A ball and a box around all of them answer for many pairs at once, wherever an arm is far from a part of the scene, or a
+gripper from the links that carry it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import TypeAlias
 
@@ -25,30 +26,38 @@ Parts: TypeAlias = Sequence[Sequence[ConvexSolid]]
 
 
 def compared_as_one(
-    bodies: Sequence[Body], parts: Parts, pairs: Sequence[tuple[int, int]], *, fixed: bool
+    bodies: Sequence[Body],
+    parts: Parts,
+    pairs: Sequence[tuple[int, int]],
+    common: Callable[[int, int], int],
+    *,
+    fixed: bool,
 ) -> list[tuple[Members, Levels]]:
-    """Bodies of one joint with one padding, each with blocks of standing bodies that none of them may touch.
+    """Bodies of one joint with one padding, each with blocks of bodies that none of them may touch.
 
-    One that is alone is listed beside many obstacles only.
+    These stand still, or one joint carries them and, by way of others, the first ones. A body that is alone is listed
+    beside many obstacles only.
 
     Args:
         bodies: All bodies.
         parts: The solids of each.
         pairs: Those that must not touch.
+        common: The last joint that carries both of two.
         fixed: Whether obstacles stay where they are; of many, neighbours are blocks then, otherwise each is one.
     """
     movers: dict[tuple[int, float, int], list[int]] = {}
     convex = [all(solid.kind == CONVEX_SOLID for solid in own) for own in parts]
     for i, j in pairs:
-        mover, still = (i, j) if bodies[j].joint == 0 else (j, i)
-        if bodies[still].joint == 0 and convex[mover] and convex[still]:
+        base = common(bodies[i].joint, bodies[j].joint)
+        mover, still = (i, j) if base == bodies[j].joint else (j, i)
+        if base == bodies[still].joint != bodies[mover].joint and convex[mover] and convex[still]:
             movers.setdefault((bodies[mover].joint, bodies[mover].padding, still), []).append(mover)
-    beside: dict[Members, list[int]] = {}
+    beside: dict[tuple[Members, int], list[int]] = {}
     for (_, _, still), members in movers.items():
-        beside.setdefault(tuple(members), []).append(still)
+        beside.setdefault((tuple(members), bodies[still].joint), []).append(still)
     made = list[tuple[Members, Levels]]()
-    for together, stills in beside.items():
-        if fixed and len(stills) >= MANY:
+    for (together, base), stills in beside.items():
+        if fixed and base == 0 and len(stills) >= MANY:
             made.append((together, _blocks(parts, stills)))
         elif len(together) > 1:
             made.append((together, [[(still,) for still in stills]]))
@@ -57,6 +66,7 @@ def compared_as_one(
 
 def group_rows(
     groups: Sequence[tuple[Members, Levels]],
+    joints: Sequence[int],
     ends: Sequence[int],
     sweeps: dict[tuple[Members, int], int],
     begin: int,
@@ -64,7 +74,8 @@ def group_rows(
     """Pairs of several bodies, made of those that begin the table.
 
     Args:
-        groups: Bodies of one joint, each with blocks of obstacles.
+        groups: Bodies of one joint, each with blocks of others.
+        joints: The joint that carries each body.
         ends: The number of each body's solid, and how many there are.
         sweeps: Numbers of the sweeps; those of the groups are added.
         begin: The number of the first of these pairs.
@@ -81,14 +92,15 @@ def group_rows(
         return ends[members[0]] if len(members) == 1 else together.setdefault(members, ends[-1] + len(together))
 
     for members, levels in groups:
-        sweep = sweeps.setdefault((members, 0), len(sweeps))
+        base = joints[levels[0][0][0]]
+        sweep = sweeps.setdefault((members, base), len(sweeps))
         held = range(first, first := first + len(members) * sum(map(len, levels[0])))  # pairs of bodies
         for number, level in enumerate(levels):
             own = range(begin + len(rows), begin + len(rows) + len(level))
             place = held.start
             for block in level:
                 end = min(place + (BLOCK if number else len(members) * len(block)), held.stop)
-                rows.append((solid(members), solid(block), 0, sweep, -1, place, end, members[0], -1, block[0], -1))
+                rows.append((solid(members), solid(block), base, sweep, -1, place, end, members[0], -1, block[0], -1))
                 place = end
             held = own
         top += held

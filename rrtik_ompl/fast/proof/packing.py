@@ -104,7 +104,7 @@ def proof_pairs(
     on = [body.joint for body in bodies]
     common = cache(partial(_common, chain))
     moving = [(i, j) for i, j in pairs if on[i] or on[j]]
-    groups = compared_as_one(bodies, parts, moving, fixed=fixed)
+    groups = compared_as_one(bodies, parts, moving, common, fixed=fixed)
     grouped = {(k, s): None for members, (blocks, *_) in groups for block in blocks for s in block for k in members}
     for i, j in [*grouped, *(pair for pair in moving if pair not in grouped and pair[::-1] not in grouped)]:
         base = common(on[i], on[j])
@@ -122,7 +122,7 @@ def proof_pairs(
         numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
         span = (first, len(of_parts))
         whole.append((ends[one], ends[other], base, *own, *span, one, numbers[0], other, numbers[1]))
-    of_groups, together, top = group_rows(groups, ends, sweeps, len(whole) + len(of_parts))
+    of_groups, together, top = group_rows(groups, on, ends, sweeps, len(whole) + len(of_parts))
     rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 4)
     rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
     top += range(len(grouped), len(whole))
