@@ -63,11 +63,13 @@ def cloud_gap(ends: Ends, margin: float) -> float | None:
     """
     cloud, other, to_other, _ = _sides(ends)
     points, _ = _near(cloud, other, to_other, cloud.radius + margin + LOOK)
-    ball, here, gap = coal.Sphere(cloud.radius), coal.Transform3s(), LOOK
+    ball, here, there, gap = coal.Sphere(cloud.radius), coal.Transform3s(), coal.Transform3s(), LOOK
+    asked = coal.CollisionRequest()
+    asked.security_margin = margin
     for point in points:
-        asked, result = coal.CollisionRequest(), coal.CollisionResult()
-        asked.security_margin = margin
-        if coal.collide(other, here, ball, coal.Transform3s(np.eye(3), point), asked, result):
+        there.setTranslation(point)
+        result = coal.CollisionResult()
+        if coal.collide(other, here, ball, there, asked, result):
             return None
         gap = min(gap, float(result.distance_lower_bound))
     return None if is_mesh(other) and _one_inside(other, points) else gap
@@ -110,7 +112,7 @@ def _sides(ends: Ends) -> tuple[PointCloud, Any, Any, bool]:
 
 
 def _near(cloud: PointCloud, other: Any, to_other: Any, reach: float) -> tuple[Matrix, Vector]:
-    """Points of a cloud within a reach [m] of the other's bounding box, nearest to it first, in the other's frame.
+    """Points of a cloud within a reach [m] of the other's bounding box, deepest inside it first, in the other's frame.
 
     Also their distances from that box.
     """
@@ -119,9 +121,10 @@ def _near(cloud: PointCloud, other: Any, to_other: Any, reach: float) -> tuple[M
     centre = turn.T @ (0.5 * (low + high) - shift)
     half = np.abs(turn.T) @ (0.5 * (high - low)) + reach
     points = cloud.tree.within(centre - half, centre + half).astype(np.float64) @ turn.T + shift
-    away: NDArray[np.float64] = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
+    beyond = np.maximum(low - points, points - high)
+    away: NDArray[np.float64] = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
     kept = np.flatnonzero(away <= reach)
-    kept = kept[np.argsort(away[kept])]
+    kept = kept[np.argsort(away[kept] + np.minimum(beyond[kept].max(axis=1), 0.0))]
     return points[kept], away[kept]
 
 
