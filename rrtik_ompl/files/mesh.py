@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, positive
 from rrtik_ompl.errors import InputError, MeshWarning
+from rrtik_ompl.files.notice import tell_once
 from rrtik_ompl.files.text import file_name, read_bytes
 from rrtik_ompl.shapes import Mesh
 
 SUFFIXES = (".stl", ".obj", ".dae")
 MAX_BYTES = 256 * 1024 * 1024
+LONG_BYTES = 20e6  # of a file that somebody has to wait for
 # In a text: nan, inf, and what overflows float32, in which assimp reads.
 _NOT_FINITE = re.compile(
     rb"[\s>][-+]?(?:(?:nan|inf)(?:inity)?|[0-9.]+e\+?0*(?:[0-9]{3,}|[4-9][0-9]|39)|[0-9]{39,}[0-9.]*)(?=[\s<]|$)",
@@ -55,6 +57,8 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
         raise InputError(f"{path}: the file is empty; export the mesh again")
     if not finite_numbers(data):
         raise InputError(f"{path}: not a usable mesh: it holds numbers that are not finite; export it again")
+    if len(data) > LONG_BYTES:
+        tell_once(f"reading {os.fspath(path)}, {len(data) / 1e6:.0f} MB: about ten seconds for a million triangles")
     vertices, triangles = _read(path, factor * _stated_unit(path, data))
     mesh = Mesh(vertices, triangles, source=os.path.abspath(path), scale=factor)
     if not mesh.closed:

@@ -109,5 +109,5 @@ def _open_edges(faces: NDArray[np.int64]) -> int:
     edges: NDArray[Any] = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     size = int(faces.max()) + 1
     forward, count = np.unique(edges[:, 0] * size + edges[:, 1], return_counts=True)
-    backward = np.unique(edges[:, 1] * size + edges[:, 0])
-    return int((count > 1).sum() + np.setxor1d(forward, backward).size)
+    backward = distinct(edges[:, 1] * size + edges[:, 0])  # numpy hashes such numbers, in ten times the time
+    return int((count > 1).sum() + np.setxor1d(forward, backward, assume_unique=True).size)

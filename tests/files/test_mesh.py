@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, MeshWarning
+from rrtik_ompl.files import mesh as mesh_files
+from rrtik_ompl.files import notice
 from rrtik_ompl.files.mesh import load_mesh
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Mesh
@@ -245,3 +247,13 @@ def test_threads_that_read_meshes_leave_standard_error_alone(tmp_path):
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda _: load_mesh(tmp_path / "a.stl"), range(200)))
     assert os.path.samestat(before, os.fstat(2))
+
+
+def test_who_reads_a_large_mesh_is_told_that_it_takes_long(tmp_path, monkeypatch):
+    told = []
+    monkeypatch.setattr(notice, "listener", told.append)
+    monkeypatch.setattr(mesh_files, "LONG_BYTES", 10)
+    file = tmp_path / "part.stl"
+    file.write_bytes(stl_binary())
+    load_mesh(file)
+    assert told == [f"reading {file}, 0 MB: about ten seconds for a million triangles"]
