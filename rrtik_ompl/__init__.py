@@ -78,6 +78,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.replanning import ReplanRun as ReplanRun
     from rrtik_ompl.replanning import load_run as load_run
     from rrtik_ompl.replanning import replan as replan
+    from rrtik_ompl.replanning.in_time import TimedPlan as TimedPlan
+    from rrtik_ompl.replanning.in_time import plan_in_time as plan_in_time
     from rrtik_ompl.replanning.scenario import Scenario as Scenario
     from rrtik_ompl.replanning.scenario import load_scenario as load_scenario
     from rrtik_ompl.robot import Robot as Robot
@@ -168,6 +170,7 @@ else:
         "reach.sampling": ("reach_map",),
         "replanning": ("ReplanRun", "load_run", "replan"),
         "robot": ("Robot",),
+        "replanning.in_time": ("TimedPlan", "plan_in_time"),
         "replanning.scenario": ("Scenario", "load_scenario"),
         "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses"),
         "problem_files.scene": ("load_scene", "save_scene"),

@@ -9,6 +9,7 @@ from rrtik_bench import (
     drrt_con_scenes,
     ikurt,
     ikurt_limits,
+    in_time,
     reshaping,
     titan4,
     titan4_screws,
@@ -35,7 +36,7 @@ from rrtik_bench.tables import Collection
 
 PAGES = (
     *(titan4, titan4_screws, titan4_tracking, mb_rrt, mb_rrt_beyond, genetic, coding, crdt, ikurt, ikurt_limits),
-    *(drrt_con, drrt_con_scenes, reshaping, shortening),
+    *(drrt_con, drrt_con_scenes, reshaping, in_time, shortening),
     *(sensing, camera_tables, sequences, detections, errata),
 )
 DRAWN = (

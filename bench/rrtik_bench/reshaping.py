@@ -8,10 +8,12 @@ what is hit, the robot's and the goal's not at all.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_bench.drrt_con import FASTEST, REPAIR_SECONDS
 from rrtik_bench.report.rows import Bar, Row, all_of, judged
@@ -108,10 +110,11 @@ class ReshapedLoop(Loop):
         return place
 
 
-def hit_edges(path: Matrix, step: float, motions: MotionQueries) -> tuple[Matrix, Vector]:
+def hit_edges(path: Matrix, step: float, motions: MotionQueries) -> tuple[Matrix, NDArray[np.int64]]:
     """Points along a path, shape (k, n), and the numbers of those from which the way to the next one is not free."""
     points = points_along(path, step)
-    return points, np.flatnonzero(~motions.motion_valid_batch(points[:-1], points[1:]))
+    blocked = ~motions.motion_valid_batch(points[:-1], points[1:])
+    return points, np.flatnonzero(blocked).astype(np.int64)
 
 
 def bent(path: Matrix, step: float, shift: float, motions: MotionQueries, rng: np.random.Generator) -> Matrix | None:
@@ -176,7 +179,7 @@ def reshaped(name: str, reshaper: Reshaper, seed: int, speed_bound: float) -> Re
 
 BRAKE, PATIENCE = 6.0, 20  # ticks
 NONE = Reshaper()
-WAYS = {
+WAYS: dict[str, Callable[[float], Reshaper]] = {
     "time scaled": lambda shift: Reshaper(BRAKE, PATIENCE),
     "path edited": lambda shift: Reshaper(shift=shift),
     "both": lambda shift: Reshaper(BRAKE, PATIENCE, shift),

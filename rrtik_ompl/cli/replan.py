@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +15,7 @@ from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
     from rrtik_ompl.replanning import ReplanRun
+    from rrtik_ompl.replanning.scenario import Scenario as Chosen
 
 Scenario = Annotated[str, typer.Argument(help="A problem with a run: section, shipped or a YAML file.")]
 
@@ -24,6 +26,9 @@ def replan_scenario(
     seed: Annotated[int, typer.Option(help="The same seed gives the same run.")] = 0,
     lookahead_ticks: Annotated[int | None, typer.Option(help="Predict obstacle motion this many ticks ahead.")] = None,
     predict: Annotated[int | None, typer.Option(hidden=True)] = None,
+    foreseen: Annotated[
+        bool, typer.Option("--foreseen", help="Plan in time: obstacles do what their motions state.")
+    ] = False,
     clearance: Annotated[
         float | None, typer.Option(help="What the moves are proven to keep from obstacles beside margins [m].")
     ] = None,
@@ -46,6 +51,7 @@ def replan_scenario(
         "clearance": clearance,
         "seconds": seconds,
         "record": record,
+        "foreseen": foreseen or None,
     }
     given = {name: value for name, value in options.items() if value is not None}
     if replay is not None and given:
@@ -56,13 +62,12 @@ def replan_scenario(
 
     chosen = load_scenario(scenario)
     if replay is None:
-        try:
-            with progress(f"{chosen.problem.name} with {planner}"):
-                run = chosen.run(planner=planner, seed=seed, **given)
-        except KeyboardInterrupt:
-            if record is not None:
-                note(f"{record} holds the run as far as it went, if it had begun")
-            raise
+        made = _foreseen(chosen, seed, given) if foreseen else _new_run(chosen, planner, seed, given)
+        if isinstance(made, str):
+            failed = {"problem": chosen.problem.name, "outcome": "not found", "reason": made}
+            say(json.dumps(failed) if as_json else f"{chosen.problem.name}: {made}")
+            return 1
+        run = made
     else:
         run = _recorded(replay, chosen.problem.name)
     if html is not None:
@@ -76,6 +81,46 @@ def replan_scenario(
         say(run.summary())
         say(*(f"wrote {file}" for file in (record, html) if file is not None))
     return 0 if run.arrived else 1
+
+
+def _new_run(chosen: Chosen, planner: str, seed: int, given: Mapping[str, Any]) -> ReplanRun:
+    """A run that is replanned on its way."""
+    try:
+        with progress(f"{chosen.problem.name} with {planner}"):
+            return chosen.run(planner=planner, seed=seed, **given)
+    except KeyboardInterrupt:
+        if "record" in given:
+            note(f"{given['record']} holds the run as far as it went, if it had begun")
+        raise
+
+
+def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun | str:
+    """A run that is planned in time, before it begins; if there is none, why.
+
+    Raises:
+        InputError: If an option does not belong here, or the goal moves.
+    """
+    from rrtik_ompl.replanning.in_time import plan_in_time
+
+    if "lookahead_ticks" in given or chosen.goal_feed is not None:
+        what = (
+            "the goal of this scenario moves" if chosen.goal_feed is not None else "--lookahead-ticks is for replanning"
+        )
+        raise InputError(f"--foreseen: {what}; leave out --foreseen")
+    settings = chosen.settings
+    with progress(f"{chosen.problem.name}, planned in time"):
+        plan = plan_in_time(
+            chosen.problem,
+            horizon=given.get("seconds", settings.seconds),
+            speed=settings.step * settings.rate,
+            margin=settings.margin,
+            clearance=given.get("clearance", settings.clearance),
+            limits=settings.limits,
+            seed=seed,
+        )
+    if plan.run is not None and "record" in given:
+        plan.run.save(given["record"])
+    return plan.reason if plan.run is None else plan.run
 
 
 def _recorded(file: Path, problem: str) -> ReplanRun:

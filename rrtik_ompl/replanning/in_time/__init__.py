@@ -1,0 +1,204 @@
+"""Planning in configuration and time: where the course of what moves is known, a motion that is free at every time."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import TAU, Matrix, not_negative, positive, whole_number
+from rrtik_ompl.choices import TickEvent
+from rrtik_ompl.copies import in_one_line
+from rrtik_ompl.errors import InputError, at_most, require
+from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.poses import pose_row
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.replanning.drrt_con import without_points_between
+from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
+from rrtik_ompl.replanning.in_time.search import Ends, TimeSearch
+from rrtik_ompl.replanning.in_time.tree import Pace
+from rrtik_ompl.replanning.record import ReplanRun, Tick
+from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.world.kept_clearance import CLEARANCE
+from rrtik_ompl.world.proof import PROOF_KERNELS
+
+NAME = "in-time"  # of the planner, in records
+MOST_SLOTS = 10_000
+ROUNDING = 1e-9
+WAITS = "what moves has to pass first"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TimedPlan:
+    """A motion among obstacles whose course is known.
+
+    Attributes:
+        run: The motion, a tick for each slot of time, as :func:`rrtik_ompl.replan` records it: it can be saved, drawn
+            and judged. None if none was found.
+        reason: Why there is none, or "".
+        least_seconds: Sooner no motion can arrive, by the limits of speed alone [s].
+        iterations: Of the search.
+        seconds: That it took [s].
+
+    Example:
+        >>> scenario = rrtik.load_scenario("replan_planar_arm")
+        >>> plan = rrtik.plan_in_time(scenario.problem, rate=5.0, horizon=0.4)
+        >>> plan.found, plan.reason.startswith("speeds allow no arrival")
+        (False, True)
+    """
+
+    run: ReplanRun | None
+    reason: str
+    least_seconds: float
+    iterations: int
+    seconds: float
+
+    __repr__ = in_one_line
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a motion."""
+        return self.run is not None
+
+    @property
+    def arrival(self) -> float:
+        """When the goal is reached [s]; inf if no motion was found."""
+        return float("inf") if self.run is None else self.run.ticks[-1].time
+
+
+def plan_in_time(
+    problem: Problem,
+    *,
+    rate: float = 10.0,
+    horizon: float = 30.0,
+    speed: float | None = None,
+    margin: float = 0.0,
+    clearance: float | None = None,
+    limits: RateLimits | None = None,
+    iterations: int = 6000,
+    seconds: float = 20.0,
+    seed: int = 0,
+) -> TimedPlan:
+    """Plan in configuration and time: a motion to the goal among obstacles that do what their motions state.
+
+    [1, ch. 5.2] names the space, configurations at times from 0 on in which a path never goes backwards in time, for
+    scenes that are fully predictable, and leaves it for DRRT-Con, which assumes nothing. The search follows [70].
+
+    The motion is straight at constant speed in every slot of time, no joint faster than its limit; between slots speeds
+    jump, accelerations are not considered, as in :func:`rrtik_ompl.replan`. It is **proven** at every time, not at
+    steps: in a slot the arm keeps from the place of an obstacle in the middle of the slot as far as any of its points
+    travels until an end of it, beside margins and the clearance. What kernels cannot prove counts as blocked. The
+    proof is worth as much as the stated courses: an obstacle that strays farther than margin and clearance can be hit.
+    After the arrival nothing is promised.
+
+    Args:
+        problem: Robot, scene whose obstacles state their motions, start and goal. Of a pose, position or region all
+            configurations are goals.
+        rate: Slots a second [Hz]. With more of them the arm comes nearer to what is fast, and searches take longer.
+        horizon: The latest arrival [s].
+        speed: The configuration's, all joints counted alike [rad/s or m/s]; None: the joints' limits alone.
+        margin: Distance to obstacles that is always kept, beside their own margins [m].
+        clearance: What is proven beside it [m]; 1 mm if None.
+        limits: Of the joints' speeds; those of the robot if None.
+        iterations: Of the search at most; it goes on for earlier arrivals until it finds no more for a while.
+        seconds: That the search may take by the clock [s].
+        seed: The same seed gives the same motion, as long as the clock does not cut in.
+
+    Raises:
+        InputError: If a number is out of range, no configuration reaches the goal, an obstacle without an end turns, or
+            the problem has path constraints.
+
+    Example:
+        >>> scenario = rrtik.load_scenario("replan_planar_arm")
+        >>> plan = rrtik.plan_in_time(scenario.problem, rate=5.0, speed=1.6, seed=1)
+        >>> plan.found and len(set(plan.run.moves)) == 1  # all moves are proven
+        True
+    """
+    require(problem, Problem, "problem to plan in time", "use Problem(world, start, goal) or load_scenario(name)")
+    if problem.constraints:
+        raise InputError("plan in time: path constraints are not kept there; leave them out, or use plan()")
+    options = _Options(
+        slot=1.0 / positive(rate, "rate", "give slots a second, such as 10"),
+        horizon=positive(horizon, "horizon", "give the latest arrival [s]"),
+        speed=float("inf") if speed is None else positive(speed, "speed", "give it in rad/s or m/s"),
+        margin=not_negative(margin, "margin"),
+        clearance=CLEARANCE if clearance is None else not_negative(clearance, "clearance"),
+        limits=limits,
+        seed=whole_number(seed, "seed"),
+    )
+    at_most(options.horizon / options.slot, MOST_SLOTS, "slots of time", "lower horizon or rate")
+    most, limit = whole_number(iterations, "iterations", least=1), positive(seconds, "seconds")
+    begun = time.perf_counter()
+    search = _search(problem, options)
+    reason = _hopeless(search, options)
+    rows = None if reason else search.run(most, lambda: time.perf_counter() - begun > limit)
+    if rows is None and not reason:
+        reason = f"no way was found in {search.iterations} iterations; raise horizon, rate, iterations or seconds"
+    run = None if rows is None else _record(problem, search, rows, options)
+    return TimedPlan(run, reason, options.slot * search.least, search.iterations, time.perf_counter() - begun)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Options:
+    """What was asked for; see :func:`plan_in_time`."""
+
+    slot: float
+    horizon: float
+    speed: float
+    margin: float
+    clearance: float
+    limits: RateLimits | None
+    seed: int
+
+
+def _search(problem: Problem, options: _Options) -> TimeSearch:
+    """The search of a problem."""
+    robot, scene, rng = problem.robot, problem.world.scene, np.random.default_rng(options.seed)
+    if options.limits is not None:
+        require(options.limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
+    rates = RateLimits.of(robot) if options.limits is None else options.limits.for_joints(robot.dof)
+    alone = problem.world.with_accuracy("conservative").with_scene(Scene((), scene.attached, held_pairs(scene)))
+    goals = every_goal(problem, alone, rng)
+    around = np.vstack([problem.start, goals])
+    lower = np.where(np.isfinite(robot.lower), robot.lower, around.min(axis=0) - TAU)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, around.max(axis=0) + TAU)
+    worlds = ForeseenWorlds(problem.world, options.slot, options.margin + options.clearance)
+    ends = Ends(problem.start, goals, lower, upper, int(options.horizon / options.slot + ROUNDING))
+    return TimeSearch(worlds, Pace(rates.velocity * options.slot, options.speed * options.slot), ends, rng)
+
+
+def _hopeless(search: TimeSearch, options: _Options) -> str:
+    """Why a search need not begin, or ""."""
+    if library(PROOF_KERNELS) is None:
+        return "motions in time are proven by kernels, and there are none here; install numba"
+    if options.slot * search.least > options.horizon + ROUNDING:
+        return f"speeds allow no arrival before {options.slot * search.least:g} s; raise horizon or speed"
+    if search.worlds.blocked(0):
+        return search.worlds.blocked(0)
+    if not search.worlds.free(0, search.ends.start, search.ends.start):
+        return "the start is not proven free in the first slot of time; raise rate, or lower margin or clearance"
+    return ""
+
+
+def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Options) -> ReplanRun:
+    """The motion as a run: a tick for each slot, obstacles where they are when it begins."""
+    robot, slot = problem.robot, options.slot
+    step = min(search.pace.step, float(np.linalg.norm(search.pace.change)))
+    run = ReplanRun(
+        problem.name, robot.name, robot.joint_names, NAME, options.seed, step, 1.0 / slot, options.margin, None
+    )
+    first = {o.name: o.pose for o in problem.world.scene.obstacles}
+    for number, q in enumerate(rows):
+        left = rows[number:]
+        moves = len(left) > 1 and bool((left[1] != q).any())
+        event: TickEvent = "arrive" if len(left) == 1 else "plan" if number == 0 else "walk" if moves else "wait"
+        placed = search.worlds.scene_at(slot * number).obstacles
+        poses = {o.name: pose_row(o.pose) for o in placed if (o.pose.homogeneous != first[o.name].homogeneous).any()}
+        proven = search.worlds.free(number, q, left[1]) if moves else None
+        path = without_points_between(left) if len(left) > 1 else None
+        run.ticks.append(Tick(slot * number, q, event, path, poses, {}, 0, "" if event != "wait" else WAITS, proven))
+    run.outcome = "arrived"
+    return run

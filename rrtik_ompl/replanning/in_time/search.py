@@ -1,0 +1,196 @@
+"""The search in configuration and time: two trees that grow towards each other, ever earlier arrivals.
+
+It follows RRT-Connect [4] where time only goes onwards, as ST-RRT* [70] does: a sample has a time in which it can be
+reached from the start and the goal from it; the tree from the goals has a root for each of many arrivals; the last time
+is near at first and put off while nothing is found. Each way is made shorter and earlier. Then new trees look for
+others, in turn for such as arrive earlier from the outset and for any.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
+from rrtik_ompl.replanning.in_time.hurry import hurried
+from rrtik_ompl.replanning.in_time.tree import Pace, TimeTree
+from rrtik_ompl.world.motion_queries import Stop
+
+PIECE = 8  # slots of one extension
+FIRST_SHARE = 1.5  # of the least time: the first last arrival
+PUT_OFF = 150  # iterations without a way, after which the last arrival is put off to twice the time
+PATIENCE = 600  # iterations of a further round
+ROUNDS = 12  # without an earlier arrival, one after the other
+STANDING = 0.1  # share of the extensions in which the robot stands
+CUTS = 200  # tries to shorten the way
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ends:
+    """Where a search begins and ends.
+
+    Attributes:
+        start: Shape (n,).
+        goals: Any of which will do, shape (g, n).
+        lower: Of samples, shape (n,).
+        upper: Of samples, shape (n,).
+        last: The last slot in which to arrive.
+    """
+
+    start: Vector
+    goals: Matrix
+    lower: Vector
+    upper: Vector
+    last: int
+
+
+class TimeSearch:
+    """See the module.
+
+    Attributes:
+        worlds, pace, ends: See below.
+        iterations: So far.
+        least: Slots that the way takes at least by the limits of speed.
+
+    Args:
+        worlds: What is free in which slot.
+        pace: How far the robot goes in a slot.
+        ends: Start, goals and the last slot.
+        rng: Random numbers.
+    """
+
+    def __init__(self, worlds: ForeseenWorlds, pace: Pace, ends: Ends, rng: np.random.Generator) -> None:
+        self.worlds, self.pace, self.ends, self._rng = worlds, pace, ends, rng
+        self._each_least: NDArray[np.int64] = np.maximum(pace.whole_slots(ends.goals - ends.start), 1)
+        self.least, self.iterations = int(self._each_least.min()), 0
+        self._begin_anew(None)
+
+    def _begin_anew(self, earlier: int | None) -> None:
+        """A round with new trees; with a last slot that is ``earlier`` than what was found, or the first one."""
+        self._trees = (TimeTree(self.pace, 1), TimeTree(self.pace, -1))
+        self._trees[0].add(self.ends.start, 0, -1)
+        self._rooted: set[tuple[int, int]] = set()
+        self._hard = earlier is not None
+        first = int(np.ceil(FIRST_SHARE * self.least)) + PIECE
+        self._last = min(self.ends.last, first) if earlier is None else earlier
+
+    def run(self, iterations: int, stop: Stop) -> Matrix | None:
+        """The earliest arrival that is found: a configuration for each slot, shape (k, n); None if there is none."""
+        best: Matrix | None = None
+        fruitless = since = 0  # rounds without an earlier way, iterations of the round
+        while self.iterations < iterations and not (stop() or self._done(best, fruitless)):
+            self.iterations, since = self.iterations + 1, since + 1
+            found = self._iterate()
+            found = None if found is None else self._improved(found, stop)
+            if found is not None and (best is None or len(found) < len(best)):
+                best, fruitless = found, 0
+            elif best is not None and (found is not None or since >= (PUT_OFF if self._hard else PATIENCE)):
+                fruitless += 1
+            else:
+                self._last = min(2 * self._last, self.ends.last) if since % PUT_OFF == 0 else self._last
+                continue
+            since = 0
+            self._begin_anew(None if self._hard else len(best) - 2)
+        return best
+
+    def _done(self, best: Matrix | None, fruitless: int) -> bool:
+        """Whether no earlier arrival is possible, or none to be hoped for."""
+        return best is not None and (fruitless >= ROUNDS or len(best) - 1 <= self.least)
+
+    def _iterate(self) -> Matrix | None:
+        """A further arrival, an extension of one tree and a connection to the other; the way if they meet."""
+        self._add_arrival()
+        grown, other = self._trees[:: 1 if self.iterations % 2 else -1]
+        new = self._extend(grown) if grown.size else None
+        if new is None:
+            return None
+        near = other.nearest(grown.q[new], int(grown.slot[new]))
+        end = None if near is None else self._grow(other, near, grown.q[new], int(grown.slot[new]), self.ends.last)
+        if end is None or not end[1]:
+            return None
+        forward, backward = (new, end[0]) if grown.onward > 0 else (end[0], new)
+        return self._way(forward, backward)
+
+    def _add_arrival(self) -> None:
+        """A root of the tree from the goals, at a random time in which the goal is free."""
+        goal = int(self._rng.integers(len(self.ends.goals)))
+        earliest = int(self._each_least[goal])
+        if earliest > self._last:
+            return
+        slot = int(self._rng.integers(earliest, self._last + 1))
+        q = self.ends.goals[goal]
+        if (goal, slot) not in self._rooted and self.worlds.free(slot - 1, q, q):
+            self._trees[1].add(q, slot, -1)
+        self._rooted.add((goal, slot))
+
+    def _extend(self, tree: TimeTree) -> int | None:
+        """Towards a sample, or standing still; the new vertex."""
+        if self._rng.random() < STANDING:
+            vertex = int(self._rng.integers(tree.size))
+            q, slot = tree.q[vertex].copy(), int(tree.slot[vertex]) + tree.onward * PIECE
+            slot = min(max(slot, 0), self._last)
+            if tree.onward * (slot - int(tree.slot[vertex])) <= 0:
+                return None
+        else:
+            q = self._rng.uniform(self.ends.lower, self.ends.upper)
+            earliest = int(self.pace.whole_slots((q - self.ends.start)[None])[0])
+            latest = self._last - int(self.pace.whole_slots(self.ends.goals - q).min())
+            if earliest > latest:
+                return None
+            slot = int(self._rng.integers(earliest, latest + 1))
+            near = tree.nearest(q, slot)
+            if near is None:
+                return None
+            vertex = near
+        end = self._grow(tree, vertex, q, slot, PIECE)
+        return None if end is None else end[0]
+
+    def _grow(self, tree: TimeTree, vertex: int, q: Vector, slot: int, most: int) -> tuple[int, bool] | None:
+        """A vertex as far towards q as is free, at most so many slots: its number, and whether it is at q."""
+        rows, whole = tree.rows_towards(vertex, q, slot, most)
+        begin = int(tree.slot[vertex])
+        free = self.worlds.steps_free(begin if tree.onward > 0 else begin - 1, rows, tree.onward)
+        if free == 0:
+            return None
+        return tree.add(rows[free], begin + tree.onward * free, vertex), whole and free == len(rows) - 1
+
+    def _way(self, forward: int, backward: int) -> Matrix:
+        """A configuration for each slot, from the start to the goal at which two vertices meet, shape (k, n)."""
+        first, before = self._trees[0].branch(forward)
+        second, after = self._trees[1].branch(backward)
+        rows = np.vstack([first, second[::-1][1:]])
+        slots = np.concatenate([before, after[::-1][1:]])
+        return each_slot(rows, slots)
+
+    def _improved(self, rows: Matrix, stop: Stop) -> Matrix:
+        """With less motion and earlier, in turn, as long as it arrives earlier."""
+        while True:
+            rows = self._shortened(rows, stop)
+            earlier = hurried(rows, self.pace, self.worlds, len(rows) - 2)
+            if earlier is None or stop():
+                return rows
+            rows = earlier
+
+    def _shortened(self, rows: Matrix, stop: Stop) -> Matrix:
+        """The same arrival with less motion: straight pieces in the place of random ones."""
+        for _ in range(CUTS):
+            if len(rows) < 3 or stop():
+                break
+            a, b = sorted(self._rng.choice(len(rows), 2, replace=False).tolist())
+            straight = each_slot(rows[[a, b]], np.array([0, b - a]))
+            if _length(straight) < _length(rows[a : b + 1]) - 1e-9 and self.worlds.steps_free(a, straight, 1) == b - a:
+                rows = np.vstack([rows[:a], straight, rows[b + 1 :]])
+        return rows
+
+
+def each_slot(rows: Matrix, slots: NDArray[np.int64]) -> Matrix:
+    """A configuration for each slot from the first to the last one: straight between rows, shape (k, n)."""
+    clock = np.arange(slots[0], slots[-1] + 1)
+    return np.stack([np.interp(clock, slots, column) for column in rows.T], axis=1)
+
+
+def _length(rows: Matrix) -> float:
+    return float(np.linalg.norm(np.diff(rows, axis=0), axis=1).sum())

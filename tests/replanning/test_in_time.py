@@ -1,0 +1,173 @@
+"""Planning in configuration and time: never back in time, never too fast, free at every time, as others judge it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.replanning.contact_check import check_contacts
+from rrtik_ompl.replanning.in_time import plan_in_time
+from rrtik_ompl.replanning.in_time.foreseen import travel
+from rrtik_ompl.replanning.in_time.hurry import full_pace
+from rrtik_ompl.replanning.in_time.search import each_slot
+from rrtik_ompl.replanning.in_time.tree import Pace, TimeTree
+from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
+from rrtik_ompl.shapes import Box, HalfSpace, Sphere
+from rrtik_ompl.world import World
+from rrtik_tests.moving_plane import FAST, box, crossing, place, plane
+
+PLANE = {"speed": 5.0, "limits": FAST}
+DENSE = 12  # exact checks in a slot
+SHUT, OPEN = 10.0, -30.0
+
+
+def gate(opens_at: float):
+    """A wall with a door across the only way; the door is elsewhere from a time [s] on."""
+    door = TimedPoses([0.0, opens_at, opens_at + 0.5], [place(10.0, SHUT), place(10.0, SHUT), place(10.0, OPEN)])
+    wall = [box("low", 10.0, 3.0, 1.0, 10.0), box("high", 10.0, 17.0, 1.0, 10.0)]
+    return plane(*wall, Obstacle("door", Box([1.0, 6.0, 1.0]), place(10.0, SHUT), door))
+
+
+def judged(problem, run, velocity, speed=np.inf):
+    """Faults that exact worlds at single times see, coal's contacts, and whether speeds are kept."""
+    rows, times = run.configurations, run.times
+    assert (np.diff(times) > 0.0).all()
+    seconds = np.diff(times)[:, None]
+    assert (np.abs(np.diff(rows, axis=0)) <= seconds * velocity * (1.0 + 1e-9)).all()
+    assert (np.linalg.norm(np.diff(rows, axis=0), axis=1) <= seconds[:, 0] * speed * (1.0 + 1e-9)).all()
+    faults = []
+    for k in range(len(rows) - 1):
+        for share in np.linspace(0.0, 1.0, DENSE):
+            now = times[k] + share * (times[k + 1] - times[k])
+            world = World(problem.robot, problem.world.scene.at(now))
+            if not world.valid(rows[k] + share * (rows[k + 1] - rows[k])):
+                faults.append(now)
+    return faults, check_contacts(problem.robot, run, problem.world.scene).contacts
+
+
+def test_a_crossing_box_is_not_met_at_any_time():
+    problem = crossing()
+    plan = plan_in_time(problem, seed=1, **PLANE)
+    assert plan.found, plan.reason
+    assert judged(problem, plan.run, 1e3, 5.0) == ([], ())
+    assert plan.run.moves[0] == plan.run.moves[1] > 0
+    assert plan.run.configurations[0].tolist() == problem.start.tolist()
+    assert plan.run.configurations[-1].tolist() == problem.goal.q.tolist()
+
+
+def test_a_door_is_waited_for_and_passed_when_it_opens():
+    problem = gate(6.0)
+    plan = plan_in_time(problem, seed=1, **PLANE)
+    assert plan.found, plan.reason
+    assert judged(problem, plan.run, 1e3, 5.0) == ([], ())
+    crossing_time = plan.run.times[np.flatnonzero(plan.run.configurations[:, 0] > 10.0)[0]]
+    assert crossing_time > 6.0
+    assert plan.arrival >= plan.least_seconds
+    assert plan.arrival < 6.5 + 18.0 / 5.0  # it does not begin only when the door is open
+
+
+def test_a_door_that_stays_shut_until_the_horizon_is_not_passed():
+    plan = plan_in_time(gate(8.0), horizon=7.0, iterations=400, seed=1, **PLANE)
+    assert not plan.found
+    assert "no way was found" in plan.reason
+    assert plan.arrival == np.inf
+
+
+def test_nothing_in_the_way_arrives_as_soon_as_speed_allows():
+    plan = plan_in_time(plane(box("far", 10.0, 18.0, 1.0, 1.0)), seed=1, **PLANE)
+    assert plan.arrival == pytest.approx(plan.least_seconds) == pytest.approx(3.6)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", ["replan_ur5", "replan_planar_arm"])
+def test_arms_among_what_moves_are_free_at_every_time_with_margin(name):
+    scenario = rrtik.load_scenario(name)
+    problem, settings = scenario.problem, scenario.settings
+    speed = settings.step * settings.rate
+    plan = plan_in_time(problem, speed=speed, margin=settings.margin, limits=settings.limits, seed=2)
+    assert plan.found, plan.reason
+    velocity = settings.max_change(problem.robot) * settings.rate
+    assert judged(problem, plan.run, velocity, speed) == ([], ())
+    nearest = check_contacts(problem.robot, plan.run, problem.world.scene, samples_per_tick=40).nearest
+    assert nearest >= settings.margin
+
+
+def test_the_same_seed_gives_the_same_motion_and_a_record_keeps_it(tmp_path):
+    one, two = (plan_in_time(crossing(), seed=3, seconds=600.0, **PLANE).run for _ in range(2))
+    assert (one.configurations == two.configurations).all()
+    one.save(tmp_path / "run.json")
+    back = rrtik.load_run(tmp_path / "run.json")
+    assert (back.configurations == one.configurations).all()
+    assert back.planner == "in-time"
+
+
+def test_the_way_of_an_obstacle_bounds_every_point_of_it():
+    rng = np.random.default_rng(0)
+    turns = [pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3)) for _ in range(4)]
+    solid = Obstacle("solid", Sphere(0.3), turns[0], TimedPoses([0.0, 0.3, 0.7, 1.5], turns))
+    points = rng.normal(size=(50, 3))
+    points *= 0.3 / np.linalg.norm(points, axis=1, keepdims=True)
+    for begin in np.linspace(0.0, 1.4, 15):
+        bound = travel(solid, begin, begin + 0.2, 0.3)
+        middle = solid.motion.pose_at(solid.pose, begin + 0.1)
+        for now in np.linspace(begin, begin + 0.2, 21):
+            there = solid.motion.pose_at(solid.pose, now)
+            moved = [np.linalg.norm(there.act(p) - middle.act(p)) for p in points]
+            assert max(moved) <= bound
+    steady = Obstacle("steady", Sphere(0.3), motion=ConstantVelocity([0.0, 3.0, 4.0]))
+    assert travel(steady, 1.0, 1.2, 0.3) == pytest.approx(0.5)
+
+
+def test_a_vertex_is_reached_only_onwards_in_time_and_at_a_speed_that_is_allowed():
+    pace = Pace(np.array([1.0, 0.5]), np.inf)
+    for onward in (1, -1):
+        tree = TimeTree(pace, onward)
+        tree.add(np.zeros(2), 10, -1)
+        assert tree.nearest(np.array([0.0, 1.0]), 10 + 2 * onward) == 0
+        assert tree.nearest(np.array([0.0, 1.0]), 10 + onward) is None
+        assert tree.nearest(np.zeros(2), 10 - onward) is None
+        assert tree.nearest(np.zeros(2), 10) is None
+
+
+def test_full_pace_takes_the_fewest_slots_and_keeps_the_ends():
+    rows = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.0], [3.0, 2.5]])
+    places = full_pace(rows, Pace(np.ones(2), np.inf))
+    assert len(places) - 1 == 6
+    assert (np.abs(np.diff(places, axis=0)) <= 1.0 + 1e-12).all()
+    assert (places[[0, -1]] == rows[[0, -1]]).all()
+    assert len(each_slot(rows[:2], np.array([0, 6]))) == 7
+
+
+def test_bad_input_names_what_is_wrong():
+    problem = crossing()
+    for options, words in (
+        ({"rate": 0.0}, "rate"),
+        ({"horizon": -1.0}, "horizon"),
+        ({"speed": np.nan}, "speed"),
+        ({"margin": -0.1}, "margin"),
+        ({"iterations": 0}, "iterations"),
+        ({"seed": -1}, "seed"),
+        ({"horizon": 1e9}, "slots of time"),
+        ({"limits": 3.0}, "limits"),
+    ):
+        with pytest.raises(InputError, match=words):
+            plan_in_time(problem, **options)
+    with pytest.raises(InputError, match="problem"):
+        plan_in_time("replan_ur5")
+    assert "no arrival before" in plan_in_time(problem, horizon=1.0, **PLANE).reason
+    near = plane(box("beside", 4.0, 10.0, 4.0, 4.0, ConstantVelocity([-30.0, 0.0, 0.0])))
+    assert "start" in plan_in_time(near, seed=1, **PLANE).reason
+
+
+def test_a_ground_that_turns_has_no_bound():
+    ground = HalfSpace([0.0, 0.0, 1.0], -5.0)
+    turned = pin.SE3(pin.exp3(np.array([0.3, 0.0, 0.0])), np.zeros(3))
+    tilting = Obstacle("ground", ground, motion=TimedPoses([0.0, 1.0], [pin.SE3.Identity(), turned]))
+    problem = plane()
+    scene = Scene((tilting,))
+    moved = rrtik.Problem(World(problem.robot, scene, motion_resolution=0.05), problem.start, problem.goal)
+    with pytest.raises(InputError, match="turns"):
+        plan_in_time(moved, **PLANE)
