@@ -5,14 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rrtik_ompl.fast.simd.bitcode_store import has_bitcode, packaged_bitcode
-from rrtik_ompl.fast.simd.code_files import kept_code, kernel_modules, kernels_by_size, machine_key
+from rrtik_ompl.fast.simd.code_files import kernel_modules, kernels_by_size
 from rrtik_ompl.fast.simd.library import code_file, is_loaded, library
 from rrtik_ompl.fast.threads import cores
+from rrtik_ompl.files.cache import nobody_else_s
 from rrtik_ompl.files.notice import COMPILING, tell_once
 
 ROOT = Path(__file__).parents[2]  # where this package stands: another process shall take no other
@@ -78,7 +78,7 @@ def _maker(names: list[str]) -> subprocess.Popen[bytes]:
 def _missing(name: str) -> bool:
     """Whether another process can make a library and keep it for this one."""
     file = code_file(name)
-    return file is not None and kept_code(file, machine_key(name)) is None
+    return file is not None and not nobody_else_s(file)  # one that is spoilt is found out by whoever loads it
 
 
 @contextmanager
@@ -97,6 +97,8 @@ def _made_by_others(names: list[str], jobs: int) -> Iterator[Callable[[str], Non
     def make(name: str) -> None:
         with _maker([name]) as process:
             others.append(process)
+
+    from concurrent.futures import ThreadPoolExecutor  # whoever finds all kernels made needs no threads
 
     pool = ThreadPoolExecutor(jobs)
     made = {name: pool.submit(make, name) for name in names}

@@ -50,6 +50,7 @@ def target_machine() -> Any:
     )
 
 
+@cache
 def processor_identity() -> str:
     """All that machine code depends on besides its source: processor, system and LLVM."""
     import llvmlite
