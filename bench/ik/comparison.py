@@ -29,10 +29,11 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast.ik.ik_layout import KERNELS
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.ik.goal_rows import pose_rows
+from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
 from rrtik_ompl.ik.numeric.kernel_call import KernelCall
 from rrtik_ompl.ik.serial_chain import seeded_limb_of
-from rrtik_ompl.ik.solve import list_ik_methods, mid_range_configuration
+from rrtik_ompl.ik.solve import list_ik_methods
 from rrtik_ompl.robot import Robot
 
 PACKAGES = ("numpy", "pin", "numba", "pytracik", "ikpy", "eaik", "roboticstoolbox-python")

@@ -16,8 +16,7 @@ from rrtik_ompl.cli.terminal import Table
 from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
-from rrtik_ompl.ik.method_interface import IkResult, different_rows
-from rrtik_ompl.ik.solve import mid_range_configuration
+from rrtik_ompl.ik.method_interface import IkResult, different_rows, mid_range_configuration
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.units import DEGREES, shown_unit
 

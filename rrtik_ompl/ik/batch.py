@@ -19,9 +19,10 @@ from rrtik_ompl.goal import PoseGoal, joint_difference, tolerances
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
 from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
 from rrtik_ompl.ik.goal_rows import POSE, pose_rows
+from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
-from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, mid_range_configuration, solve_ik
+from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, solve_ik
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 from rrtik_ompl.world.check_world import check_world

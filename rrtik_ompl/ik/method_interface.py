@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.copies import as_value, in_one_line
 from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal
@@ -130,3 +131,9 @@ def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
         if not kept or np.abs(rows[k] - rows[kept]).max(axis=1).min() > SAME_POSTURE:
             kept.append(k)
     return np.array(kept, dtype=np.intp)
+
+
+@lru_cache(maxsize=64)
+def mid_range_configuration(robot: Robot) -> Vector:
+    """Where a search begins if nobody says: the middle of the limits, shape (dof,)."""
+    return frozen(0.5 * np.sum(robot.finite_range(), axis=0))

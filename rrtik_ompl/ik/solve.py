@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, get_args
 
 import numpy as np
@@ -26,7 +26,7 @@ from rrtik_ompl.goal import (
     tip_errors,
     tolerances,
 )
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, different_rows
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, different_rows, mid_range_configuration
 from rrtik_ompl.ik.method_interface import IkResult as IkResult
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.multi_goals import PROJECTION, solve_all_tips
@@ -142,12 +142,6 @@ def _solved(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> IkR
         method=name,
         seconds=time.monotonic() - begin,
     )
-
-
-@lru_cache(maxsize=64)
-def mid_range_configuration(robot: Robot) -> Vector:
-    """Where a search begins if nobody says: the middle of the limits, shape (dof,)."""
-    return frozen(0.5 * np.sum(robot.finite_range(), axis=0))
 
 
 def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> IkMethod:

@@ -13,11 +13,12 @@ from rrtik_ompl.goal import tip_errors
 from rrtik_ompl.ik.analytic import kernel_branches
 from rrtik_ompl.ik.analytic.closed_form import branches_of, form_of
 from rrtik_ompl.ik.goal_rows import goal_rows
+from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import Search, SearchOfOne
 from rrtik_ompl.ik.numeric.kernel_call import spare_calls
 from rrtik_ompl.ik.residual import error_of_one
 from rrtik_ompl.ik.serial_chain import seeded_limb_of
-from rrtik_ompl.ik.solve import mid_range_configuration, solve_ik
+from rrtik_ompl.ik.solve import solve_ik
 
 ARMS = ("ur5", "panda", "titan4")
 ROUNDING = 1e-12  # [m] and [rad]

@@ -11,7 +11,7 @@ from rrtik_ompl.fast.ik.ik_layout import KERNELS
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.goal import TipGoal
 from rrtik_ompl.ik.goal_rows import goal_rows
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS, Search, SearchOfOne, walk
 from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, aims_of, nearest_posture
 from rrtik_ompl.ik.serial_chain import seeded_limb_of
@@ -49,7 +49,9 @@ def numeric(request: IkRequest) -> IkResponse:
     aims, timed_out = aims_of(request), False
     kernels, limb = library(KERNELS), seeded_limb_of(request.robot)
     if len(aims) == 1 and kernels is not None and limb is not None:
-        return _alone(request, SearchOfOne(kernels, limb, aims, request.robot.clamp(request.near)))
+        robot, near = request.robot, request.near  # by default the middle of the limits, which need not be clamped
+        near = near if near is mid_range_configuration(robot) else robot.clamp(near)
+        return _alone(request, SearchOfOne(kernels, limb, aims, near))
     search, waiting = Search(request.robot, aims, request.near), np.arange(len(aims))
     found = []
     while len(waiting):
