@@ -1,7 +1,7 @@
 """Attacks on the public face, the servers and long work: how many, and what broke; makes `bench/reports/robustness.md`.
 
-    python bench/robustness/report.py --calls 1000000 --messages 10000 --faults 25 --plans 20000 --pages 2000 \
-        --bad 2200
+    python bench/robustness/report.py --calls 1000000 --messages 10000 --faults 25 --kills 200 --plans 20000 \
+        --pages 2000 --bad 2200
 
 The stored page says at which sizes it was made. What is done stands beside the page until that is written: an
 interrupted run goes on where it was.
@@ -26,9 +26,9 @@ from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, plan, view
 
 PAGE = "robustness.md"
-CALLS, MESSAGES, INPUTS = fuzz.BATCH, 480, 25  # of a part
+CALLS, MESSAGES, INPUTS, TRIALS = fuzz.BATCH, 480, 25, 10  # of a part
 LOOKS = 4
-SIZES = {"calls": 2000, "messages": 960, "faults": 5, "plans": 400, "pages": 40, "bad": 100}
+SIZES = {"calls": 2000, "messages": 960, "faults": 5, "kills": 20, "plans": 400, "pages": 40, "bad": 100}
 FLAT_MB = 1.0
 PEERS: dict[str, tuple[str, Callable[[int, int], list[str]]]] = {
     "line server": ("a client of the arm's line: the arm stops, the next is served", bad_clients.line_server),
@@ -84,7 +84,7 @@ def main() -> int:
     )
     given = parser.parse_args()
     command = " ".join(
-        f"--{name} {getattr(given, name)}" for name in ("calls", "messages", "faults", "plans", "pages", "bad")
+        f"--{name} {getattr(given, name)}" for name in ("calls", "messages", "faults", "kills", "plans", "pages", "bad")
     )
     if given.works != list(WORK):
         command += f" --works {' '.join(map(shlex.quote, given.works))}"
@@ -97,7 +97,7 @@ def main() -> int:
         _calls(report, parts(calls, _blocks(given.calls, CALLS)), given.calls)
         _bad_inputs(report, parts(bad, _blocks(given.bad, INPUTS)), given.bad)
         _peers(report, parts, given.messages)
-        _faults(report, parts, given.faults, given.works)
+        _faults(report, parts, given.faults, given.kills, given.works)
         for what, count in (("plans", given.plans), ("pages", given.pages)):
             _memory(report, what, count, parts(memory, [(what, count)])[0])
     return report.finish(given.out)
@@ -133,13 +133,13 @@ def _peers(report: Report, parts: Parts, count: int) -> None:
     report.table("Mutating peers", ["peer", "rule", "messages", "broken"], rows, text=_listed(wrong))
 
 
-def _faults(report: Report, parts: Parts, count: int, works: Sequence[str]) -> None:
+def _faults(report: Report, parts: Parts, count: int, kills: int, works: Sequence[str]) -> None:
     rows, wrong, whole = [], list[str](), 0
     for work in works:
         counts = []
         for kind in faults.KINDS:
-            n = 1 if kind == "clock" else count
-            (found,) = parts(trials, [(work, kind, 0, n)])
+            n = -(-{"clock": 1, "kill": kills}.get(kind, count) // WORK[work].rarer)
+            found = [each for part in parts(trials, [(work, kind, *b) for b in _blocks(n, TRIALS)]) for each in part]
             counts.append(f"{len(found)} of {n}")
             wrong += [f"{work}, {kind}, {each}" for each in found]
             whole += n
