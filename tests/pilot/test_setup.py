@@ -311,6 +311,8 @@ def test_a_record_is_played_again_to_the_same_end(tmp_path):
         ({"kind": "joints", "q": [1, 2]}, "joints"),
         ({"kind": "seen", "objects": [{"name": "ship", "xyz": [0, 0, 0], "rotation": np.eye(3).tolist()}]}, "ship"),
         ({"kind": "command", "name": "plan"}, "arguments"),
+        ({"kind": "command", "name": [], "arguments": {}}, "a word"),
+        ({"kind": "command", "name": None, "arguments": {}}, "a word"),
         ({"kind": "begin", "problem": "env_e", "q": [0] * 6}, "env_e"),
         ({"kind": "answer", "text": "no beginning"}, "holds no line 'begin'"),
     ],

@@ -146,7 +146,9 @@ def _check(entry: Entry, robot: Robot, marker_map: MarkerMap) -> None:
     if entry["kind"] in ("begin", "joints"):
         robot.configuration(entry["q"], "q")
     elif entry["kind"] == "command":
-        str(entry["name"]) + "", dict(**entry["arguments"])
+        dict(**entry["arguments"])
+        if not isinstance(entry["name"], str):
+            raise TypeError("the name of a command is a word")
     elif entry["kind"] == "picture":
         if not all(type(entry[key]) is int and entry[key] >= 0 for key in ("at", "size")):
             raise ValueError("'at' and 'size' must be whole numbers")
