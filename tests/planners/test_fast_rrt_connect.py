@@ -17,7 +17,9 @@ from rrtik_ompl.fast.search.connect import ConnectSearch
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.ompl_bridge import StateIO
 from rrtik_ompl.ompl_bridge.attempt import attempt
+from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Sphere
 from rrtik_ompl.world import World
@@ -386,3 +388,9 @@ def test_the_planner_ends_at_its_iteration_limit():
 def test_options_of_the_planner_are_checked(options):
     with pytest.raises(InputError):
         solved_by_planner(three_joints(), **options)
+
+
+def test_trees_of_one_size_do_not_go_on_seeing_one_half_of_the_space_each():
+    found = plan(load_problem("cut_polygons"), "fastrrtconnect", seed=1835504127)
+    assert found.path is not None
+    assert found.statistics["iterations"] < 20_000

@@ -51,6 +51,7 @@ from rrtik_ompl.fast.tables.layout import JointValues
 
 MAX_STRAIGHT_MOTIONS = 16  # whole motions to goals that are tried first
 SAMPLE_BOX_GROWTH = 1.1  # from one sample to the next, where samples begin near a place
+LAST_IN_TURN = 1023  # of the samples after which the trees change the halves of the box that they are drawn from
 RANGE_TOLERANCE = 1e-9  # of the range, by which a motion of the trees may be longer
 
 
@@ -232,6 +233,9 @@ def aim_at_sample(search: ConnectTable) -> bool:
     dof, row = dof_in(search), candidate_row_of(search)
     point, bases = field(search, connect_layout.POINT), field(search, connect_layout.INVERSE_BASES)
     next_point(search, connect_layout.RANDOM, point, bases, dof)
+    if field(search, connect_layout.ITERATIONS) & LAST_IN_TURN == 0:
+        # Points of base 2 fall into the two halves of the box by turns, as the trees grow: each would see but one half.
+        next_point(search, connect_layout.RANDOM, point, bases, dof)
     place_sample(search)
     tree = tree_of(search, side)
     near = nearest_inside(search, side)
