@@ -72,4 +72,14 @@ def unannounced(quick: bool) -> list[Row]:
     return rows
 
 
-TABLES = (Table("drrt-con-unannounced", "Obstacles that appear and change", SOURCE, unannounced, 10, 1),)
+TABLES = (
+    Table(
+        "drrt-con-unannounced",
+        "Obstacles that appear and change",
+        SOURCE,
+        unannounced,
+        10,
+        1,
+        bars="the source says that they are covered; numbers ours",
+    ),
+)

@@ -177,6 +177,14 @@ def solutions(quick: bool) -> list[Row]:
 
 
 TABLES = (
-    Table("ikurt-examples", "Six examples, to the letter and repaired", SOURCE, examples, 130, 10),
+    Table(
+        "ikurt-examples",
+        "Six examples, to the letter and repaired",
+        SOURCE,
+        examples,
+        130,
+        10,
+        bars="the source says that all are solved; evaluations and ten times the accuracy ours",
+    ),
     Table("ikurt-solutions", "Solutions of a pose", SOURCE, solutions, 1, 1),
 )

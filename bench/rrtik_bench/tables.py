@@ -21,6 +21,7 @@ class Table:
         seconds: About how long the full measurement takes on two cores, on its own; tables of a page may share runs.
         quick_seconds: The same for the quick one.
         fitted: What was chosen here so that figures come out as published, if anything was.
+        bars: Who set the bars, the source or we, where the source prints no numbers to compare with.
         figures: Drawn from what is measured, see `rrtik reproduce --plot`.
     """
 
@@ -31,6 +32,7 @@ class Table:
     seconds: float
     quick_seconds: float
     fitted: str = ""
+    bars: str = ""
     figures: tuple[Figure, ...] = ()
 
 

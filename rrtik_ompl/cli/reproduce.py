@@ -97,7 +97,8 @@ def _rows(table: Table, quick: bool, kept: Kept, *, shown: bool) -> Sequence[Row
 
 
 def _fitted(table: Table) -> list[str]:
-    return [f"fitted to the published figures: {table.fitted}"] if table.fitted else []
+    fitted = [f"fitted to the published figures: {table.fitted}"] if table.fitted else []
+    return [*fitted, *([f"bars: {table.bars}"] if table.bars else [])]
 
 
 def _draw(tables: Iterable[Table], quick: bool, folder: Path) -> int:

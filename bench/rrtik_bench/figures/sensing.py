@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rrtik_bench.report.figures import Figure
+from rrtik_bench.sensing.detections import NUMBERS, confusion
 from rrtik_bench.sensing.sequences import APART, NEAR, errors
 from rrtik_bench.sensing.tables import ACCURACY, SERIES, simulated
 from rrtik_ompl.plots.joints import COLORS, tidy
@@ -41,10 +42,23 @@ def accuracy(drawing: Drawing, quick: bool) -> None:
     tidy(panel)
 
 
+def matrix(drawing: Drawing, quick: bool) -> None:
+    """How often which number was found as which, and as none."""
+    panel, found = drawing.subplots(), confusion(quick)
+    image = panel.imshow(np.where(found > 0, found, np.nan), cmap="viridis", interpolation="nearest", vmin=0)
+    panel.axvline(NUMBERS - 0.5, color="#8494a5", linewidth=0.8)
+    panel.set(xlabel=f"found as; {NUMBERS}: as none", ylabel="number of the marker")
+    drawing.colorbar(image, ax=panel, label="photographs")
+
+
 FIGURES: dict[str, tuple[Figure, ...]] = {
     "sensing-noise": (
         Figure("sensing_precision", "Precision by distance", "[1, ch. 4], figures of test 1", precision,
                "published deviations as crosses"),
+    ),
+    "sensing-detections": (
+        Figure("sensing_confusion", "Number by number: found as which", "[1, ch. 4.2.3]", matrix,
+               "the source names confusion and has no matrix", size=(6.4, 5.4)),
     ),
     "sensing-sequences": (
         Figure("sensing_accuracy", "Accuracy by distance", "[1, ch. 4], figures 4.23 to 4.28", accuracy,

@@ -47,4 +47,14 @@ def codings(quick: bool) -> list[Row]:
     return rows
 
 
-TABLES = (Table("ga-reb-coding", "Gray code beside natural binary", "[2], choice of the code", codings, 15, 3),)
+TABLES = (
+    Table(
+        "ga-reb-coding",
+        "Gray code beside natural binary",
+        "[2], choice of the code",
+        codings,
+        15,
+        3,
+        bars="the direction from the source; 0.9 and the half ours",
+    ),
+)

@@ -73,6 +73,7 @@ class Table(Protocol):
     seconds: float
     quick_seconds: float
     fitted: str
+    bars: str
     figures: Sequence[Figure]
 
     def run(self, quick: bool, /) -> Sequence[Row]:
@@ -116,5 +117,6 @@ def page(done: Done, quick: bool) -> str:
     for table, each in done:
         lines += ["", f"## {table.title}", "", f"`{table.name}`, {table.source}", ""]
         lines += [f"Fitted to the published figures: {table.fitted}.", ""] if table.fitted else []
+        lines += [f"Bars: {table.bars}.", ""] if table.bars else []
         lines += markdown_table(HEADS, map(cells, each))
     return "\n".join([*lines, ""])
