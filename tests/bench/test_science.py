@@ -1,5 +1,7 @@
 """Errors of the sources, the GRIM test, and figures drawn from what is measured."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -8,10 +10,14 @@ from rrtik_bench.errata.prints import level_link_4, listed_routes, printed_route
 from rrtik_bench.figures import ikurt as ikurt_figures
 from rrtik_bench.figures.mb_rrt import FIGURES, first_directions
 from rrtik_bench.ikurt_limits import WRIST, approach, outward_share
+from rrtik_bench.registry import COLLECTION
 from rrtik_bench.report.figures import PICTURE, Figure
+from rrtik_bench.report.rows import exactly, judged
+from rrtik_ompl.cli.published.page import page
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links
+from rrtik_tests.places import ROOT
 
 
 def test_a_mean_over_whole_numbers_is_a_fraction_of_their_number():
@@ -102,3 +108,17 @@ def test_the_planar_examples_are_drawn(tmp_path):
     figure = next(each for each in ikurt_figures.FIGURES["ikurt-examples"] if each.name == "ikurt_planar")
     figure.save(tmp_path / "planar.png", True)
     assert (tmp_path / "planar.png").stat().st_size > 5_000
+
+
+def test_the_paper_counts_the_verdicts_of_the_round_that_is_stored():
+    stored = (ROOT / "bench" / "reports" / "reproduce_full.md").read_text(encoding="utf-8")
+    paper = (ROOT / "docs" / "science" / "paper.md").read_text(encoding="utf-8")
+    told = [int(n) for n in re.findall(r"\d+", re.search(r"The full round has (.*)\.\n", paper)[1])]
+    assert told[1:] == [int(n) for n in re.findall(r"\d+", re.search(r"In all: (.*)\.\n", stored)[1])]
+    assert told[0] == sum(told[1:])
+
+
+def test_a_table_that_says_who_set_its_bars_says_so_on_its_page():
+    table = next(each for each in COLLECTION.tables if each.name == "ikurt-limits")
+    row = judged("a", "b", "c", 0.0, exactly(0, 1))
+    assert f"\nBars: {table.bars}.\n" in page([(table, [row])], True)
