@@ -59,7 +59,8 @@ def counts(distance: int, light: str, pictures: int) -> Counts:
 def confusion(quick: bool) -> NDArray[np.int64]:
     """How often which number was found as which, over all distances and lights; see :class:`Counts`."""
     found = [counts(each, light, _pictures(quick)).matrix for light in LIGHTS for each in DISTANCES]
-    return np.sum(found, axis=0, dtype=np.int64)
+    total: NDArray[np.int64] = np.sum(found, axis=0, dtype=np.int64)
+    return total
 
 
 def _pictures(quick: bool) -> int:
