@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import chain
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -18,10 +19,8 @@ TAU = 2.0 * np.pi  # [rad] a full turn
 MOST_NUMBERS = 100_000_000  # of one array, 0.8 GB; whoever has more asks in parts
 BLOCK_ROWS = 16_384  # that a batch computes at a time
 MOST_ROWS = 1_000_000  # waypoints of a path, times of a motion
-LARGEST = 1e6  # [m] or [rad]; numbers beyond are a slip of the pen, and the kernels' float32 cannot hold them
-
-
 _LISTS = frozenset((list, tuple))
+LARGEST = 1e6  # [m] or [rad]; numbers beyond are a slip of the pen, and the kernels' float32 cannot hold them
 
 
 def in_blocks(work: Callable[..., NDArray[Any]], *rows: NDArray[Any]) -> NDArray[Any]:
@@ -126,14 +125,17 @@ def _count(values: object) -> int:
         return MOST_NUMBERS + 1 if isinstance(values, range) else 0
 
 
-def _has_truths(values: list[Any] | tuple[Any, ...]) -> bool:
-    """Whether True or False is among numbers, which numpy takes for 1 and 0."""
-    kinds = set(map(type, values))
-    if bool in kinds or np.bool_ in kinds:
-        return True
-    if np.ndarray in kinds and any(type(each) is np.ndarray and each.dtype == np.bool_ for each in values):
-        return True
-    return not kinds.isdisjoint(_LISTS) and any(_has_truths(each) for each in values if type(each) in _LISTS)
+def _has_truths(values: Iterable[Any]) -> bool:
+    """Whether True or False is among numbers, which numpy takes for 1 and 0; level by level of lists in lists."""
+    while True:
+        kinds = set(map(type, values))
+        if bool in kinds or np.bool_ in kinds:
+            return True
+        if np.ndarray in kinds and any(type(each) is np.ndarray and each.dtype == np.bool_ for each in values):
+            return True
+        if kinds.isdisjoint(_LISTS):
+            return False
+        values = list(chain.from_iterable(each for each in values if type(each) in _LISTS))
 
 
 def too_many(count: int, what: str) -> InputError:
@@ -193,6 +195,18 @@ def number_rows(values: ArrayLike, what: str) -> NDArray[np.float64]:
     return array if array.ndim >= 2 else array.reshape(1, -1)
 
 
+def rows_of(values: ArrayLike, columns: int, what: str) -> Matrix:
+    """As :func:`number_rows`, shape (k, columns).
+
+    Raises:
+        InputError: If they are no such rows.
+    """
+    rows = number_rows(values, what)
+    if rows.shape[1:] != (columns,):
+        raise InputError(f"{what}: expected shape (any, {columns}), got {rows.shape}")
+    return rows
+
+
 def filled_rows(values: ArrayLike, columns: int, what: str) -> Matrix:
     """As :func:`finite_array`, of one row at least, shape (k, columns).
 
@@ -203,18 +217,6 @@ def filled_rows(values: ArrayLike, columns: int, what: str) -> Matrix:
     if len(rows) == 0:
         raise InputError(f"{what}: at least one row is needed")
     return rows
-
-
-def places(values: ArrayLike, count: int, what: str) -> NDArray[np.int64]:
-    """Numbers of rows given by a user, of ``count`` rows, shape (k,).
-
-    Raises:
-        InputError: If they are no whole numbers from 0 to ``count - 1``.
-    """
-    array = finite_array(values, (None,), what)
-    if (array != np.floor(array)).any() or array.min(initial=0) < 0 or array.max(initial=0) >= count:
-        raise InputError(f"{what} must be whole numbers from 0 to {count - 1}")
-    return array.astype(np.int64)
 
 
 def truths(values: ArrayLike, what: str) -> Mask:

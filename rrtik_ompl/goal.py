@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, number_rows, positive
+from rrtik_ompl.arrays import Mask, Vector, finite_array, frozen, positive, rows_of
 from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, listed, require
@@ -62,7 +62,7 @@ class JointGoal:
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Largest joint error of each row of Q, shape (m,) [rad or m]."""
         require(robot, Robot, "robot of a goal")
-        rows = finite_array(number_rows(Q, "configurations"), (None, len(self.q)), "configurations")
+        rows = rows_of(Q, len(self.q), "configurations")
         return np.asarray(np.abs(joint_difference(robot, rows, self.q)).max(axis=1))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:

@@ -227,7 +227,7 @@ class Robot:
 
     def fk(self, q: ArrayLike, frame: str | None = None) -> pin.SE3:
         """Forward kinematics: T_world_tip (or another frame) as ``pinocchio.SE3`` for q, shape (dof,)."""
-        return pin.SE3(self.fk_batch(self.configuration(q)[None], frame)[0])
+        return pin.SE3(self._poses(self.configuration(q)[None], self._frame_id(frame))[0])
 
     def jacobian(self, q: ArrayLike, frame: str | None = None) -> Matrix:
         """Geometric Jacobian at the tip in world axes, rows (linear; angular), shape (6, dof)."""

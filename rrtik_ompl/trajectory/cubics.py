@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.errors import InputError
 
 JUMP_SHARE = 1e-6  # of the largest acceleration; a larger difference between two pieces is a jump, its jerk infinite
 LONGEST_PERIOD = 0.02  # [s]; between set points of a drive
@@ -122,3 +123,15 @@ def in_thirds(times: Vector, positions: Matrix, velocities: Matrix, acceleration
         for row, values in zip(rows, (times[:-1, None] + k * x, p, v, a), strict=True):
             row[k::3] = values
     return rows
+
+
+def places(values: ArrayLike, count: int, what: str) -> NDArray[np.int64]:
+    """Numbers of rows given by a user, of ``count`` rows, shape (k,).
+
+    Raises:
+        InputError: If they are no whole numbers from 0 to ``count - 1``.
+    """
+    array = finite_array(values, (None,), what)
+    if (array != np.floor(array)).any() or array.min(initial=0) < 0 or array.max(initial=0) >= count:
+        raise InputError(f"{what} must be whole numbers from 0 to {count - 1}")
+    return array.astype(np.int64)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, places, positive
+from rrtik_ompl.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
 from rrtik_ompl.copies import as_value, in_notebook
 from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.files.text import write_text
@@ -22,6 +22,7 @@ from rrtik_ompl.trajectory.cubics import (
     even_parts,
     hermite_accelerations,
     jerks_of,
+    places,
     set_point_peaks,
 )
 from rrtik_ompl.trajectory.messages import write_mcap
@@ -265,8 +266,8 @@ class Trajectory:
         """
         require(accelerations, bool, "accelerations of a file")
         ending, at = written_ending(file), slice(None) if self.set_points is None else self.set_points
-        state = State(self.positions[at], self.velocities[at], self.accelerations[at])
-        clock, state = (self.times[at], state) if rate is None else self.sampled(rate)
+        known = self.times[at], State(self.positions[at], self.velocities[at], self.accelerations[at])
+        clock, state = known if rate is None else self.sampled(rate)
         columns = [(column + 0.0).tolist() for column in (clock, *state)]
         if ending == ".mcap":
             write_mcap(file, self.robot_name, self.joint_names, columns)
@@ -296,5 +297,4 @@ def bad_moments(motion: Trajectory, world: World) -> Vector:
     clock = np.append(motion.times[pieces] + shares * h[pieces], motion.duration)
     bad = np.flatnonzero(~world.certify(motion(clock).positions))
     _, where = np.unique(np.append(pieces, len(h) - 1)[bad], return_index=True)
-    found: Vector = clock[bad[where]]
-    return found
+    return np.asarray(clock[bad[where]])
