@@ -84,6 +84,7 @@ def solve_ik(
     """
     check_world(world, robot)
     one_of(get_args(IkMethod), method, METHOD)
+    require(all, bool, "all")
     load_kernels(robot)
     begin = time.monotonic()
     limit, random = not_negative(seconds, "seconds"), RandomStream(seed)

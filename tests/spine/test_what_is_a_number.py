@@ -197,6 +197,7 @@ ODD_CALLS = {
     "on_better": lambda: rrtik.shorten(PATH, PROBLEM, on_better=lambda: None),
     "method of shortening": lambda: rrtik.shorten(PATH, PROBLEM, method=np.eye(2)),
     "method of inverse kinematics": lambda: rrtik.solve_ik(ROBOT, rrtik.pose([1, 1, 0]), method=np.eye(2)),
+    "all solutions": lambda: rrtik.solve_ik(ROBOT, rrtik.pose([1, 1, 0]), all=np.zeros(3)),
     "method of many": lambda: rrtik.solve_ik_batch(ROBOT, [np.eye(4)], method=np.eye(2)),
     "no configuration": lambda: rrtik.GoalSet([rrtik.pose([1, 1, 0])]).member_at(ROBOT, np.zeros((0, 3))),
     "margin of an arm": lambda: rrtik.without_robot(rrtik.PointCloud([[0, 0, 9]]), ROBOT, [0, 0, 0], 1e300),
