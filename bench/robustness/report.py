@@ -82,12 +82,17 @@ def main() -> int:
     parser.add_argument(
         "--works", nargs="+", choices=list(WORK), default=list(WORK), help="long work that is disturbed"
     )
+    parser.add_argument(
+        "--few", nargs="+", choices=list(WORK), default=[], help="long work with one trial of each fault"
+    )
     given = parser.parse_args()
     command = " ".join(
         f"--{name} {getattr(given, name)}" for name in ("calls", "messages", "faults", "kills", "plans", "pages", "bad")
     )
     if given.works != list(WORK):
         command += f" --works {' '.join(map(shlex.quote, given.works))}"
+    if given.few:
+        command += f" --few {' '.join(map(shlex.quote, given.few))}"
     report = Report("Nothing breaks it", f"python bench/robustness/report.py {command}", processes(given.jobs))
     report.intro = (
         "Wanted are 1,000,000 calls, 10,000 messages to each server, 2,000 kills and interrupts, 20,000 plans and "
@@ -99,7 +104,7 @@ def main() -> int:
         _calls(report, parts(calls, _blocks(given.calls, CALLS)), given.calls)
         _bad_inputs(report, parts(bad, _blocks(given.bad, INPUTS)), given.bad)
         _peers(report, parts, given.messages)
-        _faults(report, parts, given.faults, given.kills, given.works)
+        _faults(report, parts, (given.faults, given.kills), given.works, given.few)
         for what, count in (("plans", given.plans), ("pages", given.pages)):
             _memory(report, what, count, parts(memory, [(what, count)])[0])
     return report.finish(given.out)
@@ -135,17 +140,18 @@ def _peers(report: Report, parts: Parts, count: int) -> None:
     report.table("Mutating peers", ["peer", "rule", "messages", "broken"], rows, text=_listed(wrong))
 
 
-def _faults(report: Report, parts: Parts, count: int, kills: int, works: Sequence[str]) -> None:
+def _faults(report: Report, parts: Parts, counts: tuple[int, int], works: Sequence[str], few: Sequence[str]) -> None:
+    count, kills = counts
     rows, wrong, whole = [], list[str](), 0
     for work in works:
-        counts = []
+        shown = []
         for kind in faults.KINDS:
-            n = -(-{"clock": 1, "kill": kills}.get(kind, count) // WORK[work].rarer)
+            n = 1 if work in few else -(-{"clock": 1, "kill": kills}.get(kind, count) // WORK[work].rarer)
             found = [each for part in parts(trials, [(work, kind, *b) for b in _blocks(n, TRIALS)]) for each in part]
-            counts.append(f"{len(found)} of {n}")
+            shown.append(f"{len(found)} of {n}")
             wrong += [f"{work}, {kind}, {each}" for each in found]
             whole += n
-        rows.append([work, *counts])
+        rows.append([work, *shown])
     wanted = "nothing lost that was said to be done, nothing doubled, no half file"
     report.bar("kills, interrupts, full disks, clocks", wanted, f"{len(wrong)} in {whole} trials", not wrong)
     report.table("Faults of long work", ["work", *faults.KINDS], rows, text=_listed(wrong))
