@@ -48,6 +48,7 @@ GOOD: dict[tuple[str, ...], tuple[str, ...]] = {
     ("reproduce",): ("drrt-con-arm", "--quick"),
     ("bench",): ("suite.yaml", "--out", "runs", "--views", "0"),
     ("list",): ("robots",),
+    ("warmup",): (),
     ("convert",): ("problem.yaml", "other.yaml"),
     ("markers", "print"): ("sheet.pdf",),
     ("markers", "calibrate"): ("photographs", "--out", "camera.yaml"),
