@@ -232,6 +232,8 @@ COMMAND_LINE = {
     "parameter without value": (task(), ("plan", "task.yaml", "--set", "range"), ["--set", "NAME=VALUE"]),
     "names without quotes": (task(), ("plan", "task.yaml", "--set", "frozen_joints=[joint1]"), ["--set", "in quotes"]),
     "record of a replay": ({}, ("replan", "replan_ur5", "--replay", "a.json", "--record", "b.json"), ["leave out"]),
+    "foreseen replay": ({}, ("replan", "replan_ur5", "--replay", "a.json", "--foreseen"), ["leave out --foreseen"]),
+    "foreseen ticks": ({}, ("replan", "replan_ur5", "--foreseen", "--lookahead-ticks", "3"), ["--foreseen"]),
     "negative seed of a pilot": ({}, ("pilot", "titan4_sdu", "--simulated", "--seed", "-1"), ["--seed", "0"]),
     "out of unknown kind": (task(), ("plan", "task.yaml", "--out", "path.xls"), ["path.xls", ".json"]),
     "out is a folder": (task() | {"a.json/b": ""}, ("plan", "task.yaml", "--out", "a.json"), ["a.json", "a folder"]),

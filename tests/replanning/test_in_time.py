@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.cli.app import run as run_command
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.in_time import plan_in_time
@@ -102,6 +105,15 @@ def test_the_same_seed_gives_the_same_motion_and_a_record_keeps_it(tmp_path):
     back = rrtik.load_run(tmp_path / "run.json")
     assert (back.configurations == one.configurations).all()
     assert back.planner == "in-time"
+
+
+def test_the_command_plans_in_time_and_says_when_there_is_no_way(tmp_path, capsys):
+    record = tmp_path / "run.json"
+    assert run_command(["replan", "replan_planar_arm", "--foreseen", "--record", str(record)]) == 0
+    assert rrtik.load_run(record).planner == "in-time"
+    assert "moves proven" in capsys.readouterr().out
+    assert run_command(["replan", "replan_planar_arm", "--foreseen", "--seconds", "0.5", "--json"]) == 1
+    assert "speeds allow no arrival" in json.loads(capsys.readouterr().out)["reason"]
 
 
 def test_the_way_of_an_obstacle_bounds_every_point_of_it():
