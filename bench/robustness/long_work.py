@@ -102,6 +102,14 @@ def _whole_campaign(file: Path) -> object:
     return count
 
 
+def _lines(file: Path) -> object:
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+
+
+def _left_over(file: Path) -> object:
+    raise InputError(f"{file}: it is done, and this is still there")
+
+
 def _drawn_film() -> int:
     rows = np.random.default_rng(1).integers(0, 256, (PICTURES, 120, 160, 3), dtype=np.uint8)
     write_film(Path("film.avi"), iter(rows), 10.0)
@@ -160,7 +168,9 @@ WORK: dict[str, LongWork] = {
         rarer=5,
     ),
     "reproduce": LongWork(
-        _command("reproduce", "drrt-con-arm", "--quick", "--markdown", "table.md"), {"table.md": _table}, rarer=4
+        _command("reproduce", "drrt-con-arm", "--quick", "--markdown", "table.md"),
+        {"table.md": _table, "table.parts.jsonl": _lines},
+        rarer=4,
     ),
     "reach": LongWork(
         _command("reach", "planar3", "--samples", "20000", "--out", "map.npz", "--html", "page.html"),
@@ -178,4 +188,7 @@ WORK: dict[str, LongWork] = {
     ),
     "plan_batch": LongWork(_batch, waits=True),
 }  # fmt: skip
-WHOLE = {f"out/{NAME}": _whole_campaign}  # what is read otherwise once the work is done
+WHOLE: dict[str, Reader] = {
+    f"out/{NAME}": _whole_campaign,
+    "table.parts.jsonl": _left_over,
+}  # what is read otherwise once the work is done
