@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, finite_array, not_negative
+from rrtik_ompl.arrays import Matrix, bounded_array, not_negative
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.robot import Robot
@@ -28,6 +28,8 @@ __all__ = [
     "motion_report",
     "time_parameterize",
 ]
+
+MOST_BLEND = 10.0  # [m]; curves of far more than the arm is long have crashed the kernels
 
 
 def time_parameterize(
@@ -94,9 +96,9 @@ def time_parameterize(
     require(bounds, RateLimits, "limits of a path to time", "use RateLimits.of(robot)")
     bounds = bounds.for_joints(path.waypoints.shape[1])
     corners = _corners(path)
-    reach = float(finite_array(blend, (), "blend"))
-    if reach < 0.0:
-        raise InputError(f"blend must be 0 or greater, got {reach:g}")
+    reach = float(bounded_array(blend, (), "blend"))
+    if not 0.0 <= reach <= MOST_BLEND:
+        raise InputError(f"blend must be 0 or greater, at most {MOST_BLEND:g}, got {reach:g}")
     if clearance is not None:
         not_negative(clearance, "clearance")
     arm = limits if isinstance(limits, Robot) else None if world is None else world.robot

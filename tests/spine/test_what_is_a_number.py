@@ -201,6 +201,8 @@ ODD_CALLS = {
     "method of many": lambda: rrtik.solve_ik_batch(ROBOT, [np.eye(4)], method=np.eye(2)),
     "no configuration": lambda: rrtik.GoalSet([rrtik.pose([1, 1, 0])]).member_at(ROBOT, np.zeros((0, 3))),
     "margin of an arm": lambda: rrtik.without_robot(rrtik.PointCloud([[0, 0, 9]]), ROBOT, [0, 0, 0], 1e300),
+    "a blend without end": lambda: rrtik.time_parameterize(PATH, LIMITS, blend=1e300, world=WORLD),
+    "a blend of 50 m": lambda: rrtik.time_parameterize(PATH, LIMITS, blend=50.0, world=WORLD),
     "payload": lambda: rrtik.time_parameterize(PATH, ROBOT, payload=np.zeros(3)),
     "title": lambda: rrtik.view(ROBOT, html="page.html", title=3),
     "problems": lambda: rrtik.plan_batch(range(10**12)),
