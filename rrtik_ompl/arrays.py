@@ -289,7 +289,8 @@ def whole_number(value: object, what: str, least: int = 0) -> int:
     """
     if type(value) is int and value >= least:
         return value
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+    odd = isinstance(value, bool | np.timedelta64)  # which are of the kinds of whole numbers all the same
+    if odd or not isinstance(value, int | np.integer) or value < least:
         raise InputError(f"{what} must be a whole number of at least {least}, got {value!r}")
     return int(value)
 

@@ -29,8 +29,6 @@ __all__ = [
     "time_parameterize",
 ]
 
-MOST_BLEND = 10.0  # [m]; curves of far more than the arm is long have crashed the kernels
-
 
 def time_parameterize(
     path: JointPath,
@@ -97,8 +95,8 @@ def time_parameterize(
     bounds = bounds.for_joints(path.waypoints.shape[1])
     corners = _corners(path)
     reach = float(bounded_array(blend, (), "blend"))
-    if not 0.0 <= reach <= MOST_BLEND:
-        raise InputError(f"blend must be 0 or greater, at most {MOST_BLEND:g}, got {reach:g}")
+    if reach < 0.0:
+        raise InputError(f"blend must be 0 or greater, got {reach:g}")
     if clearance is not None:
         not_negative(clearance, "clearance")
     arm = limits if isinstance(limits, Robot) else None if world is None else world.robot

@@ -40,6 +40,8 @@ def blended(
     """
     kept = spaced(corners, MERGED_SHARE * blend)
     rows = corners if len(kept) == len(corners) else vertices(corners[kept])
+    if len(rows) < 2:  # the whole path is shorter than what is merged
+        return None
     along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
     radii, room = first_radii(rows, blend), (DEVIATION_SHARE - MERGED_SHARE) * blend
     for _ in range(MAX_ROUNDS):

@@ -296,6 +296,15 @@ def test_a_clearance_that_is_none_is_refused_also_where_nothing_is_blended(clear
         time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 1.0), clearance=clearance)
 
 
+@pytest.mark.parametrize("rows", [[[0.0, 0.0, 0.0], [0.5, 0.2, 0.0]], [[0.0] * 3, [0.1, 0.0, 0.0], [1e-11, 0.0, 0.0]]])
+def test_a_path_that_is_shorter_than_what_a_blend_merges_stops_at_its_corners(rows):
+    arm = load_robot("planar3")
+    path, limits = JointPath.of(arm, rows), RateLimits([1.0] * 3, [2.0] * 3)
+    for blend in (4.9, 5.1, 50.0, 1e6):
+        motion = time_parameterize(path, limits, blend=blend, world=World(arm))
+        assert motion.duration == pytest.approx(time_parameterize(path, limits).duration)
+
+
 def test_a_blend_needs_a_world():
     with pytest.raises(InputError, match=r"world=problem\.world"):
         time_parameterize(JointPath([[0, 0], [1, 0], [1, 1]]), RateLimits(1.0, 1.0), blend=0.1)
