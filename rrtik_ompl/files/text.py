@@ -45,9 +45,11 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
         raise InputError(f"{path}: this is a folder; give a file") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    if max(length, len(data)) > limit:
-        shown = f"{length // 2**20} MiB, more" if length else "larger"
-        raise InputError(f"{path}: {shown} than {limit // 2**20} MiB, the most that is read")
+    length = max(length, len(data))
+    if length > limit:
+        most, size = limit // 2**20, length // 2**20
+        shown = f"{size} MiB, more" if size > most else "larger"
+        raise InputError(f"{path}: {shown} than {most} MiB, the most that is read")
     return data
 
 

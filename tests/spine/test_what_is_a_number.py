@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import textwrap
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,12 @@ from rrtik_ompl.trajectory.cubics import places
 
 ROBOT = rrtik.load_robot("planar3")
 WORLD = rrtik.World(ROBOT)
+
+
+def nothing() -> Any:
+    """A function that takes nothing and gives nothing."""
+
+
 HUGE = np.broadcast_to(0.0, (10**9, 3))
 LIMITS = rrtik.RateLimits([1, 1, 1], [2, 2, 2])
 PROBLEM = rrtik.Problem(WORLD, [0, 0, 0], [0.5, 0.2, 0])
@@ -191,10 +198,10 @@ ODD_CALLS = {
     "replanner": lambda: rrtik.replan(PROBLEM, step=0.1, rate=1.0, planner=np.eye(2)),
     "feed": lambda: rrtik.replan(PROBLEM, lambda: None, step=0.1, rate=1.0),
     "words of a configuration": lambda: ROBOT.configuration([1, 2], np.eye(2)),
-    "goal feed": lambda: rrtik.replan(PROBLEM, step=0.1, rate=1.0, goal_feed=lambda: None),
+    "goal feed": lambda: rrtik.replan(PROBLEM, step=0.1, rate=1.0, goal_feed=nothing),
     "clock": lambda: rrtik.replan(PROBLEM, step=0.1, rate=1.0, clock=len),
     "on_ready": lambda: rrtik.view(ROBOT, html="page.html", on_ready="browser"),
-    "on_better": lambda: rrtik.shorten(PATH, PROBLEM, on_better=lambda: None),
+    "on_better": lambda: rrtik.shorten(PATH, PROBLEM, on_better=nothing),
     "method of shortening": lambda: rrtik.shorten(PATH, PROBLEM, method=np.eye(2)),
     "method of inverse kinematics": lambda: rrtik.solve_ik(ROBOT, rrtik.pose([1, 1, 0]), method=np.eye(2)),
     "all solutions": lambda: rrtik.solve_ik(ROBOT, rrtik.pose([1, 1, 0]), all=np.zeros(3)),
@@ -209,7 +216,7 @@ ODD_CALLS = {
     "problems": lambda: rrtik.plan_batch(range(10**12)),
     "axis of a set": lambda: rrtik.GoalSet([rrtik.pose([1, 1, 0])], np.array(["x", "y"])),
     "no feed": lambda: rrtik.replan(PROBLEM, np.array(True), step=0.1, rate=1.0),
-    "a clock that stands": lambda: rrtik.replan(PROBLEM, step=0.1, rate=1.0, clock=lambda: None),
+    "a clock that stands": lambda: rrtik.replan(PROBLEM, step=0.1, rate=1.0, clock=nothing),
     "parameters": lambda: rrtik.plan_many(WORLD, [0, 0, 0], [[1, 0, 0]], "bicrdt", parameters=np.zeros(3)),
     "proof in a file": lambda: PATH.save("path.json", proof=np.zeros(3)),
     "accelerations in a file": lambda: rrtik.time_parameterize(PATH, LIMITS).save("a.csv", accelerations=np.zeros(3)),
