@@ -23,8 +23,17 @@ from rrtik_ompl.fast.proof.accessors import (
 from rrtik_ompl.fast.proof.frames import carried, turned_back
 from rrtik_ompl.fast.proof.layout import ProofTable
 from rrtik_ompl.fast.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.fast.simd.lanes import bits, choose, double_at, first_bit, rounded_sum, spread_wide, wide_lanes_at
-from rrtik_ompl.fast.simd.wide_lanes import highest_of_wide, lowest_of_wide
+from rrtik_ompl.fast.simd.lanes import (
+    bits,
+    choose,
+    double_at,
+    first_bit,
+    highest_of_wide,
+    lowest_of_wide,
+    rounded_sum,
+    spread_wide,
+    wide_lanes_at,
+)
 
 MOST_STEPS = 20
 CONVERGED = 1e-7  # [m]

@@ -160,17 +160,18 @@ smaller = _lane_function("llvm.minnum", 2)
 larger = _lane_function("llvm.maxnum", 2)
 
 
-def _reduction(name: str) -> Any:
+def _reduction(name: str, lanes: Any, number: Any) -> Any:
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        kind = ir.FunctionType(SINGLE, [args[0].type])
-        called = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.{name}.v{WIDTH}f32")
+        kind = ir.FunctionType(context.get_value_type(number), [args[0].type])
+        full = f"llvm.vector.reduce.{name}.v{WIDTH}f{number.bitwidth}"
+        called = cgutils.get_or_insert_function(builder.module, kind, full)
         return builder.call(called, args, fastmath=FAST_MATH)
 
-    return intrinsic(lambda typingctx, x: (types.float32(x), emit) if x == LANES else None)
+    return intrinsic(lambda typingctx, x: (number(x), emit) if x == lanes else None)
 
 
-lowest = _reduction("fmin")
-highest = _reduction("fmax")
+lowest, highest = (_reduction(name, LANES, types.float32) for name in ("fmin", "fmax"))
+lowest_of_wide, highest_of_wide = (_reduction(name, WIDE_LANES, types.float64) for name in ("fmin", "fmax"))
 
 
 @_lowered
