@@ -6,6 +6,7 @@ import http.client
 import json
 import socket
 import threading
+import time
 from contextlib import suppress
 
 import numpy as np
@@ -24,6 +25,7 @@ LINE_REQUESTS = (
     '{"do": "stop"}',
 )
 ON_A_LINE = 12  # messages of a client before it goes
+BETWEEN_LOOKS = 2e-4  # [s] at an arm, which leave its line the processor
 
 
 def line_server(first: int, count: int) -> list[str]:
@@ -115,6 +117,7 @@ def arm_of_a_line(first: int, count: int) -> list[str]:
                     faults.append(f"{server.seed}: a line that cannot be shown: {arm.lost!r}")
                 with suppress(Exception):
                     arm.move(0, 0.1)
+                time.sleep(BETWEEN_LOOKS)
             reported = arm.reported
             if not comes_true(lambda: arm.reported > reported and not arm.lost):
                 faults.append(f"{first + count}: the line does not come back: {arm.lost}")

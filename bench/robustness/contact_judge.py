@@ -163,7 +163,8 @@ class Judge:
             if best is not None and bounds[k] >= best.gap:
                 break
             i, j = self._pairs[k]
-            gap = _gap(self._parts[i], poses[i], self._parts[j], poses[j], self._kept[k])
+            most = np.inf if best is None else best.gap
+            gap = _gap(self._parts[i], poses[i], self._parts[j], poses[j], self._kept[k], most)
             if best is None or gap < best.gap:
                 pair = f"{self._parts[i].name} / {self._parts[j].name}"
                 best = Nearest(gap, pair, (self._parts[i].kind, self._parts[j].kind))
@@ -184,8 +185,11 @@ class Judge:
         return np.asarray(bounds)
 
 
-def _gap(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, kept: float) -> float:
-    """What is left of the distance of two bodies above what must be kept [m]; less than 0 if that is not kept."""
+def _gap(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, kept: float, most: float) -> float:
+    """What is left of the distance of two bodies above what must be kept [m]; less than 0 if that is not kept.
+
+    Where it is more than ``most``, ``most`` or more comes back.
+    """
     ends = (first, first_pose, second, second_pose)
     for a, a_pose, b, b_pose in sorted((ends, ends[2:] + ends[:2]), key=_order):
         between = b_pose.inverse() * a_pose  # a's frame in b's
@@ -194,10 +198,10 @@ def _gap(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, k
                 normal = between.rotation @ normal
                 return lowest(b.shape, normal) - (offset + float(normal @ between.translation)) - kept
             case Sphere(radius=radius):
-                return float(distance_to(b.shape, between.translation[None])[0]) - radius - kept
+                return float(distance_to(b.shape, between.translation[None], most + kept + radius)[0]) - radius - kept
             case PointCloud():
-                return _cloud_gap(a.shape, between, b) - kept
-    return _by_coal(first, first_pose, second, second_pose, kept)
+                return _cloud_gap(a.shape, between, b, most + kept) - kept
+    return _by_coal(first, first_pose, second, second_pose, kept, most)
 
 
 def _order(ends: tuple[Part, pin.SE3, Part, pin.SE3]) -> int:
@@ -205,25 +209,29 @@ def _order(ends: tuple[Part, pin.SE3, Part, pin.SE3]) -> int:
     return next((k for k, kind in enumerate((HalfSpace, PointCloud)) if isinstance(ends[0].shape, kind)), 2)
 
 
-def _cloud_gap(cloud: PointCloud, between: pin.SE3, other: Part) -> float:
-    """The distance of the ball that is nearest; balls are looked at in the order of their distance from a box."""
+def _cloud_gap(cloud: PointCloud, between: pin.SE3, other: Part, most: float) -> float:
+    """The distance of the ball that is nearest; balls are looked at in the order of their distance from a box.
+
+    Where it is more than ``most``, ``most`` comes back.
+    """
     points: Matrix = cloud.points.astype(np.float64) @ between.rotation.T + between.translation
     centre, half = other.box
     away = np.linalg.norm(np.maximum(np.abs(points - centre) - half, 0.0), axis=1)
-    best = np.inf
+    best = most
     for rows in np.array_split(np.argsort(away), max(len(points) // 16, 1)):
         if away[rows[0]] - cloud.radius >= best:
             break
-        best = min(best, float(distance_to(other.shape, points[rows]).min()) - cloud.radius)
+        away_of_rows = distance_to(other.shape, points[rows], best + cloud.radius)
+        best = min(best, float(away_of_rows.min()) - cloud.radius)
     return best
 
 
-def _by_coal(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, kept: float) -> float:
+def _by_coal(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, kept: float, most: float) -> float:
     """By coal; of bodies that overlap, how far they have to be moved for the distance that they must keep.
 
     That is an upper bound of how deep they overlap, for some other way may be shorter.
     """
-    found = _coal_distance(first, first_pose, second, second_pose, np.zeros(3))
+    found = _coal_distance(first, first_pose, second, second_pose, np.zeros(3), most + kept)
     left = float(found.min_distance) - kept
     if left >= 0.0:
         return left
@@ -231,13 +239,19 @@ def _by_coal(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE
     ways = WAYS if not np.isfinite(normal).all() else np.vstack([normal, -normal, WAYS])
     for step in STEPS:
         for way in ways:
-            if _coal_distance(first, first_pose, second, second_pose, step * way).min_distance > kept:
+            moved = _coal_distance(first, first_pose, second, second_pose, step * way, 2.0 * kept + step)
+            if moved.min_distance > kept:
                 return -float(step)
     return -2.0 * float(STEPS[-1])
 
 
-def _coal_distance(first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, shift: Vector) -> Any:
+def _coal_distance(
+    first: Part, first_pose: pin.SE3, second: Part, second_pose: pin.SE3, shift: Vector, most: float
+) -> Any:
+    """The distance by coal, or ``most`` where it is more: pairs of triangles farther apart are then passed over."""
     asked, found = coal.DistanceRequest(), coal.DistanceResult()
+    if np.isfinite(most):
+        found.min_distance = most
     asked.gjk_tolerance = asked.epa_tolerance = 1e-9
     ends = (
         coal.Transform3s(first_pose.rotation, first_pose.translation),

@@ -18,7 +18,16 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.collision.cloud_solid import CloudSolid, cloud_solid
-from rrtik_ompl.collision.solids import SameObject, bvh, convexified, hull, is_mesh, measured, mesh_arrays
+from rrtik_ompl.collision.solids import (
+    SameObject,
+    bvh,
+    convex_arrays,
+    convexified,
+    hull,
+    is_mesh,
+    measured,
+    mesh_arrays,
+)
 from rrtik_ompl.shapes import (
     Box,
     Capsule,
@@ -282,7 +291,5 @@ def shape_of(geometry: Any) -> Shape | None:
     if is_mesh(geometry):
         return Mesh(*mesh_arrays(geometry))
     if isinstance(geometry, coal.Convex):
-        corners = np.array(geometry.points(), dtype=np.float64).reshape(-1, 3)
-        faces = [geometry.polygons(k) for k in range(geometry.num_polygons)]
-        return Mesh(corners, np.array([[f[0], f[1], f[2]] for f in faces], dtype=np.int64))
+        return Mesh(*convex_arrays(geometry))
     return None

@@ -16,9 +16,11 @@ from rrtik_ompl.robot import Robot
 
 Found = TypeVar("Found")
 
-# A mesh whose volume is at least this share of its convex hull's is taken as convex: its hull stands for it. The hull
-# contains the mesh, so nothing that touches the mesh is missed.
+# A mesh no triangle of which lies deeper [m] below its convex hull is taken as convex: its hull stands for it. The hull
+# contains the mesh, so nothing that touches the mesh is missed. Volumes are compared first, as that is quick.
+DEEPEST_DENT = 1e-6
 CONVEX_VOLUME_RATIO = 0.999
+MOST_COMPARED = 400_000_000  # triangles times faces of the hull; a mesh of more stays one
 
 # Hulls below these are refused: thickness over extent, and extent [m].
 FLATTEST, SMALLEST = 1e-7, 1e-6
@@ -61,7 +63,7 @@ def _thickness(points: Matrix) -> float:
 
 
 def convexified(geometry: Any) -> Any:
-    """The convex hull of a mesh that is convex (see ``CONVEX_VOLUME_RATIO``); any other geometry as it is."""
+    """The convex hull of a mesh that is convex (see ``DEEPEST_DENT``); any other geometry as it is."""
     if not is_mesh(geometry):
         return geometry
     vertices, triangles = mesh_arrays(geometry)
@@ -70,7 +72,26 @@ def convexified(geometry: Any) -> Any:
     if not _thickness(vertices) >= FLATTEST * _extent(vertices):
         return geometry
     solid = hull(vertices)
-    return solid if volume >= CONVEX_VOLUME_RATIO * solid.computeVolume() else geometry
+    if volume < CONVEX_VOLUME_RATIO * solid.computeVolume() or len(triangles) * solid.num_polygons > MOST_COMPARED:
+        return geometry
+    return solid if _depth(vertices, triangles, solid) <= DEEPEST_DENT else geometry
+
+
+def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -> float:
+    """At most how far triangles lie below the surface of their convex hull [m].
+
+    All of a triangle is as near to a plane beside the hull as its farthest corner; the plane is that of the face which
+    is nearest to the triangle's middle.
+    """
+    points, faces = convex_arrays(solid)
+    normals = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
+    normals *= np.where((normals * (points[faces[:, 0]] - points.mean(axis=0))).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    sizes = np.linalg.norm(normals, axis=1)
+    normals = normals[sizes > 0.0] / sizes[sizes > 0.0, None]
+    tops = np.array([(vertices @ normal).max() for normal in normals])
+    corners = vertices[triangles]
+    nearest = [int(np.argmin(tops - normals @ middle)) for middle in corners.mean(axis=1)]
+    return float((tops[nearest, None] - np.einsum("tcj,tj->tc", corners, normals[nearest])).max())
 
 
 def is_mesh(geometry: Any) -> bool:
@@ -116,6 +137,13 @@ def _around(key: SameObject) -> Any:
 def mesh_arrays(geometry: Any) -> tuple[Matrix, NDArray[np.int64]]:
     """Vertices, shape (n, 3), and triangles, shape (m, 3), of a coal mesh, read-only."""
     return _mesh_arrays(SameObject(geometry))
+
+
+def convex_arrays(solid: coal.Convex) -> tuple[Matrix, NDArray[np.int64]]:
+    """Corners, shape (n, 3), and triangles, shape (m, 3), of a coal convex solid; its triangles turn either way."""
+    points = np.array(solid.points(), dtype=np.float64).reshape(-1, 3)
+    corners = (solid.polygons(k) for k in range(solid.num_polygons))
+    return points, np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
 
 
 def is_closed(geometry: Any) -> bool:

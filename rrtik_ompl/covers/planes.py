@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.solids import SameObject
+from rrtik_ompl.collision.solids import SameObject, convex_arrays
 
 MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
 SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal
@@ -44,8 +44,7 @@ def outward_planes(solid: Any) -> Matrix | None:
     Each plane is moved to the outermost corner along its normal, so that the solid lies behind all of them whatever
     the faces' own precision; almost parallel faces share one plane.
     """
-    points = np.array(solid.points(), dtype=np.float64).reshape(-1, 3)
-    triangles = np.array([[t[0], t[1], t[2]] for t in (solid.polygons(k) for k in range(solid.num_polygons))])
+    points, triangles = convex_arrays(solid)
     if len(triangles) < 4:
         return None
     a, b, c = (points[triangles[:, k]] for k in range(3))

@@ -61,8 +61,8 @@ def test_overlaps_are_seen(kind):
     assert Judge(world_beside(BESIDE[kind], -5e-5)).nearest(np.zeros(1)).gap < -2e-5
 
 
-def test_worlds_of_two_robots_are_right_at_contact():
-    for robot in ("titan4", "z1"):
+def test_worlds_of_robots_are_right_at_contact():
+    for robot in ("titan4", "z1", "panda"):
         found = contact.contacts(robot, 1, 20)
         assert (found.contacts, found.too_deep, found.too_far, found.wrong) == (20, 0, 0, [])
 

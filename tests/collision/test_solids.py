@@ -10,7 +10,7 @@ from rrtik_ompl.collision.certificate import distance
 from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.collision.solids import hull, inside_mesh
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
 from rrtik_ompl.shapes.polygons import convex_parts
 
 LETTER_E = [(8, 4), (18, 4), (18, 7), (11, 7), (11, 11), (18, 11)]
@@ -71,6 +71,21 @@ def test_the_sense_of_a_polygon_does_not_matter():
 def test_a_convex_mesh_becomes_a_solid_and_a_hollow_one_stays_a_mesh(cube, dented_cube):
     assert isinstance(pieces(cube)[0].geometry, coal.ConvexBase)
     assert isinstance(pieces(dented_cube(1.0, -0.6))[0].geometry, coal.BVHModelBase)
+
+
+@pytest.mark.parametrize(("dent", "kind"), [(5e-7, coal.ConvexBase), (5e-6, coal.BVHModelBase)])
+def test_a_nearly_convex_mesh_is_judged_as_what_it_is(dented_cube, dent, kind):
+    assert isinstance(pieces(dented_cube(1.0, 1.0 - dent))[0].geometry, kind)
+
+
+def test_a_fine_cylinder_in_the_precision_of_a_file_is_convex():
+    turn = np.linspace(0.0, 2.0 * np.pi, n := 200, endpoint=False)
+    ring = np.column_stack([0.05 * np.cos(turn), 0.05 * np.sin(turn), np.full(n, 0.2)])
+    points = np.vstack([ring, ring * [1.0, 1.0, -1.0]]).astype(np.float32).astype(np.float64)
+    at, after = np.arange(n), np.roll(np.arange(n), -1)
+    sides = [np.column_stack([at, at + n, after + n]), np.column_stack([at, after + n, after])]
+    lids = [np.column_stack([0 * at, at, after])[1:-1], np.column_stack([0 * at + n, after + n, at + n])[1:-1]]
+    assert isinstance(pieces(Mesh(points, np.vstack(sides + lids)))[0].geometry, coal.ConvexBase)
 
 
 @given(point=st.tuples(*[st.floats(-2.0, 2.0)] * 3))
