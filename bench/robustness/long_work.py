@@ -42,7 +42,6 @@ class LongWork:
         again: Does it once more after a fault; as ``work`` if None.
         waits: Whether it waits for other processes rather than works: its moments are of wall time then.
         grows: Files that grow line by line: what stood in them before a fault must still stand there.
-        rarer: How many times fewer trials are made of it, as it takes longer.
     """
 
     work: Callable[[], int]
@@ -50,7 +49,6 @@ class LongWork:
     again: Callable[[], int] | None = None
     waits: bool = False
     grows: tuple[str, ...] = ()
-    rarer: int = 1
 
 
 def _command(*words: str) -> Callable[[], int]:
@@ -149,12 +147,10 @@ WORK: dict[str, LongWork] = {
     "plan": LongWork(
         _command(*PLAN, *PLAN_FILES),
         {"path.json": rrtik.load_path, "page.html": _page, "proof.json": load_certificate},
-        rarer=4,
     ),
     "task": LongWork(
         _command("task", "titan4_drawer", "--out", "task.json", "--trajectory", "motion.json", "--html", "page.html"),
         {"task.json": load_task_plan, "motion.json": lambda file: json.loads(file.read_text()), "page.html": _page},
-        rarer=4,
     ),
     "replan --record": LongWork(
         _command("replan", "replan_walls", "--seconds", "1", "--record", "run.json", "--html", "page.html"),
@@ -165,12 +161,10 @@ WORK: dict[str, LongWork] = {
         {"session.jsonl": lambda file: list(read_record(file))},
         _session("second.jsonl"),
         grows=("session.jsonl",),
-        rarer=5,
     ),
     "reproduce": LongWork(
         _command("reproduce", "drrt-con-arm", "--quick", "--markdown", "table.md"),
         {"table.md": _table, "table.parts.jsonl": _lines},
-        rarer=4,
     ),
     "reach": LongWork(
         _command("reach", "planar3", "--samples", "20000", "--out", "map.npz", "--html", "page.html"),
@@ -184,7 +178,6 @@ WORK: dict[str, LongWork] = {
         _command(*BENCH, "--resume"),
         waits=True,
         grows=(f"out/{NAME}",),
-        rarer=5,
     ),
     "plan_batch": LongWork(_batch, waits=True),
 }  # fmt: skip
