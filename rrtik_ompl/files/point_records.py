@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.errors import InputError
 
 AXES = ("x", "y", "z")
+LONGEST_LINE = 4 * 1024 * 1024  # bytes, that are surely read; a line takes ten times its size in memory
 
 
 def claimed(text: str, what: str) -> int:
@@ -62,8 +63,13 @@ def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int |
     """Columns of rows of numbers in a text, shape (n, len(columns)); all of them if None.
 
     Raises:
-        InputError: If a row is too short or has something else.
+        InputError: If a row is too short, too long, or has something else.
     """
+    for begin in range(0, len(data) - LONGEST_LINE, LONGEST_LINE):
+        window = data[begin : begin + LONGEST_LINE]
+        if b"\n" not in window and b"\r" not in window:
+            most = LONGEST_LINE // 2**20
+            raise InputError(f"{what}: not rows of numbers: a line is longer than {most} MiB, the most that is read")
     plain = data.replace(b",", b" ") if b"," in data else data
     if not plain or plain.isspace():
         return np.zeros((0, len(columns or ())))

@@ -116,6 +116,7 @@ BAD = {
     "empty.xyz": (b"", "no point"),
     "nan.xyz": (b"0 0 0\nnan 0 0\n", "1 of 2 points are not finite"),
     "short.xyz": (b"0 0\n", "not rows of numbers"),
+    "one_line.xyz": (b"0 0 1 " * 2_000_000, "a line is longer than 4 MiB"),
     "cloud.las": (b"LASF", "unknown kind of cloud"),
 }
 
