@@ -275,7 +275,7 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
     found = world_digest(world.robot, world.bodies, world.pairs)
     if digest == found and same_step:
         return _restored(world, rows, *known, seed=seed, near=near)
-    if not moved and digest != found:
+    if moved is not True and digest != found:
         raise InputError(f"{path}: is the roadmap of another world; load it with moved=True, or make a new one")
     return _restored(world, rows, *known, seed=seed, near=near).moved_to(world)
 

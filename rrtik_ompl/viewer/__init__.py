@@ -80,6 +80,8 @@ def view(
 
     called(on_ready, "on_ready", "an address")
     require(title, str | None, "title of a page")
+    require(still, bool, "still")
+    require(inline, bool | None, "inline")
     text = page(shown, path, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still)
     if html is not None:
         write_text(html, text)

@@ -83,6 +83,13 @@ def test_what_cannot_be_shown_is_refused(shown: Any) -> None:
         page(shown)
 
 
+@pytest.mark.parametrize("option", ["still", "inline"])
+def test_a_word_is_no_answer_to_yes_or_no(option: str, tmp_path: Path) -> None:
+    words: dict[str, Any] = {option: "no"}
+    with pytest.raises(InputError, match=f"{option} must be of type bool"):
+        view(Scene(), html=tmp_path / "page.html", **words)
+
+
 def test_a_path_without_a_robot_is_refused(scene: Scene) -> None:
     with pytest.raises(InputError, match="needs a robot"):
         page(scene, WAYPOINTS)
