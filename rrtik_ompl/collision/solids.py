@@ -20,7 +20,7 @@ Found = TypeVar("Found")
 # contains the mesh, so nothing that touches the mesh is missed. Volumes are compared first, as that is quick.
 DEEPEST_DENT = 1e-6
 CONVEX_VOLUME_RATIO = 0.999
-MOST_COMPARED = 400_000_000  # triangles times faces of the hull; a mesh of more stays one
+COMPARED_AT_ONCE, MOST_COMPARED = 20_000, 400_000_000  # triangles times faces of the hull; one of more stays a mesh
 
 # Hulls below these are refused: thickness over extent, and extent [m].
 FLATTEST, SMALLEST = 1e-7, 1e-6
@@ -88,9 +88,10 @@ def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -
     normals *= np.where((normals * (points[faces[:, 0]] - points.mean(axis=0))).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     sizes = np.linalg.norm(normals, axis=1)
     normals = normals[sizes > 0.0] / sizes[sizes > 0.0, None]
-    tops = np.array([(vertices @ normal).max() for normal in normals])
-    corners = vertices[triangles]
-    nearest = [int(np.argmin(tops - normals @ middle)) for middle in corners.mean(axis=1)]
+    corners, parts = vertices[triangles], 1 + len(triangles) * len(normals) // COMPARED_AT_ONCE
+    tops = np.concatenate([(vertices @ part.T).max(axis=0) for part in np.array_split(normals, parts)])
+    middles = np.array_split(corners.mean(axis=1), parts)
+    nearest = np.concatenate([(tops - part @ normals.T).argmin(axis=1) for part in middles])
     return float((tops[nearest, None] - np.einsum("tcj,tj->tc", corners, normals[nearest])).max())
 
 
