@@ -133,7 +133,7 @@ class Expander:
     def _aims(self, branch: Branch, step: Step, stage: MoveTo) -> Iterator[Branch]:
         world = branch.setting.world
         problem = Problem(world, branch.q, stage.goal, constraints=stage.constraints)
-        search = GoalSearch(problem, self.rng)
+        search = GoalSearch(problem, self.rng, all_turns=False)  # the plan to it may go either way round
         search.first()
         if search.reason:
             self.failures.append((branch, step, search.reason))

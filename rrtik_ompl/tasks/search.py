@@ -13,12 +13,14 @@ from itertools import count
 
 import numpy as np
 
+from rrtik_ompl.arrays import TAU, Vector
 from rrtik_ompl.errors import ProblemError
 from rrtik_ompl.path import JointPath, proved_as_clear
 from rrtik_ompl.planning import plan_counted
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.tasks.branches import Branch, Expander, again
 from rrtik_ompl.tasks.program import Step
+from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.stages import MoveTo
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 
@@ -109,7 +111,7 @@ class TaskSearch:
 
     def _motions(self, branch: Branch, effort: int) -> list[tuple[Branch, JointPath]] | None:
         """The motions of a branch that has done everything, those between postures planned; None if one fails."""
-        found = []
+        found: list[tuple[Branch, JointPath]] = []
         for link in branch.chain():
             if link.moves and id(link) not in self._ways and not self._plan(link, effort):
                 self._blocked.add(id(link))
@@ -117,7 +119,7 @@ class TaskSearch:
                 return None
             path = self._ways.get(id(link), link.path)
             if path is not None:
-                found.append((link, path))
+                found.append((link, _begun_at(found[-1][1].end, path, link) if found else path))
         return found
 
     def _plan(self, link: Branch, effort: int) -> bool:
@@ -142,3 +144,17 @@ class TaskSearch:
             return False
         self._ways[id(link)] = made.path
         return True
+
+
+def _begun_at(q: Vector, path: JointPath, link: Branch) -> JointPath:
+    """The path of a branch from q, shape (dof,), where the one before ended: perhaps whole turns of joints away.
+
+    A plan may reach its goal the other way round of a continuous joint.
+    """
+    away = q - path.start
+    if not away.any():
+        return path
+    assert link.step is not None, "it has done one"
+    turned = path.with_waypoints(np.vstack([q, path.waypoints[1:] + TAU * np.round(away / TAU)]))
+    clearance = CLEARANCE if path.proof is None else path.proof.clearance
+    return proved_as_clear(turned, world_of_motion(turned, link.setting.world, link.step.stage), clearance)

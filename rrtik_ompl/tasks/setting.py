@@ -8,9 +8,11 @@ from typing import Any
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import robot_from_entry
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
-from rrtik_ompl.tasks.stages import Attach, Detach, Gripper
+from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, MoveTo, Stage
 from rrtik_ompl.world import World
 
 
@@ -57,6 +59,13 @@ class Setting:
         held = next(item for item in self.scene.attached if item.name == stage.object)
         pose = self.robot.fk(q, held.link) * held.pose
         return Setting(self._like, self.robot, self.scene.detaching(stage.object, pose))
+
+
+def world_of_motion(path: JointPath, world: World, stage: Stage) -> World:
+    """The world of a motion, with the path constraints of its stage if it has any."""
+    if not isinstance(stage, MoveTo) or not stage.constraints:
+        return world
+    return Problem(world, path.start, path.end, constraints=stage.constraints).world
 
 
 def with_gripper(robot: Robot, stage: Gripper) -> Robot:

@@ -10,10 +10,8 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, frozen, not_negative
 from rrtik_ompl.copies import in_one_line
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.tasks import MoveTo, TaskPlan
-from rrtik_ompl.tasks.stages import Stage
+from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.world import World
 
@@ -89,18 +87,11 @@ def time_task(
         begins.append(now)
         if path.length == 0.0:
             continue
-        part = time_parameterize(path, used, blend=blend, world=_kept(path, world, stage), **options)
+        part = time_parameterize(path, used, blend=blend, world=world_of_motion(path, world, stage), **options)
         parts.append(part)
         gaps.append(waiting)
         waiting, now = 0.0, now + part.duration
     return TimedTask(_joined(parts, gaps), frozen(begins), frozen(np.reshape(pauses, (-1, 2))))
-
-
-def _kept(path: JointPath, world: World, stage: Stage) -> World:
-    """The world of a motion, with the path constraints of its stage if it has any."""
-    if not isinstance(stage, MoveTo) or not stage.constraints:
-        return world
-    return Problem(world, path.start, path.end, constraints=stage.constraints).world
 
 
 def _changed(before: World, after: World) -> bool:

@@ -1,10 +1,13 @@
 """Goals that are reached one after the other, as one path."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.constraints.shorthands import upright
+from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.scene import Obstacle, Scene
@@ -55,6 +58,28 @@ def test_constraints_hold_on_the_whole_way_as_seen_from_the_start(world):
     axis = robot.fk_batch(rows)[:, :3, column]
     tilt = np.degrees(np.arccos(np.clip(axis @ axis[0], -1.0, 1.0)))
     assert tilt.max() <= 5.2
+
+
+def test_goals_behind_which_a_continuous_joint_went_the_other_way_round_are_joined_without_a_jump():
+    links = '<link name="base"/><link name="tip"/><link name="arm"><collision><origin xyz="0.3 0 0"/>'
+    links += '<geometry><box size="0.5 0.04 0.04"/></geometry></collision></link>'
+    turn = '<joint name="turn" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/></joint>'
+    lift = '<joint name="lift" type="prismatic"><parent link="arm"/><child link="tip"/><origin xyz="0.55 0 0"/>'
+    lift += '<axis xyz="0 0 1"/><limit lower="0" upper="0.3" effort="10" velocity="1"/></joint>'
+    robot = robot_from_urdf_text(f'<robot name="swing">{links}{turn}{lift}</robot>')
+    wall = Obstacle("wall", Box([0.2, 0.1, 0.5]), [0.0, 0.4, 0.0])  # in the short way of every motion across it
+    world, start = World(robot, Scene([wall])), [0.0, 0.1]
+    for angle in np.linspace(2.2, 3.1, 19):
+        tour = plan_through(world, start, [[angle, 0.1], [angle + 0.05, 0.25], start], seed=1)
+        assert tour.found, tour.reason
+        rows = tour.path.waypoints
+        dense = np.vstack([a + np.linspace(0.0, 1.0, 200)[:, None] * (b - a) for a, b in pairwise(rows)])
+        corners = np.array([[0.05, -0.02], [0.05, 0.02], [0.55, -0.02], [0.55, 0.02]])  # of the arm, seen from above
+        cosine, sine = np.cos(dense[:, :1]), np.sin(dense[:, :1])
+        beside = np.abs(cosine * corners[:, 0] - sine * corners[:, 1])
+        ahead = sine * corners[:, 0] + cosine * corners[:, 1]
+        assert not ((beside < 0.1) & (ahead > 0.35)).any()
+        assert tour.path.proven
 
 
 def test_a_goal_out_of_reach_is_named(world):
