@@ -121,7 +121,7 @@ class _Work:
         request = replace(self._request, seconds=self._left(), seed=seed)
         if not self._how.bounded or self._one_joint:
             return request
-        limits = {"bound": BOUND * self.best.length, "max_iterations": BOUNDED_SAMPLES}
+        limits = {"bound": BOUND * COSTS["length"](self.best, self._problem), "max_iterations": BOUNDED_SAMPLES}
         return replace(request, restarts=0, parameters={**limits, **request.parameters})
 
     def _settle(self, path: JointPath) -> None:

@@ -9,6 +9,11 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.ompl_bridge.planner_names import find_planner
+from rrtik_ompl.planning import improving
+from rrtik_ompl.planning.improving import Improvement, improved
+from rrtik_ompl.planning.one_planner import run_planner
+from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.planning.path_costs import least_cost, length
 
 HEAVY = 6.0
@@ -85,6 +90,25 @@ def test_shortening_never_makes_the_weighted_length_longer(problem, method):
     assert all((each.start == path.start).all() and (each.end == path.end).all() for each in seen)
     ratio = weighted_length(shorter, weights) / length(shorter, heavy)
     assert least_cost(heavy, "length") == pytest.approx(np.linalg.norm((heavy.goal.q - heavy.start) * weights) / ratio)
+
+
+@pytest.mark.kernels
+def test_plans_that_shall_be_shorter_than_the_best_path_are_bounded_in_the_weighted_length(monkeypatch):
+    monkeypatch.setattr(improving, "PATIENCE", 12)
+    post = rrtik.Obstacle("post", rrtik.Box([0.1, 0.1, 1.2]), [0.6, 0.0, 0.6])
+    robot = rrtik.weighted(rrtik.load_robot("ur5"), {"shoulder_pan_joint": 5.0})
+    start, goal = np.array([[-1.2, -0.9, 1.2, -0.3, 1.6, 0.0], [1.2, -0.9, 1.2, -0.3, 1.6, 0.0]])
+    problem = rrtik.Problem(rrtik.World(robot, rrtik.Scene([post])), start, goal)
+    request = Request(20.0, 1, 0, {}, "preferred", None)
+    tried = []
+
+    def again(request):
+        tried.append(run_planner(problem, "fastrrtconnect", find_planner("fastrrtconnect"), request).found)
+        return first
+
+    first = run_planner(problem, "fastrrtconnect", find_planner("fastrrtconnect"), request)
+    improved(problem, first, again, request, Improvement(20.0, bounded=True))
+    assert np.mean(tried) > 0.5
 
 
 @pytest.mark.kernels
