@@ -21,6 +21,7 @@ from rrtik_ompl.planning import PROOF_MODES, RESTARTS, plan
 from rrtik_ompl.planning.batches import Query, plans_together
 from rrtik_ompl.planning.outcome import Plan
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
 
 Ends = ArrayLike | Sequence[Goal]
@@ -71,7 +72,7 @@ def plan_many(
     one_of(PROOF_MODES, proof, "proof")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
     dof = world.robot.dof
-    wanted = _goals(goals, dof)
+    wanted = _goals(goals, world.robot)
     rows = finite_array(starts, (dof,) if dimensions(starts) == 1 else (None, dof), "starts")
     rows = np.broadcast_to(rows, (len(wanted), dof)) if rows.ndim == 1 else rows
     if len(rows) != len(wanted):
@@ -85,12 +86,16 @@ def plan_many(
     return [each for batch in made for each in batch]
 
 
-def _goals(given: Ends, dof: int) -> list[Goal]:
+def _goals(given: Ends, robot: Robot) -> list[Goal]:
     """Goals as they are given, or rows of configurations as goals."""
-    if isinstance(given, Sequence) and all(isinstance(goal, Goal) for goal in given):
-        return [goal for goal in given if isinstance(goal, Goal)]
-    rows: Any = given
-    return [JointGoal(row) for row in finite_array(rows, (None, dof), "goals")]
+    if not isinstance(given, Sequence) or not all(isinstance(goal, Goal) for goal in given):
+        rows: Any = given
+        return [JointGoal(row) for row in finite_array(rows, (None, robot.dof), "goals")]
+    goals = [goal for goal in given if isinstance(goal, Goal)]
+    for number, goal in enumerate(goals):
+        if isinstance(goal, JointGoal):
+            robot.configuration(goal.q, f"goals[{number}]")
+    return goals
 
 
 def _batch(

@@ -126,6 +126,10 @@ def test_starts_and_goals_that_do_not_fit_are_refused(world):
         rrtik.plan_many(world, np.zeros((2, 6)), np.zeros((2, 6)), threads=0)
     with pytest.raises(InputError, match="goals"):
         rrtik.plan_many(world, np.zeros((2, 6)), np.zeros((2, 5)))
+    some = [rrtik.JointGoal(np.zeros(6)), rrtik.JointGoal(np.zeros(5))]
+    for planner in (None, "fastrrtconnect"):
+        with pytest.raises(InputError, match=r"goals\[1\]: robot 'ur5' has 6 joints .*, but 5 values were given"):
+            rrtik.plan_many(world, np.zeros(6), some, planner)
 
 
 def test_what_work_raises_in_a_thread_is_raised():
