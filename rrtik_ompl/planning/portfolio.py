@@ -76,17 +76,19 @@ def _search(problem: Problem, request: Request) -> tuple[Plan, str, dict[str, in
         left = share * (request.seconds - spent)
         if left <= 0.0:
             break
+        begin = time.perf_counter()
         try:
             tried = run_planner(problem, name, find_planner(name), replace(request, seconds=left))
         except PlannerError as error:
             broken = error
             reasons.append(str(error))
+            spent += time.perf_counter() - begin
             continue
         spent += tried.seconds
         for key, value in tried.statistics.items():
             totals[key] = totals.get(key, 0) + value
         reasons += [] if tried.found else [f"{name}: {tried.reason}"]
-        best = tried if best is None or _rank(tried) < _rank(best) else best
+        best = tried if best is None or not best.found or _rank(tried) < _rank(best) else best
         if best.found and best.proven is not False:
             break
     if best is None:

@@ -88,10 +88,29 @@ def test_where_nobody_finds_a_path_the_reason_names_everybody(boxes, monkeypatch
     assert not nothing.found
     assert "fastrrtconnect: " in nothing.reason
     assert "bicrdt: " in nothing.reason
+    assert nothing.planner == members(boxes)[-1]  # the one that tried last
     assert nothing.statistics["attempts"] >= 2
     replaced(monkeypatch, fastrrtconnect=Broken, bicrdt=Broken)
     with pytest.raises(PlannerError, match="no luck"):
         plan(boxes, seed=1, seconds=1.0)
+
+
+def test_what_a_planner_took_until_it_broke_counts(boxes, monkeypatch):
+    class BrokenLate(Idle):
+        """Breaks when its time is up."""
+
+        def search(self, starts, goals, checker, ptc):
+            while not ptc():
+                time.sleep(0.01)
+            raise RuntimeError("no luck")
+
+    def member(name):
+        return BrokenLate if name == members(boxes)[0] else Idle
+
+    monkeypatch.setattr(portfolio, "find_planner", member)
+    nothing = plan(boxes, seed=1, seconds=2.0)
+    assert not nothing.found
+    assert nothing.seconds > 0.9
 
 
 def test_the_portfolio_takes_no_options(boxes):
