@@ -23,6 +23,7 @@ from rrtik_ompl.planning.path_costs import COSTS, least_cost
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import shorten
 from rrtik_ompl.shortening.restarts import BOUND, BOUNDED_SAMPLES, GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
+from rrtik_ompl.world.kept_clearance import possible_clearance
 
 LEAST_SECONDS = 1e-3  # for which another round is begun
 PLANS = 4  # of which the best is shortened further, if it is worth it
@@ -146,7 +147,8 @@ class _Work:
             return path
         self._shortenings += 1
         end, seed = time.perf_counter() + left, self._request.seed + self._shortenings
-        limits: dict[str, Any] = {"checks": checks, "clearance": self._request.clearance, "seed": seed}
+        clearance = possible_clearance(self._problem.world, self._request.clearance, path.waypoints)
+        limits: dict[str, Any] = {"checks": checks, "clearance": clearance, "seed": seed}
         single = None if self._one_joint else False
         found = shorten(path, self._problem, stop=lambda: time.perf_counter() > end, one_joint=single, **limits)
         self._take(found)

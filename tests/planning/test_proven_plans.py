@@ -274,6 +274,7 @@ def test_a_path_to_a_goal_of_the_tip_ends_where_the_clearance_is_kept(seed):
 
 
 def test_where_no_configuration_at_the_goal_keeps_the_clearance_less_is_kept():
-    found = rrtik.plan(rrtik.load_problem("planar6_c_pose"), seed=1, clearance=0.3)
-    assert found.proven
-    assert 0.0 < found.path.proof.clearance < 0.3
+    for improve in (0.0, 0.3):
+        found = rrtik.plan(rrtik.load_problem("planar6_c_pose"), seed=1, clearance=0.3, improve=improve)
+        assert found.proven
+        assert 0.0 < found.path.proof.clearance < 0.3
