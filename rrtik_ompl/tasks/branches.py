@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -41,7 +42,7 @@ class Branch:
         step: What has been done since; None at the start.
         path: Of a straight line; None elsewhere.
         done: How many stages.
-        cost: Way of the joints so far [rad, metres counted alike].
+        cost: Way of the joints so far, weighted [rad, metres counted alike].
         chosen: Numbers of the alternatives taken, from 0.
         effort: Round of the search that made it.
     """
@@ -188,5 +189,6 @@ def again(branch: Branch, effort: int) -> Branch:
 
 
 def _next(branch: Branch, step: Step, setting: Setting, q: Vector, path: JointPath | None = None) -> Branch:
-    cost = branch.cost + (way_of(setting.robot, branch.q, q) if path is None else path.length)
+    rows = [branch.q, q] if path is None else path.waypoints
+    cost = branch.cost + sum(way_of(setting.robot, a, b) for a, b in pairwise(rows))
     return Branch(setting, q, branch.rest[1:], branch, step, path, branch.done + 1, cost, branch.chosen, branch.effort)

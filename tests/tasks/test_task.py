@@ -333,3 +333,12 @@ def test_what_is_held_keeps_its_padding_and_what_is_let_go_has_none():
     refused = taken(0.025).plan(world, start, seed=1)
     assert not refused.found
     assert "shelf" in refused.reason
+
+
+def test_of_several_lines_the_one_is_taken_whose_weighted_way_is_shorter():
+    start, taken = [0.0, -1.6, 1.8, -0.2, 1.6, 0.0], []
+    lines = Alternatives([[Straight(by=[0.0, 0.05, 0.0])], [Straight(by=[0.0, 0.0, 0.12])]])  # the base turns, or not
+    for weights in (None, {"shoulder_pan_joint": 20.0}):
+        world = rrtik.World(rrtik.load_robot("ur5", joint_weights=weights))
+        taken.append(Task([lines]).plan(world, start, seed=1).chosen)
+    assert taken == [(0,), (1,)]
