@@ -22,6 +22,7 @@ from rrtik_ompl.fast.ik.rail_layout import (
 )
 
 NO_TURN = 1e-12  # [rad]
+LEAST_SCREW = 1e-8  # [rad]; the line of a smaller one is so far away that places about it lose their digits
 MOST_TURNS = 1_000
 STRAIGHT = 1e-9  # share of its length by which three points may leave a line
 Z = (0.0, 0.0, 1.0)
@@ -127,7 +128,7 @@ def screw_rail(T_begin: pin.SE3, T_end: pin.SE3, turns: int = 0) -> Rail:
     if whole_turns > MOST_TURNS:
         raise InputError(f"turns must be a whole number from {-MOST_TURNS} to {MOST_TURNS}, got {turns}")
     axis, angle = _turn_between(T_begin, T_end)
-    if angle < NO_TURN:
+    if angle < LEAST_SCREW:
         if whole_turns:
             raise InputError(
                 f"turns={turns}: the goal is not turned against the tip, so whole turns have no axis; leave turns out"

@@ -195,6 +195,16 @@ def test_a_screw_turns_and_slides_in_proportion():
         assert np.linalg.norm(pose[:2, 3] - point[:2]) == pytest.approx(0.05, abs=1e-4)
 
 
+@pytest.mark.parametrize("angle", [2e-12, 1e-10, 1e-8, 1e-6])
+def test_a_screw_that_hardly_turns_ends_at_its_goal(angle):
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        begin, axis = pin.SE3.Random(), rng.normal(size=3)
+        turn = pin.exp3(angle / np.linalg.norm(axis) * axis)
+        goal = pin.SE3(turn @ begin.rotation, begin.translation + rng.normal(size=3))
+        assert screw_rail(begin, goal).poses([1.0])[0] == pytest.approx(goal.homogeneous, abs=1e-7)
+
+
 def test_whole_turns_of_a_screw_go_the_other_way_round():
     begin = pin.SE3.Identity()
     goal = pin.SE3(pin.exp3(np.array([0.0, 0.0, 0.5])), np.array([0.0, 0.0, 0.1]))
