@@ -7,7 +7,8 @@ import pytest
 from ompl import geometric as og
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.description.urdf import robot_from_urdf_text
+from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
 from rrtik_ompl.planning import plan
@@ -278,3 +279,16 @@ def test_where_no_configuration_at_the_goal_keeps_the_clearance_less_is_kept():
         found = rrtik.plan(rrtik.load_problem("planar6_c_pose"), seed=1, clearance=0.3, improve=improve)
         assert found.proven
         assert 0.0 < found.path.proof.clearance < 0.3
+
+
+@pytest.mark.parametrize("planner", [None, "RRTConnect"])
+def test_an_arm_without_solids_is_planned_in_an_empty_scene(planner):
+    joint = '<joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>'
+    joint += '<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>'
+    text = f'<robot name="bare"><link name="base"/><link name="arm"/>{joint}</robot>'
+    with pytest.warns(MeshWarning, match="all is free"):
+        world = rrtik.World(robot_from_urdf_text(text))
+    found = rrtik.plan(rrtik.Problem(world, [-1.0], [1.5]), planner, seed=1)
+    assert found.proven
+    assert found.path.violations(world) == ()
+    assert not world.prove([[-1.0], [2.5]]).proven

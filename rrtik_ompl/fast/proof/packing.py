@@ -229,8 +229,8 @@ def sizes_of(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]
     made = np.zeros((len(groups), layout.SIZE_COUNT))
     first = [group[0] for group in groups]
     made[:, layout.DISC] = [solid.disc for solid in first]
-    made[:, layout.DISC_AXIS : layout.DISC_AXIS + 3] = [solid.axis for solid in first]
-    known = np.array([all(solid.kind in SIZED for solid in group) for group in groups])
+    made[:, layout.DISC_AXIS : layout.DISC_AXIS + 3] = np.reshape([solid.axis for solid in first], (-1, 3))
+    known = np.array([all(solid.kind in SIZED for solid in group) for group in groups], dtype=bool)
     if not known.any():
         return made
     turns, kept = turns[known], [group for group, convex in zip(groups, known, strict=True) if convex]
@@ -286,7 +286,7 @@ def _solid_arrays(
         numbers.append((bodies[members[0]].joint, 0, 0, WHOLE_BODY))
         solids.append([solid for k in members for solid in parts[k]])
     turns = np.concatenate([turns, np.tile(np.eye(3), (len(groups), 1, 1))])
-    records = np.array(numbers, dtype=np.int32)
+    records = np.array(numbers, dtype=np.int32).reshape(-1, layout.SOLID_SIZE)  # none where all is free
     clouds = np.flatnonzero(records[:, layout.SOLID_KIND] == CLOUD)
     records[clouds, layout.SOLID_KIND] += np.arange(len(clouds), dtype=np.int32)
     return {
