@@ -27,6 +27,7 @@ from rrtik_ompl.world.proof import PROOF_KERNELS
 
 NAME = "in-time"  # of the planner, in records
 MOST_SLOTS = 10_000
+SLOWEST = 1e-300  # [rad or m] in a slot: a number by which can be divided
 ROUNDING = 1e-9
 WAITS = "what moves has to pass first"
 
@@ -90,9 +91,10 @@ def plan_in_time(
     The motion is straight at constant speed in every slot of time, no joint faster than its limit; between slots speeds
     jump, accelerations are not considered, as in :func:`rrtik_ompl.replan`. It is **proven** at every time, not at
     steps: in a slot the arm keeps from the place of an obstacle in the middle of the slot as far as any of its points
-    travels until an end of it, beside margins and the clearance. What kernels cannot prove counts as blocked. The
-    proof is worth as much as the stated courses: an obstacle that strays farther than margin and clearance can be hit.
-    After the arrival nothing is promised.
+    travels until an end of it, beside margins and the clearance. What kernels cannot prove counts as blocked. The arm
+    arrives before an obstacle reaches what no joint moves, or not at all. The proof is worth as much as the stated
+    courses: an obstacle that strays farther than margin and clearance can be hit. Nothing is promised after the
+    arrival.
 
     Args:
         problem: Robot, scene whose obstacles state their motions, start and goal. Of a pose, position or region all
@@ -132,11 +134,13 @@ def plan_in_time(
     at_most(options.horizon / options.slot, MOST_SLOTS, "slots of time", "lower horizon or rate")
     most, limit = whole_number(iterations, "iterations", least=1), positive(seconds, "seconds")
     begun = time.perf_counter()
-    search = _search(problem, options)
-    reason = _hopeless(search, options)
+    search, cut_short = _search(problem, options)
+    reason = _hopeless(search, options, cut_short)
     rows = None if reason else search.run(most, lambda: time.perf_counter() - begun > limit)
     if rows is None and not reason:
-        reason = f"no way was found in {search.iterations} iterations; raise horizon, rate, iterations or seconds"
+        tried = f"no way was found in {search.iterations} iterations"
+        remedy = "raise horizon, rate, iterations or seconds"
+        reason = f"{tried}, and {cut_short}" if cut_short else f"{tried}; {remedy}"
     run = None if rows is None else _record(problem, search, rows, options)
     return TimedPlan(run, reason, options.slot * search.least, search.iterations, time.perf_counter() - begun)
 
@@ -154,8 +158,8 @@ class _Options:
     seed: int
 
 
-def _search(problem: Problem, options: _Options) -> TimeSearch:
-    """The search of a problem."""
+def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
+    """The search of a problem, and why it has less time than the horizon, or ""."""
     robot, scene, rng = problem.robot, problem.world.scene, np.random.default_rng(options.seed)
     if options.limits is not None:
         require(options.limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
@@ -166,18 +170,20 @@ def _search(problem: Problem, options: _Options) -> TimeSearch:
     lower = np.where(np.isfinite(robot.lower), robot.lower, around.min(axis=0) - TAU)
     upper = np.where(np.isfinite(robot.upper), robot.upper, around.max(axis=0) + TAU)
     worlds = ForeseenWorlds(problem.world, options.slot, options.margin + options.clearance)
-    ends = Ends(problem.start, goals, lower, upper, int(options.horizon / options.slot + ROUNDING))
-    return TimeSearch(worlds, Pace(rates.velocity * options.slot, options.speed * options.slot), ends, rng)
+    reached, cut_short = worlds.base_reached(options.horizon)
+    last = int(min(options.horizon, reached) / options.slot + ROUNDING)
+    pace = Pace(np.maximum(rates.velocity * options.slot, SLOWEST), max(options.speed * options.slot, SLOWEST))
+    return TimeSearch(worlds, pace, Ends(problem.start, goals, lower, upper, last), rng), cut_short
 
 
-def _hopeless(search: TimeSearch, options: _Options) -> str:
+def _hopeless(search: TimeSearch, options: _Options, cut_short: str) -> str:
     """Why a search need not begin, or ""."""
     if library(PROOF_KERNELS) is None:
         return "motions in time are proven by kernels, and there are none here; install numba"
     if options.slot * search.least > options.horizon + ROUNDING:
-        return f"speeds allow no arrival before {options.slot * search.least:g} s; raise horizon or speed"
-    if search.worlds.blocked(0):
-        return search.worlds.blocked(0)
+        return f"speeds allow no arrival before {options.slot * search.least:g} s; raise horizon, speed or rate"
+    if search.least > search.ends.last:
+        return f"{cut_short}, before the goal can be reached"
     if not search.worlds.free(0, search.ends.start, search.ends.start):
         return "the start is not proven free in the first slot of time; raise rate, or lower margin or clearance"
     return ""
@@ -190,11 +196,11 @@ def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Option
     run = ReplanRun(
         problem.name, robot.name, robot.joint_names, NAME, options.seed, step, 1.0 / slot, options.margin, None
     )
-    first = {o.name: o.pose for o in problem.world.scene.obstacles}
+    first = {o.name: o.pose for o in search.worlds.scene_at(0.0).obstacles}  # stated poses may be others
     for number, q in enumerate(rows):
         left = rows[number:]
         moves = len(left) > 1 and bool((left[1] != q).any())
-        event: TickEvent = "arrive" if len(left) == 1 else "plan" if number == 0 else "walk" if moves else "wait"
+        event: TickEvent = "arrive" if len(left) == 1 else "wait" if not moves else "walk" if number else "plan"
         placed = search.worlds.scene_at(slot * number).obstacles
         poses = {o.name: pose_row(o.pose) for o in placed if (o.pose.homogeneous != first[o.name].homogeneous).any()}
         proven = search.worlds.free(number, q, left[1]) if moves else None

@@ -7,25 +7,32 @@ free at every time of the slot.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import replace
+from hashlib import blake2b
 from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.certificate import distance
 from rrtik_ompl.collision.extent import farthest
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.replanning.feed import ROTATION_NOISE
 from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.world import World
+from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld
 
 ROUNDING = 1e-9  # [m]: of places that are computed from times
+MOST_WORLDS = 256  # that are kept at once: up to 1 MB each, and there may be thousands of slots
+FINEST = 1e-4  # [m]: of an obstacle's way; if it may touch the base within so little, it counts as touching it
 
 
 class ForeseenWorlds:
-    """Which straight motions are free in which slot; each slot's world is made when it is first asked for.
+    """Which straight motions are free in which slot; each slot's world is made when it is asked for.
 
     Args:
         world: The robot and the scene, whose obstacles state their motions.
@@ -39,51 +46,87 @@ class ForeseenWorlds:
     def __init__(self, world: World, slot: float, room: float) -> None:
         self._world, self._slot, self._room = world.with_accuracy("exact"), slot, room
         self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in world.scene.obstacles}
-        self._worlds: dict[bytes, MovingWorld] = {}
-        self._known: dict[int, MovingWorld] = {}
+        self._worlds: OrderedDict[bytes, MovingWorld] = OrderedDict()  # the one that was asked last comes last
+        self._keys: dict[int, bytes] = {}
 
     def free(self, slot: int, a: Vector, b: Vector) -> bool:
         """Whether the straight motion from a to b, shape (n,), both inside the limits, is proven free in a slot."""
         return bool(self._in(slot).motions_proven(a[None], b[None])[0])
 
-    def steps_free(self, slot: int, rows: Matrix, onward: int) -> int:
+    def steps_free(self, slot: int, rows: Matrix, onward: int, stop: Stop) -> int:
         """How many of the motions from row to row, shape (k, n), are free, the first in a slot, the next in that after.
 
         Args:
             slot: Of the first motion.
             rows: In the order of time where ``onward`` is 1, backwards where it is -1.
             onward: See there.
+            stop: Ends it; what was not looked at is not free.
         """
         for number, (a, b) in enumerate(pairwise(rows)):
             first, second = (a, b) if onward > 0 else (b, a)
-            if not self.free(slot + onward * number, first, second):
+            if stop() or not self.free(slot + onward * number, first, second):
                 return number
         return len(rows) - 1
 
-    def blocked(self, slot: int) -> str:
-        """Which obstacle overlaps the base in a slot, as a line; "" if none does."""
-        return self._in(slot).blocked
+    def base_reached(self, until: float) -> tuple[float, str]:
+        """When an obstacle first reaches what no joint moves before a time [s], and a line about it; inf, "" if never.
+
+        Nothing is free from then on. The places in the middle of slots would not show it: an obstacle may touch the
+        base between them.
+        """
+        obstacles = {o.name: o for o in self._world.scene.obstacles if o.motion is not None}
+        bodies, found = self._world.bodies, (float("inf"), "")
+        for pair in self._world.pairs:
+            part, solid = sorted((bodies[k] for k in pair), key=lambda body: body.kind == "obstacle")
+            if part.joint == solid.joint == 0 and solid.name in obstacles:
+                time = self._touch(part, solid, obstacles[solid.name], 0.0, min(until, found[0]))
+                if time is not None:
+                    found = time, f"'{solid.name}' reaches '{part.name}' at {time:.3g} s, and the base cannot give way"
+        return found
+
+    def _touch(self, part: Body, solid: Body, obstacle: Obstacle, begin: float, end: float) -> float | None:
+        """When an obstacle first touches a body at rest, None if it is proven apart from it from begin to end [s]."""
+        middle, way = 0.5 * (begin + end), travel(obstacle, begin, end, self._radii[obstacle.name])
+        pose = _placed(obstacle, middle)
+        if distance(part.geometry, part.placement.homogeneous, solid.geometry, pose.homogeneous, way) is not None:
+            return None
+        if way <= FINEST:
+            return begin
+        first = self._touch(part, solid, obstacle, begin, middle)
+        return self._touch(part, solid, obstacle, middle, end) if first is None else first
 
     def scene_at(self, time: float) -> Scene:
         """Where obstacles are at a time [s]."""
         scene = self._world.scene
-        moved = (o if o.motion is None else replace(o, pose=o.motion.pose_at(o.pose, time)) for o in scene.obstacles)
-        return replace(scene, obstacles=tuple(moved))
+        return replace(scene, obstacles=tuple(replace(o, pose=_placed(o, time)) for o in scene.obstacles))
 
     def _in(self, slot: int) -> MovingWorld:
-        known = self._known.get(slot)
-        if known is None:
-            begin, end = slot * self._slot, (slot + 1) * self._slot
-            scene = self.scene_at(0.5 * (begin + end))
-            kept = {
-                o.name: self._room + travel(o, begin, end, self._radii[o.name]) for o in self._world.scene.obstacles
-            }
-            key = np.array([[*o.pose.homogeneous.ravel(), kept[o.name]] for o in scene.obstacles]).tobytes()
-            if key not in self._worlds:  # where all is at rest one world serves every slot
-                self._worlds[key] = MovingWorld(self._world)
-                self._worlds[key].move(scene, inflation=kept)
-            known = self._known[slot] = self._worlds[key]
-        return known
+        """The world in a slot; where all is at rest one world serves every slot."""
+        key = self._keys.get(slot)
+        if key is not None and key in self._worlds:
+            self._worlds.move_to_end(key)
+            return self._worlds[key]
+        begin, end = slot * self._slot, (slot + 1) * self._slot
+        scene = self.scene_at(0.5 * (begin + end))
+        kept = {o.name: self._room + travel(o, begin, end, self._radii[o.name]) for o in self._world.scene.obstacles}
+        places = np.array([[*o.pose.homogeneous.ravel(), kept[o.name]] for o in scene.obstacles])
+        key = self._keys[slot] = blake2b(places.tobytes(), digest_size=16).digest()
+        if key not in self._worlds:
+            world = self._world_to_place()
+            world.move(scene, inflation=kept)
+            self._worlds[key] = world
+        return self._worlds[key]
+
+    def _world_to_place(self) -> MovingWorld:
+        """A new world, or the one that was asked the longest time ago."""
+        if len(self._worlds) < MOST_WORLDS:
+            return MovingWorld(self._world)
+        return self._worlds.popitem(last=False)[1]
+
+
+def _placed(obstacle: Obstacle, time: float) -> pin.SE3:
+    """Where an obstacle is at a time [s]."""
+    return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
 
 
 def travel(obstacle: Obstacle, begin: float, end: float, radius: float) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.tree import Pace
+from rrtik_ompl.world.motion_queries import Stop
 
 Place = tuple[int, int]  # slot and number of a place
 
@@ -28,7 +29,7 @@ def full_pace(rows: Matrix, pace: Pace) -> Matrix:
     return places
 
 
-def hurried(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, most: int) -> Matrix | None:
+def hurried(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, most: int, stop: Stop) -> Matrix | None:
     """The same way with the fewest slots, at most so many; a configuration for each slot, or None.
 
     Args:
@@ -36,12 +37,13 @@ def hurried(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, most: int) -> Matr
         pace: How far the robot goes in a slot.
         worlds: What is free in which slot.
         most: Slots.
+        stop: Ends it without a way.
     """
     places = full_pace(rows, pace)
     last, begin = len(places) - 1, (0, 0)
     before: dict[Place, Place] = {begin: begin}
     queue = deque([begin])  # those that have stood less come first
-    while queue:
+    while queue and not stop():
         slot, k = queue.popleft()
         if k == last:
             return places[_numbers(before, (slot, k))]

@@ -83,7 +83,7 @@ class TimeSearch:
         fruitless = since = 0  # rounds without an earlier way, iterations of the round
         while self.iterations < iterations and not (stop() or self._done(best, fruitless)):
             self.iterations, since = self.iterations + 1, since + 1
-            found = self._iterate()
+            found = self._iterate(stop)
             found = None if found is None else self._improved(found, stop)
             if found is not None and (best is None or len(found) < len(best)):
                 best, fruitless = found, 0
@@ -100,15 +100,17 @@ class TimeSearch:
         """Whether no earlier arrival is possible, or none to be hoped for."""
         return best is not None and (fruitless >= ROUNDS or len(best) - 1 <= self.least)
 
-    def _iterate(self) -> Matrix | None:
+    def _iterate(self, stop: Stop) -> Matrix | None:
         """A further arrival, an extension of one tree and a connection to the other; the way if they meet."""
         self._add_arrival()
         grown, other = self._trees[:: 1 if self.iterations % 2 else -1]
-        new = self._extend(grown) if grown.size else None
+        new = self._extend(grown, stop) if grown.size else None
         if new is None:
             return None
         near = other.nearest(grown.q[new], int(grown.slot[new]))
-        end = None if near is None else self._grow(other, near, grown.q[new], int(grown.slot[new]), self.ends.last)
+        if near is None:
+            return None
+        end = self._grow(other, near, (grown.q[new], int(grown.slot[new])), self.ends.last, stop)
         if end is None or not end[1]:
             return None
         forward, backward = (new, end[0]) if grown.onward > 0 else (end[0], new)
@@ -126,7 +128,7 @@ class TimeSearch:
             self._trees[1].add(q, slot, -1)
         self._rooted.add((goal, slot))
 
-    def _extend(self, tree: TimeTree) -> int | None:
+    def _extend(self, tree: TimeTree, stop: Stop) -> int | None:
         """Towards a sample, or standing still; the new vertex."""
         if self._rng.random() < STANDING:
             vertex = int(self._rng.integers(tree.size))
@@ -145,14 +147,20 @@ class TimeSearch:
             if near is None:
                 return None
             vertex = near
-        end = self._grow(tree, vertex, q, slot, PIECE)
+        end = self._grow(tree, vertex, (q, slot), PIECE, stop)
         return None if end is None else end[0]
 
-    def _grow(self, tree: TimeTree, vertex: int, q: Vector, slot: int, most: int) -> tuple[int, bool] | None:
-        """A vertex as far towards q as is free, at most so many slots: its number, and whether it is at q."""
-        rows, whole = tree.rows_towards(vertex, q, slot, most)
+    def _grow(
+        self, tree: TimeTree, vertex: int, to: tuple[Vector, int], most: int, stop: Stop
+    ) -> tuple[int, bool] | None:
+        """A vertex as far towards a configuration in a slot as is free, at most so many slots.
+
+        Returns:
+            Its number, and whether it is there.
+        """
+        rows, whole = tree.rows_towards(vertex, *to, most)
         begin = int(tree.slot[vertex])
-        free = self.worlds.steps_free(begin if tree.onward > 0 else begin - 1, rows, tree.onward)
+        free = self.worlds.steps_free(begin if tree.onward > 0 else begin - 1, rows, tree.onward, stop)
         if free == 0:
             return None
         return tree.add(rows[free], begin + tree.onward * free, vertex), whole and free == len(rows) - 1
@@ -169,8 +177,8 @@ class TimeSearch:
         """With less motion and earlier, in turn, as long as it arrives earlier."""
         while True:
             rows = self._shortened(rows, stop)
-            earlier = hurried(rows, self.pace, self.worlds, len(rows) - 2)
-            if earlier is None or stop():
+            earlier = hurried(rows, self.pace, self.worlds, len(rows) - 2, stop)
+            if earlier is None:
                 return rows
             rows = earlier
 
@@ -181,7 +189,8 @@ class TimeSearch:
                 break
             a, b = sorted(self._rng.choice(len(rows), 2, replace=False).tolist())
             straight = each_slot(rows[[a, b]], np.array([0, b - a]))
-            if _length(straight) < _length(rows[a : b + 1]) - 1e-9 and self.worlds.steps_free(a, straight, 1) == b - a:
+            shorter = _length(straight) < _length(rows[a : b + 1]) - 1e-9
+            if shorter and self.worlds.steps_free(a, straight, 1, stop) == b - a:
                 rows = np.vstack([rows[:a], straight, rows[b + 1 :]])
         return rows
 

@@ -11,6 +11,7 @@ from rrtik_ompl.arrays import Matrix, Vector
 
 GAP_WEIGHT = 0.2  # of a slot between two vertices, beside a slot that the motion needs at least
 ROUNDING = 1e-9  # [slots]
+NEVER = 1 << 40  # slots: more than any plan has, and still a number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,8 +33,8 @@ class Pace:
         return found
 
     def whole_slots(self, moves: Matrix) -> NDArray[np.int64]:
-        """The same in whole slots, shape (m,)."""
-        return np.ceil(self.slots(moves) - ROUNDING).astype(np.int64)
+        """The same in whole slots, ``NEVER`` at most, shape (m,)."""
+        return np.minimum(np.ceil(self.slots(moves) - ROUNDING), NEVER).astype(np.int64)
 
 
 class TimeTree:
