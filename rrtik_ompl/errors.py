@@ -171,7 +171,7 @@ def at_most(count: float, limit: float, what: str, remedy: str = "") -> None:
     """
     if count > limit:
         hint = f"; {remedy}" if remedy else ""
-        shown = count if isinstance(count, int) else f"{count:.0f}"
+        shown = count if isinstance(count, int) else f"{count:.0f}" if count < 1e15 else f"{count:g}"
         raise InputError(f"{what}: {shown} are more than the {limit:.0f} that are allowed{hint}")
 
 

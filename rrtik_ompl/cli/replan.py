@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,12 +18,15 @@ if TYPE_CHECKING:
     from rrtik_ompl.replanning import ReplanRun
     from rrtik_ompl.replanning.scenario import Scenario as Chosen
 
+PLANNER = "drrt-con"
 Scenario = Annotated[str, typer.Argument(help="A problem with a run: section, shipped or a YAML file.")]
 
 
 def replan_scenario(
     scenario: Scenario,
-    planner: Annotated[str, typer.Option(help="drrt-con, or to compare with: rrt-connect, drrt.")] = "drrt-con",
+    planner: Annotated[
+        str | None, typer.Option(help=f"{PLANNER} if absent, or to compare with: rrt-connect, drrt.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="The same seed gives the same run.")] = 0,
     lookahead_ticks: Annotated[int | None, typer.Option(help="Predict obstacle motion this many ticks ahead.")] = None,
     predict: Annotated[int | None, typer.Option(hidden=True)] = None,
@@ -32,7 +36,9 @@ def replan_scenario(
     clearance: Annotated[
         float | None, typer.Option(help="What the moves are proven to keep from obstacles beside margins [m].")
     ] = None,
-    seconds: Annotated[float | None, typer.Option(help="Simulated time at most [s].")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Simulated time at most [s]; with --foreseen the latest arrival.")
+    ] = None,
     record: Annotated[Path | None, typer.Option(help="Keep everything, on Ctrl-C too: .json.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Show this record instead of a new run.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained page that replays the run.")] = None,
@@ -47,6 +53,7 @@ def replan_scenario(
     check_target(html, (".html", ".htm"))
     check_target(record, (".json",))
     options: dict[str, Any] = {
+        "planner": planner,
         "lookahead_ticks": lookahead_ticks,
         "clearance": clearance,
         "seconds": seconds,
@@ -62,7 +69,7 @@ def replan_scenario(
 
     chosen = load_scenario(scenario)
     if replay is None:
-        made = _foreseen(chosen, seed, given) if foreseen else _new_run(chosen, planner, seed, given)
+        made = _foreseen(chosen, seed, given) if foreseen else _new_run(chosen, seed, given)
         if isinstance(made, str):
             failed = {"problem": chosen.problem.name, "outcome": "not found", "reason": made}
             say(json.dumps(failed) if as_json else f"{chosen.problem.name}: {made}")
@@ -83,11 +90,12 @@ def replan_scenario(
     return 0 if run.arrived else 1
 
 
-def _new_run(chosen: Chosen, planner: str, seed: int, given: Mapping[str, Any]) -> ReplanRun:
+def _new_run(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun:
     """A run that is replanned on its way."""
+    options = {"planner": PLANNER, **given}
     try:
-        with progress(f"{chosen.problem.name} with {planner}"):
-            return chosen.run(planner=planner, seed=seed, **given)
+        with progress(f"{chosen.problem.name} with {options['planner']}"):
+            return chosen.run(seed=seed, **options)
     except KeyboardInterrupt:
         if "record" in given:
             note(f"{given['record']} holds the run as far as it went, if it had begun")
@@ -102,25 +110,32 @@ def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun 
     """
     from rrtik_ompl.replanning.in_time import plan_in_time
 
-    if "lookahead_ticks" in given or chosen.goal_feed is not None:
-        what = (
-            "the goal of this scenario moves" if chosen.goal_feed is not None else "--lookahead-ticks is for replanning"
-        )
-        raise InputError(f"--foreseen: {what}; leave out --foreseen")
-    settings = chosen.settings
+    others = [f"--{name.replace('_', '-')}" for name in ("planner", "lookahead_ticks") if name in given]
+    if others:
+        raise InputError(f"--foreseen: {others[0]} is for replanning; leave out one of them")
+    if chosen.goal_feed is not None:
+        raise InputError("--foreseen: the goal of this scenario moves; leave out --foreseen")
+    changes = {name: given[name] for name in ("seconds", "clearance") if name in given}
+    settings = replace(chosen.settings, **changes)  # checks them by the names that the options have
     with progress(f"{chosen.problem.name}, planned in time"):
         plan = plan_in_time(
             chosen.problem,
-            horizon=given.get("seconds", settings.seconds),
+            horizon=settings.seconds,
             speed=settings.step * settings.rate,
             margin=settings.margin,
-            clearance=given.get("clearance", settings.clearance),
+            clearance=settings.clearance,
             limits=settings.limits,
             seed=seed,
         )
     if plan.run is not None and "record" in given:
         plan.run.save(given["record"])
-    return plan.reason if plan.run is None else plan.run
+    return _in_options(plan.reason) if plan.run is None else plan.run
+
+
+def _in_options(reason: str) -> str:
+    """Why nothing was found, with what the command offers in the place of arguments that it has not."""
+    what, given, _ = reason.partition("; raise horizon")
+    return f"{what}; raise --seconds, or call plan_in_time(), which has more options" if given else reason
 
 
 def _recorded(file: Path, problem: str) -> ReplanRun:

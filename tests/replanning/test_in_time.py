@@ -113,7 +113,9 @@ def test_the_command_plans_in_time_and_says_when_there_is_no_way(tmp_path, capsy
     assert rrtik.load_run(record).planner == "in-time"
     assert "moves proven" in capsys.readouterr().out
     assert run_command(["replan", "replan_planar_arm", "--foreseen", "--seconds", "0.5", "--json"]) == 1
-    assert "speeds allow no arrival" in json.loads(capsys.readouterr().out)["reason"]
+    reason = json.loads(capsys.readouterr().out)["reason"]
+    assert "speeds allow no arrival" in reason
+    assert "raise --seconds" in reason  # there is no --horizon
 
 
 def test_the_way_of_an_obstacle_bounds_every_point_of_it():

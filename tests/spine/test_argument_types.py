@@ -145,3 +145,5 @@ def test_a_name_too_long_for_the_system_is_one_of_no_problem():
 def test_a_number_beyond_all_floats_is_too_many():
     with pytest.raises(InputError, match="more than the 5"):
         at_most(10**400, 5, "things")
+    with pytest.raises(InputError, match=r"things: 1e\+300 are more than the 5"):
+        at_most(1e300, 5, "things")
