@@ -78,9 +78,9 @@ def check(
 ) -> int:
     """Check a problem, and a path or a timed motion for it.
 
-    Motions are proven free for their whole length; where that cannot be done they are checked densely. Of a timed
-    motion this is the curve between its points, and its speeds are compared with the robot's. Exit code 1 if the path
-    is not valid, or if the certificate does not hold, which a path's file may have beside its waypoints.
+    Motions are proven free for their whole length; where that cannot be done they are checked densely. A timed motion
+    is checked along the curve between its points, and its speeds are compared with the robot's. The file of a path may
+    contain a certificate. Exit code 1 if the path is not valid, or if its certificate does not hold.
     """
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
@@ -136,7 +136,7 @@ def _certified(problem: Problem, route: JointPath, certificate: Certificate, fil
 
 
 def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if left out.")] = None) -> int:
-    """List what is there by name."""
+    """List names of robots, planners, problems and others."""
     from rrtik_ompl import list_ik_methods, list_planners, list_problems, list_robots
     from rrtik_ompl.catalog import list_suites
     from rrtik_ompl.tasks.task_file import list_tasks
@@ -180,7 +180,7 @@ def convert(
 def warmup() -> int:
     """Compile all kernels now, once per machine.
 
-    No later command waits for them then.
+    Later commands then do not wait for them.
     """
     from rrtik_ompl.fast import warm_up
     from rrtik_ompl.fast.wasm.page_kernels import page_kernels

@@ -16,22 +16,22 @@ from rrtik_ompl.cli.terminal import counter, note, progress, say, suggest
 def bench(
     suite: Annotated[str, typer.Argument(help="A shipped suite (see: rrtik list suites) or a YAML file.")],
     runs: Annotated[
-        int | None, typer.Option(help="Of each planner on each problem, in place of the suite's.", min=1)
+        int | None, typer.Option(help="Runs of each planner on each problem, in place of the suite's number.", min=1)
     ] = None,
-    jobs: Annotated[int, typer.Option(help="Runs at a time; more than one make the times longer.", min=1)] = 1,
+    jobs: Annotated[int, typer.Option(help="Runs at the same time; with more than one, times get longer.", min=1)] = 1,
     out: Annotated[Path | None, typer.Option(help="Folder for records and reports; bench-SUITE if left out.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted campaign.")] = False,
     problems: Annotated[
         Path | None, typer.Option(help="Folder of further problems: files, MotionBenchMaker pairs.")
     ] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to do the runs.")] = None,
-    views: Annotated[int, typer.Option(help="3-D views at most.", min=0)] = 12,
+    views: Annotated[int, typer.Option(help="Largest number of 3-D views.", min=0)] = 12,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of a table.")] = False,
 ) -> int:
-    """Run planners beside each other on many problems.
+    """Compare planners on many problems.
 
-    A run that crashes, hangs or takes too much memory is a failed run and no more. Exit code 1 if every run of some
-    planner ended with an error, as with a parameter that it cannot use.
+    A run that crashes, hangs or takes too much memory counts as failed; the others go on. Exit code 1 if every run of
+    some planner ended with an error, as with a parameter that it cannot use.
     """
     from rrtik_ompl.benchmark.campaign import Progress, run_campaign
     from rrtik_ompl.benchmark.report import write_report

@@ -36,7 +36,7 @@ def show(
     path: Annotated[
         Path | None, typer.Argument(help="A path file: .json, .csv or .txt. Or a timed motion: it plays in real time.")
     ] = None,
-    scene: Annotated[Path | None, typer.Option(help="What stands around a robot: a YAML file.")] = None,
+    scene: Annotated[Path | None, typer.Option(help="Obstacles around a robot: a YAML file.")] = None,
     before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     film: Annotated[
@@ -126,7 +126,7 @@ def play(
 
 def overlay(
     source: Annotated[str, typer.Argument(help="A video, an image, a folder of images, or a camera's number.")],
-    problem: Annotated[str, typer.Argument(help="Whose arm is drawn, at its start: a shipped problem or a YAML file.")],
+    problem: Annotated[str, typer.Argument(help="Its arm is drawn, at its start: a shipped problem or a YAML file.")],
     path: Annotated[Path | None, typer.Argument(help="A path that the arm follows: .json, .csv or .txt.")] = None,
     *,
     camera: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
@@ -135,7 +135,7 @@ def overlay(
     seconds: Annotated[float, typer.Option(help="Duration of the whole path [s].")] = 10.0,
     ghosts: Annotated[int, typer.Option(help="Configurations ahead on the path, drawn as well, 0 to 20.")] = 1,
     frames: Annotated[
-        int, typer.Option(help="Number of pictures at most; 0: all; a camera device needs a number.", min=0)
+        int, typer.Option(help="Largest number of pictures; 0: all; a camera device needs a number.", min=0)
     ] = 0,
 ) -> int:
     """Draw the moving arm into a video.

@@ -49,7 +49,9 @@ def inverse_kinematics(
     robot: Annotated[
         str | None, typer.Argument(help="A name (see: rrtik list robots), a URDF or a DH table; left out if --problem.")
     ] = None,
-    position: Annotated[Triple | None, typer.Option(metavar="X Y Z", help="Of the tip in the world [m].")] = None,
+    position: Annotated[
+        Triple | None, typer.Option(metavar="X Y Z", help="Position of the tip in the world [m].")
+    ] = None,
     quaternion: Annotated[
         tuple[float, float, float, float] | None,
         typer.Option(metavar="X Y Z W", help="Orientation; any if left out."),
@@ -60,17 +62,22 @@ def inverse_kinematics(
     problem: Annotated[
         str | None, typer.Option(help="Take robot, scene, start (as --near) and, without --position, goal from it.")
     ] = None,
-    scene: Annotated[Path | None, typer.Option(help="Obstacles: a YAML file with a scene; answers are free.")] = None,
+    scene: Annotated[
+        Path | None, typer.Option(help="Obstacles: a YAML file with a scene; answers are free of collision.")
+    ] = None,
     near: Annotated[str | None, typer.Option(help="A named posture of the robot; answers near it come first.")] = None,
     near_deg: Annotated[
         str | None, typer.Option(metavar="Q1,Q2,..", help="The same in joint values, with commas [deg; m if sliding].")
     ] = None,
     everything: Annotated[
-        bool, typer.Option("--all", help="All solutions, not just one; those that differ by full turns once.")
+        bool,
+        typer.Option("--all", help="All solutions, not just one; those that differ by full turns are listed once."),
     ] = False,
     method: Annotated[str, typer.Option(help="auto, or see: rrtik list ik.")] = "auto",
-    tolerance_mm: Annotated[float | None, typer.Option(help="Of the position [mm]; 1 if left out.")] = None,
-    tolerance_deg: Annotated[float | None, typer.Option(help="Of the orientation [deg]; 0.57 if left out.")] = None,
+    tolerance_mm: Annotated[float | None, typer.Option(help="Tolerance of the position [mm]; 1 if left out.")] = None,
+    tolerance_deg: Annotated[
+        float | None, typer.Option(help="Tolerance of the orientation [deg]; 0.57 if left out.")
+    ] = None,
     seconds: Annotated[
         float | None, typer.Option(help="Wall time for a numeric method [s]; per pose with --poses.")
     ] = None,

@@ -21,9 +21,11 @@ if TYPE_CHECKING:
     from rrtik_ompl.sensing.rig import Rig
     from rrtik_ompl.sensing.sensor import Sensor, View
 
-markers = typer.Typer(help="Print markers, calibrate cameras, sense what they see.")
+markers = typer.Typer(help="Print markers, calibrate cameras, find marked objects in pictures.")
 
-Dictionary = Annotated[str, typer.Option(help="4x4_50 sees farthest; aruco_mip_36h12 confuses least; apriltag_36h11.")]
+Dictionary = Annotated[
+    str, typer.Option(help="4x4_50 is found farthest away, aruco_mip_36h12 confused least; apriltag_36h11.")
+]
 BOARD_MARKER = 0.73  # side of a board's markers, of a chess square, where it is not said
 PICTURES, SCENES = (".png", ".jpg"), (".yaml", ".yml")
 
@@ -40,8 +42,12 @@ def print_sheet(
     out: Annotated[Path, typer.Argument(help="Where to: .pdf (true to size) or .png.")],
     kind: Annotated[Kind, typer.Option(help="Single markers, or a ChArUco board for calibration.")] = Kind.markers,
     ids: Annotated[str, typer.Option(help="Numbers: 0,1,7 or 0-5.")] = "0-3",
-    side: Annotated[float, typer.Option(help="Of a marker's black square; on a board, of a chess square [mm].")] = 80.0,
-    marker: Annotated[float | None, typer.Option(help="On a board: of its markers [mm]; 0.73 of a square.")] = None,
+    side: Annotated[
+        float, typer.Option(help="Side of a marker's black square; on a board, of a chess square [mm].")
+    ] = 80.0,
+    marker: Annotated[
+        float | None, typer.Option(help="On a board: side of its markers [mm]; 0.73 of a square if left out.")
+    ] = None,
     columns: Annotated[int, typer.Option(help="Chess squares of a board across.")] = 6,
     rows: Annotated[int, typer.Option(help="Chess squares of a board down.")] = 8,
     dictionary: Dictionary = "4x4_50",
@@ -69,13 +75,15 @@ def print_sheet(
 @markers.command("calibrate")
 def calibrate_camera(
     photographs: Annotated[
-        list[Path], typer.Argument(help="Folder of photographs of the board, or a video; of a rig one each camera.")
+        list[Path], typer.Argument(help="Folder of photographs of the board, or a video; for a rig one per camera.")
     ],
-    out: Annotated[Path, typer.Option(help="The camera file to write, of a rig its file: .yaml.")],
+    out: Annotated[Path, typer.Option(help="The camera file to write; for a rig, the rig's file: .yaml.")],
     columns: Annotated[int, typer.Option(help="Chess squares of the board across.")] = 6,
     rows: Annotated[int, typer.Option(help="Chess squares of the board down.")] = 8,
     square: Annotated[float, typer.Option(help="Side of a chess square as printed [mm].")] = 30.0,
-    marker: Annotated[float | None, typer.Option(help="Side of a marker as printed [mm]; 0.73 of a square.")] = None,
+    marker: Annotated[
+        float | None, typer.Option(help="Side of a marker as printed [mm]; 0.73 of a square if left out.")
+    ] = None,
     dictionary: Dictionary = "4x4_50",
     chessboard: Annotated[bool, typer.Option("--chessboard", help="The board has no markers.")] = False,
 ) -> int:
@@ -138,21 +146,22 @@ def _tell(found: Calibration, names: list[str]) -> None:
     heads = ("fx", "fy", "cx", "cy")
     say(", ".join(f"{n} {v:.2f} +- {s:.2f}" for n, v, s in zip(heads, values, found.sigmas, strict=True)))
     if found.camera.tone is not None:
-        say(f"tone {found.camera.tone:.2f} (0: grey values are light, 1: coded as sRGB)")
+        say(f"tone {found.camera.tone:.2f} (0: grey values are linear, 1: coded as sRGB)")
 
 
 @markers.command("sense")
 def sense(
     source: Annotated[
         list[str],
-        typer.Argument(help="An image, a folder of images, a video, or a camera's number; with --rig one a camera."),
+        typer.Argument(help="An image, a folder of images, a video, or a camera's number; with --rig one per camera."),
     ],
     marker_map: Annotated[Path, typer.Option("--map", help="Marker map: which marker is on which object: .yaml.")],
     camera: Annotated[Path | None, typer.Option(help="Camera file (see: rrtik markers calibrate).")] = None,
     rig: Annotated[
-        Path | None, typer.Option(help="In place of --camera: several that take pictures together: .yaml.")
+        Path | None,
+        typer.Option(help="File of a rig, in place of --camera: cameras that take pictures together: .yaml."),
     ] = None,
-    frames: Annotated[int, typer.Option(help="Number of pictures at most; 0: all, of a camera device 1.", min=0)] = 0,
+    frames: Annotated[int, typer.Option(help="Largest number of pictures; 0: all (of a camera device: 1).", min=0)] = 0,
     scene: Annotated[Path | None, typer.Option(help="Write the scene in the frame of the base: .yaml.")] = None,
     task: Annotated[
         Path | None, typer.Option(help="Write a problem with the detected objects: .yaml. Needs --problem and --grasp.")
@@ -169,10 +178,10 @@ def sense(
         bool | None,
         typer.Option(
             "--independent/--over-time",
-            help="Each picture by itself, or as a film, smoothed over time. Left out: a folder's by themselves.",
+            help="Each picture by itself (default for a folder), or smoothed over time as a film.",
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a picture.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per picture.")] = False,
 ) -> int:
     """Print the poses of marked objects, from pictures."""
     check_target(scene, SCENES)

@@ -30,7 +30,7 @@ UNITS = "One number, or one per joint with commas [deg/s{0}; m/s{0} if it slides
 def list_moves(
     path: GivenPath,
     problem: Annotated[
-        str | None, typer.Option(help="What the path is for; if it moves several joints at once, it is converted.")
+        str | None, typer.Option(help="Problem of the path; if several joints move at once, the path is converted.")
     ] = None,
     shorten: Annotated[
         str | None,
@@ -71,12 +71,12 @@ def time_path(
     velocity: Annotated[str | None, typer.Option(help=UNITS.format(""))] = None,
     acceleration: Annotated[str | None, typer.Option(help=UNITS.format("^2"))] = None,
     jerk: Annotated[str | None, typer.Option(help=f"{UNITS.format('^3')} inf: no limit.")] = None,
-    share: Annotated[float, typer.Option(help="Of all limits, above 0 to 1: 0.5 is half as fast.")] = 1.0,
+    share: Annotated[float, typer.Option(help="Share of all limits, above 0 to 1: 0.5 is half as fast.")] = 1.0,
     blend: Annotated[float, typer.Option(help="Round corners from this far before them [deg]; 0 stops there.")] = 0.0,
     tip_speed: Annotated[float | None, typer.Option(help="Largest speed of the tip [m/s].")] = None,
     tip_acceleration: Annotated[float | None, typer.Option(help="Largest acceleration of the tip [m/s^2].")] = None,
-    torque: Annotated[bool, typer.Option(help="Keep the efforts of the robot's description.")] = False,
-    payload: Annotated[float, typer.Option(help="Mass at the tip that the torques carry too [kg].")] = 0.0,
+    torque: Annotated[bool, typer.Option(help="Keep torques within the efforts of the robot's description.")] = False,
+    payload: Annotated[float, typer.Option(help="Mass at the tip, for --torque [kg].")] = 0.0,
     rate: Annotated[float | None, typer.Option(help="Save points at a control rate [1/s], not the knots.")] = None,
     out: Annotated[
         Path | None, typer.Option(help="Save the trajectory: .json, .csv, .mcap; .yaml, .ros.json for ROS 2.")

@@ -37,7 +37,7 @@ def pilot(
     ] = False,
     second: Annotated[str | None, typer.Option(help="Camera number or film that is shown beside the first.")] = None,
     rig: Annotated[
-        Path | None, typer.Option(help="In place of --camera-file: both cameras are sensed together: .yaml.")
+        Path | None, typer.Option(help="File of a rig, in place of --camera-file, to use both cameras together: .yaml.")
     ] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recorded session.")] = None,
     arm: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="An arm; a simulated one if left out.")] = None,
@@ -45,18 +45,16 @@ def pilot(
         str | None,
         typer.Option(metavar="HOST:PORT", help="A master arm, whose joints the arm follows while K is held."),
     ] = None,
-    port: Annotated[int, typer.Option(help="Of the page; 0 takes a free one.", min=0, max=65535)] = 0,
+    port: Annotated[int, typer.Option(help="Port of the page; 0 takes a free one.", min=0, max=65535)] = 0,
     host: Annotated[str, typer.Option(help="Address for other machines; needs --token.")] = "127.0.0.1",
     token: Annotated[str, typer.Option(help="Secret word for --host, at least 16 letters.")] = "",
     certificate: Annotated[Path | None, typer.Option(help="Serve the page by TLS with this certificate (PEM).")] = None,
     key: Annotated[Path | None, typer.Option(help="Private key of the certificate, if it is not in its file.")] = None,
-    sigmas: Annotated[
-        float, typer.Option(help="Margin of seen objects: this many standard deviations; 0: none.")
-    ] = 3.0,
+    sigmas: Annotated[float, typer.Option(help="Margin of detected objects, in standard deviations; 0: none.")] = 3.0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
     seed: Annotated[int, typer.Option(help="The same commands give the same routes.", min=0)] = 0,
 ) -> int:
-    """Help a pilot drive an arm, on a page in the browser.
+    """Open a page in the browser that helps a pilot drive an arm.
 
     It shows the camera with the arm drawn in, grasps, routes and moves. Ctrl-C ends it.
     """

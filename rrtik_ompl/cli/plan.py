@@ -41,11 +41,11 @@ def _chosen(names: tuple[Name, ...], what: str) -> Callable[[str], Name]:
 def plan(
     problem: ProblemName,
     planner: Annotated[
-        str | None, typer.Option(help="See: rrtik list planners. If left out, the problem's, or else auto.")
+        str | None, typer.Option(help="See: rrtik list planners. If left out, the problem's planner, or else auto.")
     ] = None,
     seconds: Annotated[float, typer.Option(help="Limit of wall time [s].")] = 5.0,
-    seed: Annotated[int | None, typer.Option(help="The same seed gives the same path; drawn if left out.")] = None,
-    restarts: Annotated[int, typer.Option(help="New attempts at most, if one gives up early.")] = 20,
+    seed: Annotated[int | None, typer.Option(help="The same seed gives the same path; random if left out.")] = None,
+    restarts: Annotated[int, typer.Option(help="Largest number of new attempts, if one ends early.")] = 20,
     parameter: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="An option of the planner, in JSON; repeatable."),
@@ -68,24 +68,26 @@ def plan(
     ] = "preferred",
     clearance: Annotated[
         float | None,
-        typer.Option(help="What the path keeps from obstacles [m]; 0.001, or what start and goal have, if left out."),
+        typer.Option(
+            help="Distance to keep from obstacles [m]; if left out 0.001, or less if start or goal have less."
+        ),
     ] = None,
     improve: Annotated[
         float,
-        typer.Option(help="How long the path may go on getting shorter once it was found [s], within --seconds."),
+        typer.Option(help="How long to improve the path after it was found [s], within --seconds."),
     ] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
     certificate: Annotated[
-        Path | None, typer.Option(help="Write what proves the path free: .json; that of --out takes both.")
+        Path | None, typer.Option(help="Write the certificate of the path: .json; the file of --out can hold both.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
     """Find a path and print its moves.
 
-    One that moves several joints at once is printed as waypoints. Exit code 1 if no path was found, or if a certificate
-    was asked for and the path is not proven free.
+    A path that moves several joints at once is printed as waypoints. Exit code 1 if no path was found, or if a
+    certificate was asked for and the path is not proven free.
     """
     check_target(out, PATH_FORMATS)
     check_target(html, (".html", ".htm"))

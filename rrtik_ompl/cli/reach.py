@@ -32,7 +32,10 @@ def reach(
     cell: Annotated[float | None, typer.Option(help="Side of a cell [m]; an 18th of the reach if left out.")] = None,
     samples: Annotated[int, typer.Option(help="Postures to draw.")] = 200_000,
     axis: Annotated[
-        str | None, typer.Option(help="Of the tip's frame that points: x, y or z; z if left out, of planar arms x.")
+        str | None,
+        typer.Option(
+            help="Axis of the tip's frame whose directions count: x, y or z; if left out z, for planar arms x."
+        ),
     ] = None,
     scene: Annotated[Path | None, typer.Option(help="Obstacles: only free postures count. A YAML file.")] = None,
     free: Annotated[bool, typer.Option("--free", help="Leave out postures in which the arm hits itself.")] = False,

@@ -31,15 +31,15 @@ def replan_scenario(
     lookahead_ticks: Annotated[int | None, typer.Option(help="Predict obstacle motion this many ticks ahead.")] = None,
     predict: Annotated[int | None, typer.Option(hidden=True)] = None,
     foreseen: Annotated[
-        bool, typer.Option("--foreseen", help="Plan in time: obstacles do what their motions state.")
+        bool, typer.Option("--foreseen", help="Plan in configuration and time: obstacles move as stated.")
     ] = False,
     clearance: Annotated[
-        float | None, typer.Option(help="What the moves are proven to keep from obstacles beside margins [m].")
+        float | None, typer.Option(help="Distance that moves are proven to keep from obstacles on top of margins [m].")
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(help="Simulated time at most [s]; with --foreseen the latest arrival.")
+        float | None, typer.Option(help="Largest simulated time [s]; with --foreseen the latest arrival.")
     ] = None,
-    record: Annotated[Path | None, typer.Option(help="Keep everything, on Ctrl-C too: .json.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Write the record of the run, on Ctrl-C too: .json.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Show this record instead of a new run.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained page that replays the run.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,

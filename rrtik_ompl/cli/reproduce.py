@@ -30,14 +30,14 @@ def _folder(given: Path | None) -> Path | None:
 
 def reproduce(
     tables: Annotated[
-        list[str] | None, typer.Argument(metavar="[TABLE]...", help="Names, or beginnings of them.")
+        list[str] | None, typer.Argument(metavar="[TABLE]...", help="Names of tables, or beginnings of names.")
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="All tables.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, the same rules: minutes for all.")] = False,
     listed: Annotated[bool, typer.Option("--list", help="List the tables and how long they take.")] = False,
     markdown: Annotated[
         Path | None,
-        typer.Option(help="Write the comparison to this file: .md; what is done is kept beside it, and continued."),
+        typer.Option(help="Write the comparison to this file: .md; an interrupted round goes on where it was."),
     ] = None,
     plot: Annotated[
         Path | None,

@@ -25,9 +25,9 @@ def straight(
     rpy_deg: Annotated[
         Three | None, typer.Option(help="Its roll, pitch, yaw at the end [deg]; as at the start if left out.")
     ] = None,
-    through: Annotated[Three | None, typer.Option(help="On the circle through this point [m].")] = None,
-    deviation: Annotated[float, typer.Option(help="Of the tip from the line at most [m].")] = 1e-4,
-    clearance: Annotated[float, typer.Option(help="To be kept from obstacles beside their margins [m].")] = 0.0,
+    through: Annotated[Three | None, typer.Option(help="Go along the circle through this point [m].")] = None,
+    deviation: Annotated[float, typer.Option(help="Largest deviation of the tip from the line [m].")] = 1e-4,
+    clearance: Annotated[float, typer.Option(help="Distance to keep from obstacles on top of margins [m].")] = 0.0,
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
@@ -87,9 +87,9 @@ def task(
         Path | None,
         typer.Option(help="Time the whole task, and save it: .json, .csv, .mcap; .yaml, .ros.json for ROS 2."),
     ] = None,
-    share: Annotated[float, typer.Option(help="Of the limits of the joints, above 0 to 1: 0.5 is half as fast.")] = 1.0,
+    share: Annotated[float, typer.Option(help="Share of the joints' limits, above 0 to 1: 0.5 is half as fast.")] = 1.0,
     pause: Annotated[
-        float, typer.Option(help="Rest where a gripper works or an object is taken or put down [s].")
+        float, typer.Option(help="Rest where a gripper moves or an object is taken or put down [s].")
     ] = 1.0,
     html: Annotated[Path | None, typer.Option(help="Write a page that plays the whole task.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
