@@ -47,7 +47,8 @@ class Output(NamedTuple):
 
 def inverse_kinematics(
     robot: Annotated[
-        str | None, typer.Argument(help="A name (see: rrtik list robots), a URDF or a DH table; left out if --problem.")
+        str | None,
+        typer.Argument(help="A name (see: rrtik list robots), a URDF, an MJCF or a DH table; left out if --problem."),
     ] = None,
     position: Annotated[
         Triple | None, typer.Option(metavar="X Y Z", help="Position of the tip in the world [m].")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.sensing.rig import Rig
     from rrtik_ompl.sensing.sensor import Sensor, View
 
-markers = typer.Typer(help="Print markers, calibrate cameras, find marked objects in pictures.")
+markers = typer.Typer(help="Print markers, calibrate cameras, find marked objects.")
 
 Dictionary = Annotated[
     str, typer.Option(help="4x4_50 is found farthest away, aruco_mip_36h12 confused least; apriltag_36h11.")

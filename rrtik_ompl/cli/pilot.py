@@ -54,7 +54,7 @@ def pilot(
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
     seed: Annotated[int, typer.Option(help="The same commands give the same routes.", min=0)] = 0,
 ) -> int:
-    """Open a page in the browser that helps a pilot drive an arm.
+    """Open a page that helps a pilot drive an arm.
 
     It shows the camera with the arm drawn in, grasps, routes and moves. Ctrl-C ends it.
     """
