@@ -129,10 +129,13 @@ def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float
     size = reach / CELLS if cell is None else positive(cell, "cell")
     margin = 0.5 * (PROBE_MARGIN - 1.0) * reach
     low, high = (np.floor if k == 0 else np.ceil for k in (0, 1))
-    first, last = low((tips.min(axis=0) - margin) / size), high((tips.max(axis=0) + margin) / size)
-    if robot.planar:
-        first[2], last[2] = BELOW - 1.0, BELOW
-    shape = tuple(int(n) for n in np.maximum(last - first, 1.0))
-    if np.prod(shape, dtype=float) > MAX_CELLS:
-        raise InputError(f"cell of {size:g} m makes {np.prod(shape, dtype=float):.3g} cells; at most {MAX_CELLS}")
+    with np.errstate(over="ignore"):
+        first, last = low((tips.min(axis=0) - margin) / size), high((tips.max(axis=0) + margin) / size)
+        if robot.planar:
+            first[2], last[2] = BELOW - 1.0, BELOW
+        numbers = np.maximum(last - first, 1.0)
+        count = float(np.prod(numbers))
+    if not count <= MAX_CELLS:
+        raise InputError(f"cell of {size:g} m makes {count:.3g} cells; at most {MAX_CELLS}")
+    shape = tuple(map(int, numbers))
     return base + size * first, size, (shape[0], shape[1], shape[2])

@@ -105,6 +105,7 @@ BAD_ANSWERS = {
     "joints of 100 rad": joints([*START[:5], 100.0] if not ROBOT.continuous[5] else [100.0, *START[1:]]),
     "text for joints": joints(["0"] * 5 + ["a"]),
     "an error of an odd kind": b'{"error": [[[]]]}\n',
+    "an error that cannot be shown": b'{"error": "\\ud7ff \\u001b[2J"}\n',
     "an endless line": b"a" * (MAX_LINE_BYTES + 1),
     "nothing": b"",
 }

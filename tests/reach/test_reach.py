@@ -97,6 +97,7 @@ def test_a_map_is_the_same_for_the_same_seed_and_survives_its_file(titan, found,
     [
         ({"cell": 0.0}, "cell: must be greater than 0"),
         ({"cell": 1e-3}, "at most 4000000"),
+        ({"cell": 5e-324}, "at most 4000000"),
         ({"samples": 0}, "samples must be a whole number of at least 1"),
         ({"samples": 1e4}, "samples must be a whole number"),
         ({"axis": "w"}, "axis must be x, y or z"),

@@ -124,6 +124,8 @@ def test_what_is_no_picture_is_refused(tmp_path):
     for name in ("text.png", "empty.png", "missing.png"):
         with pytest.raises(InputError, match=name):
             read_picture(tmp_path / name)
+    with pytest.raises(InputError, match="check the name"):
+        read_picture("a\0.png")
     with pytest.raises(InputError, match="not a video"):
         list(pictures_from(tmp_path / "empty.mp4"))
     with pytest.raises(InputError, match="cannot be opened"):

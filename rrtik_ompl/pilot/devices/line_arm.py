@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import LARGEST, Vector
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, printable
 from rrtik_ompl.files.messages import message_in, quoted
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.robot import Robot
@@ -214,7 +214,7 @@ class LineArm:
             except Exception as error:  # nothing that comes over the line ends this thread
                 self._line.close()
                 why = getattr(error, "strerror", None) or error
-                self.lost = f"the connection to the arm is lost: {why}; the joints are the last known ones"
+                self.lost = printable(f"the connection to the arm is lost: {why}; the joints are the last known ones")
                 self._ended.wait(RETRY_SECONDS)
             self.reported = time.monotonic()
             if self._ended.is_set() and self._request is None and self._grip is None:

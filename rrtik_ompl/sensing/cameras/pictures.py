@@ -48,8 +48,9 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
         if not os.path.isfile(file) or size > MAX_FILE_BYTES:
             raise InputError(f"{path}: is not an image file of at most 512 MiB")
         data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-    except OSError as error:
-        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}; check the name") from None
+    except (OSError, ValueError) as error:  # a name that the system cannot have is a ValueError
+        why = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path}: {why.lower()}; check the name") from None
     picture = None
     if size:
         try:
