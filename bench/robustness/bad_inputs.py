@@ -56,7 +56,8 @@ GOOD: dict[tuple[str, ...], tuple[str, ...]] = {
 }
 NO_NUMBERS = {int: ("x", "", "1.5", "nan", "1e3", "0x10"), float: ("x", "", "nan", "inf", "-inf", "1e999", "1,5")}
 NO_NAMES = ("nowhere/none.xyz", "\ud800", "\x00")
-NO_FOLDER = "suite.yaml/none"  # where a folder would be made
+FOLDERS = {(("bench",), "--out"), (("reproduce",), "--plot")}  # options that make folders
+NO_FOLDER = "suite.yaml/none"  # where none can be made
 ANY_TEXT = {"--token", "--grasp"}  # a word as good as any other
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
 
@@ -100,7 +101,7 @@ def _no_values(name: tuple[str, ...], option: str, parameter: Any) -> tuple[str,
         return NO_NUMBERS[kind]
     if option in ANY_TEXT:
         return ()
-    return (NO_FOLDER, *NO_NAMES[1:]) if name == ("bench",) and option == "--out" else NO_NAMES
+    return (NO_FOLDER, *NO_NAMES[1:]) if (name, option) in FOLDERS else NO_NAMES
 
 
 def _of_files() -> Iterator[BadInput]:

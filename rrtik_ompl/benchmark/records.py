@@ -45,7 +45,8 @@ def read_head(file: Path) -> Record:
     """
     for _, data in _lines(file):
         suite, machine = data.get("suite"), data.get("machine")
-        if data.get("version") != 1 or not isinstance(suite, dict) or not isinstance(machine, dict):
+        known = data.get("version") == 1 and data["version"] is not True
+        if not known or not isinstance(suite, dict) or not isinstance(machine, dict):
             raise InputError(f"{file}:1: not the head of a campaign; choose another --out, or delete the file")
         lacking = [name for name in MACHINE if name not in machine]
         if lacking:

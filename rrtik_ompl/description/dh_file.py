@@ -20,6 +20,7 @@ from rrtik_ompl.files.sections import (
     Vector2,
     Vector3,
     Vector4,
+    Version,
     parse,
 )
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
@@ -69,7 +70,7 @@ class TableEntry(Section):
 class DhFile(Section):
     """A robot given by a DH table."""
 
-    version: Literal[1]
+    version: Version
     name: Name
     dh: TableEntry
     postures_deg: dict[str, Numbers] = Field({}, description="named configurations [deg, m if prismatic]")

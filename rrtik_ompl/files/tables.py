@@ -74,8 +74,9 @@ def _asked(kind: str) -> str:
 
 def _check_heads(document: dict[str, Any], kind: str) -> None:
     for key, expected in (("version", 1), ("kind", kind)):
-        if document.get(key, expected) != expected:
-            raise InputError(f"{key}: expected {expected!r}, got {document[key]!r}")
+        found = document.get(key, expected)
+        if found is True or found != expected:  # true is equal to 1 in Python, but not what a file should say
+            raise InputError(f"{key}: expected {expected!r}, got {found!r}")
     for key in ("units", "joint_names", "continuous"):
         words = document.get(key)
         if words is not None and not (isinstance(words, list) and all(isinstance(word, str) for word in words)):

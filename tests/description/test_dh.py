@@ -113,6 +113,7 @@ def test_a_dh_file_is_loaded_by_its_path(tmp_path):
     [
         ("standard", "craig", "convention"),
         ("version: 1", "version: 2", "version"),
+        ("version: 1", "version: true", "version"),
         ("a: 0.4", "a: long", "rows"),
         ("a: 0.4", "length: 0.4", "unknown key 'length'"),
         ("[-90, 120]", "[120, -90]", "swap them"),

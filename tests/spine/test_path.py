@@ -75,6 +75,13 @@ def test_no_file_shows_a_zero_with_a_sign(tmp_path, ending):
     assert "-0" not in (tmp_path / f"path.{ending}").read_text()
 
 
+@pytest.mark.parametrize("version", ["true", "2", "null", '"1"'])
+def test_a_file_of_another_version_is_refused(tmp_path, version):
+    (file := tmp_path / "path.json").write_text(f'{{"version": {version}, "waypoints": [[0, 0], [1, 0]]}}')
+    with pytest.raises(InputError, match="version: expected 1"):
+        load_path(file)
+
+
 def test_a_path_takes_the_names_of_the_robot_it_is_read_for(tmp_path, sdu_route):
     robot = load_robot("titan4")
     file = tmp_path / "path.txt"
