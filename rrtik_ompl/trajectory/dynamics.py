@@ -172,9 +172,10 @@ class DynamicLimits:
         if (high <= 0.0).any() or (low >= 0.0).any():
             joint = int(((high <= 0.0) | (low >= 0.0)).any(axis=0).argmax())
             name, need = self.robot.joint_names[joint], np.abs(unit.holding[:, joint]).max()
+            newtons = "N" if self.robot.prismatic[joint] else "N m"
             raise InputError(
-                f"torque limits: joint '{name}' needs {need:.3g} N m to hold the arm still on this path, its limit is "
-                f"{self.torque[joint]:.3g} N m; carry less, or choose another path"
+                f"torque limits: joint '{name}' needs {need:.3g} {newtons} to hold the arm still on this path, its "
+                f"limit is {self.torque[joint]:.3g} {newtons}; carry less, or choose another path"
             )
         used = np.isfinite(self.torque)
         rows = Rows(*(part[:, used] for part in (along, unit.torques - unit.holding, low, high)))

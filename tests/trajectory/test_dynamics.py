@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.trajectory import RateLimits, time_parameterize
@@ -104,3 +105,12 @@ def test_limits_of_the_tip_need_a_robot_and_torques_inertias(ur5):
     planar = load_robot("planar3")
     with pytest.raises(InputError, match="no inertias"):
         time_parameterize(JointPath.of(planar, [[0.0] * 3, [1.0] * 3]), planar, torque=5.0)
+
+
+def test_the_force_of_a_joint_that_slides_is_said_in_newtons():
+    mass = '<inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    joint = '<joint name="lift" type="prismatic"><parent link="base"/><child link="car"/><axis xyz="0 0 1"/>'
+    joint += '<limit lower="0" upper="1" effort="20" velocity="1"/></joint>'
+    robot = robot_from_urdf_text(f'<robot name="r"><link name="base"/><link name="car">{mass}</link>{joint}</robot>')
+    with pytest.raises(InputError, match=r"'lift' needs 49\.\d N to hold .* its limit is 20 N;"):
+        time_parameterize(JointPath.of(robot, [[0.0], [1.0]]), robot, torque=True)
