@@ -17,7 +17,7 @@ from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, listed, require
 from rrtik_ompl.poses import rigid, rotation_angles
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import TaskRegion, WithinTolerances
+from rrtik_ompl.task_region import HasTipErrors, TaskRegion, WithinTolerances
 from rrtik_ompl.tip_distance import metres_per_radian
 from rrtik_ompl.units import wrapped
 
@@ -71,7 +71,7 @@ class JointGoal:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PositionGoal:
+class PositionGoal(HasTipErrors):
     """Bring the tip to a point of the world [m], orientation free. ``tolerance`` [m]."""
 
     position: Vector
@@ -85,13 +85,11 @@ class PositionGoal:
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Distance of the tip from the point for each row of Q, shape (m,) [m]."""
-        require(robot, Robot, "robot of a goal")
-        return np.asarray(np.linalg.norm(robot.fk_batch(Q)[:, :3, 3] - self.position, axis=1))
+        return self.errors(robot, Q)[0]
 
-    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
-        """Distance [m] of each row of Q, and an angle of 0, shapes (m,)."""
-        distances = self.distance(robot, Q)
-        return distances, np.zeros(len(distances))
+    def errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+        """Distance [m] of poses of the tip, shape (m, 4, 4), and an angle of 0, shapes (m,)."""
+        return np.linalg.norm(tips[:, :3, 3] - self.position, axis=1), np.zeros(len(tips))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """Which rows of Q are at the goal, shape (m,)."""
@@ -113,10 +111,8 @@ class PoseGoal(WithinTolerances):
         positive(self.position_tolerance, "goal position_tolerance")
         positive(self.orientation_tolerance, "goal orientation_tolerance")
 
-    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
-        """Position error [m] and rotation angle [rad] of each row of Q, shapes (m,)."""
-        require(robot, Robot, "robot of a goal")
-        tips = robot.fk_batch(Q)
+    def errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+        """Position error [m] and rotation angle [rad] of poses of the tip, shape (m, 4, 4), shapes (m,)."""
         return pose_errors(tips, self.T_world_tip)
 
 
@@ -166,11 +162,13 @@ class GoalSet:
 
         Positions and poses are measured alike; of a position the turn is free. Tolerances do not count.
         """
-        return np.asarray(np.min([part.distance(robot, Q) for part in self.parts], axis=0))
+        each = self.member_errors(robot, Q)
+        return np.asarray((each[..., 0] + metres_per_radian(robot) * each[..., 1]).min(axis=0))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """Which rows of Q are at one of the parts, shape (m,)."""
-        return np.asarray(np.any([part.satisfied(robot, Q) for part in self.parts], axis=0))
+        most = np.array([tolerances(part) for part in self.parts])[:, None]
+        return np.asarray((self.member_errors(robot, Q) <= most).all(axis=2).any(axis=0))
 
     def member_at(self, robot: Robot, q: ArrayLike) -> int | None:
         """Number of the member that a configuration, shape (dof,), reaches, from 0, the nearest of several; or None."""
@@ -185,7 +183,9 @@ class GoalSet:
 
         Of what lies inside the box, and of what the free rotation can remove, nothing counts.
         """
-        return np.array([part.errors(robot, Q) for part in self.parts]).transpose(0, 2, 1)
+        require(robot, Robot, "robot of a goal")
+        tips = robot.fk_batch(Q)  # once for all of them
+        return np.array([part.errors_at(tips) for part in self.parts]).transpose(0, 2, 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,16 +26,27 @@ COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 SWEEPS = 3  # over roll, pitch and yaw; one is exact where a single one of them is free
 
 
-class WithinTolerances(ABC):
+class HasTipErrors(ABC):
+    """What the tip has a distance and an angle from."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+        """Distance [m] and angle [rad] of poses of the tip, shape (m, 4, 4), from the goal, shapes (m,)."""
+
+    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
+        """Distance [m] and angle [rad] of the tip from the goal, for each row of Q, shapes (m,)."""
+        require(robot, Robot, "robot of a goal")
+        return self.errors_at(robot.fk_batch(Q))
+
+
+class WithinTolerances(HasTipErrors):
     """What has an error in position and one in orientation, and a tolerance for each."""
 
     __slots__ = ()
     position_tolerance: float
     orientation_tolerance: float
-
-    @abstractmethod
-    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
-        """Distance [m] and angle [rad] of the tip from the goal, for each row of Q, shapes (m,)."""
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """How far the tip is from the goal, shape (m,) [m]: its way, and its turn at the lever of half the arm's reach.
@@ -169,10 +180,8 @@ class TaskRegion(WithinTolerances):
         place = (tips[:, :3, 3] - self.T_world_w.translation) @ R_w - rpy_matrices(angles) @ self.T_w_tip.translation
         return np.hstack([np.clip(place, self.bounds[:3, 0], self.bounds[:3, 1]), angles])
 
-    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
-        """Distance [m] and angle [rad] of the tip from the nearest pose, for each row of Q, shapes (m,)."""
-        require(robot, Robot, "robot of a goal")
-        tips = robot.fk_batch(Q)
+    def errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+        """Distance [m] and angle [rad] of poses of the tip, shape (m, 4, 4), from the nearest pose, shapes (m,)."""
         poses = self.poses(self.nearest(tips))
         position: Vector = np.linalg.norm(tips[:, :3, 3] - poses[:, :3, 3], axis=1)
         return position, rotation_angles(np.swapaxes(poses[:, :3, :3], 1, 2) @ tips[:, :3, :3])

@@ -37,8 +37,7 @@ from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world.holding_world import HoldingWorld
 
 STARTS = 48  # of inverse kinematics in one round
-FEWEST = 4  # for each part, to say how near the arm came
-PARTS = 6  # of a grasp set, among which the starts of a round are shared out
+PARTS = 6  # of a grasp set, among which the starts of a round are shared out, or to which it is said how near it came
 MAX_ROUNDS = 4  # at most, until one free configuration is found
 LAST_ROUND = 64
 NO_LIMIT = 1e9  # [s]; the passes of MB-RRT are counted, some 0.1 to 0.4 s of them
@@ -199,10 +198,15 @@ _first_rounds: WeakKeyDictionary[Problem, tuple[Matrix, Matrix, bool]] = WeakKey
 
 def _miss(problem: Problem, goal: TipGoal) -> str:
     """How near the arm came to a goal within its limits, in a line."""
-    robot, parts = problem.world.robot, parts_of(goal)
-    count = max(STARTS // len(parts), FEWEST)
-    starts = np.random.default_rng(0).uniform(*robot.finite_range(), (count, robot.dof))
-    ends = np.vstack([project(robot, as_task_region(part), starts) for part in parts])
+    robot, regions = problem.world.robot, [as_task_region(part) for part in parts_of(goal)]
+    starts = np.random.default_rng(0).uniform(*robot.finite_range(), (STARTS, robot.dof))
+    if len(regions) > PARTS:  # to walk to each of thousands would take minutes
+        places = np.array([(region.T_world_w * region.T_w_tip).translation for region in regions])
+        away = np.linalg.norm(places[:, None] - robot.fk_batch(starts)[:, :3, 3], axis=2).min(axis=1)
+        regions = [regions[k] for k in np.argsort(away, kind="stable")[:PARTS]]
+        goal = GoalSet(regions)
+    starts = starts[: STARTS // len(regions)]
+    ends = np.vstack([project(robot, region, starts) for region in regions])
     distance, angle = tip_errors(goal, robot, ends)
     best = np.argmin(goal.distance(robot, ends))
     if goal.satisfied(robot, ends[best : best + 1])[0]:

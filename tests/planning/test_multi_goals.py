@@ -1,5 +1,7 @@
 """Goals of several tips at once: all of them are reached, by every kind of planner, and with path constraints."""
 
+import time
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -134,3 +136,22 @@ def test_which_member_of_a_set_was_reached_is_said(titan, tmp_path, capsys):
     rrtik.save_problem(rrtik.Problem(world, "ready", goal), file)
     assert run(["plan", str(file)]) == 0
     assert "it ends at goal 2 of 3" in capsys.readouterr().out
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("middle", [0.5, 2.5])  # in the post, out of reach
+def test_thousands_of_grasps_that_cannot_be_reached_do_not_cost_minutes(middle):
+    post = rrtik.Obstacle("post", rrtik.Box([0.1, 0.1, 1.2]), [0.5, 0.0, 0.6])
+    world, rng = rrtik.World(rrtik.load_robot("panda"), rrtik.Scene([post])), np.random.default_rng(0)
+    places = np.array([middle, 0.0, 0.5]) + 0.02 * rng.normal(size=(2000, 3))
+    goal = rrtik.GoalSet([pin.SE3(pin.exp3(rng.normal(size=3)), place) for place in places])
+    problem = rrtik.Problem(world, "default", goal)
+    rrtik.plan(problem, "RRTConnect", seed=1, seconds=0.01)  # loads kernels
+    begin = time.process_time()
+    found = rrtik.plan(problem, "RRTConnect", seed=1, seconds=0.05)
+    assert time.process_time() - begin < 5.0
+    assert not found.found
+    assert "wall time" in found.reason
+    rows = rng.uniform(*world.robot.finite_range(), (5, 7))
+    each = np.array([part.distance(world.robot, rows) for part in goal.parts])
+    assert (goal.distance(world.robot, rows) == each.min(axis=0)).all()
