@@ -98,7 +98,7 @@ class Loop:
             free = self._measured(spent, event, self._repair)
             event = "walk" if free and self._planner.path is before else event
         here = self.q
-        event, reason, place = self._go(event) if free else self._wait_or_evade()
+        event, reason, place = self._early_evasion() or (self._go(event) if free else self._wait_or_evade())
         self._left, path = self._distance_left(place), self._planner.path
         moves = (place != here).any()
         proven = self._measured(spent, "prove", self._proven, here[None], place[None]) if moves else None
@@ -172,11 +172,15 @@ class Loop:
         others = self._goals[(self._goals != planner.path[-1]).any(axis=1)]
         return planner.retarget(others, self._world, stop)
 
+    def _early_evasion(self) -> tuple[TickEvent, str, Vector] | None:
+        """Evade a cloud that closes in before it is too near, with a path or without; None if that is not needed."""
+        if self._world.blocked or not (self._closes_in() and self._world.valid(self.q)):
+            return None
+        place = self._evasion()
+        return None if place is None else ("evade", "an obstacle closes in", place)
+
     def _go(self, event: TickEvent) -> tuple[TickEvent, str, Vector]:
-        """Go along the free path, or evade a cloud that closes in. Event, reason, configuration."""
-        away = self._evasion() if self._closes_in() else None
-        if away is not None:
-            return "evade", "an obstacle closes in", away
+        """Go along the free path. Event, reason, configuration."""
         place = self._step()
         return (event, "", place) if place is not self.q else ("wait", "the goal is not free", place)
 

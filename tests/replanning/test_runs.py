@@ -109,12 +109,15 @@ def test_a_robot_that_is_nearer_than_it_may_be_leaves_also_where_a_first_step_ga
     assert way[0] < -0.9 * 0.01
 
 
-def test_a_cloud_that_closes_in_is_evaded_before_it_is_too_near():
+@pytest.mark.parametrize("shut", [False, True])
+def test_a_cloud_that_closes_in_is_evaded_before_it_is_too_near(shut):
     around = np.random.default_rng(0).normal(size=(500, 3))
     ball = around / np.linalg.norm(around, axis=1, keepdims=True)
+    walls = [box(f"wall{x}", x, 13.0, 0.2, 2.0) for x in (7.0, 9.0)] + [box(f"lid{y}", 8, y, 2, 0.2) for y in (12, 14)]
 
     def seen(time):
-        return Scene([Obstacle("seen", PointCloud(ball + np.array([9.4 - 0.4 * time, 10, 0]), 0.02))])
+        cloud = Obstacle("seen", PointCloud(ball + np.array([9.4 - 0.4 * time, 10, 0]), 0.02))
+        return Scene([cloud, *(walls if shut else ())])  # there is no path to what is shut up
 
     problem = Problem(World(plane().robot, seen(0.0), motion_resolution=0.05), [8.0, 10.0], [8.0, 13.0])
     slow = OPTIONS | {"step": 0.05, "max_edge": 0.2}
