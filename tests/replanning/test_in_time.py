@@ -79,6 +79,14 @@ def test_a_door_that_stays_shut_until_the_horizon_is_not_passed():
     assert plan.arrival == np.inf
 
 
+def test_a_goal_that_stays_blocked_is_named():
+    lid = TimedPoses([0.0, 0.5], [place(19.0, 2.0), place(19.0, 10.0)])
+    plan = plan_in_time(plane(box("lid", 19.0, 2.0, 1.0, 1.0, lid)), iterations=200, seed=1, **PLANE)
+    assert not plan.found
+    assert "the goal is not proven free at any of the" in plan.reason
+    assert "horizon" in plan.reason
+
+
 def test_nothing_in_the_way_arrives_as_soon_as_speed_allows():
     plan = plan_in_time(plane(box("far", 10.0, 18.0, 1.0, 1.0)), seed=1, **PLANE)
     assert plan.arrival == pytest.approx(plan.least_seconds) == pytest.approx(3.6)

@@ -138,9 +138,7 @@ def plan_in_time(
     reason = _hopeless(search, options, cut_short)
     rows = None if reason else search.run(most, lambda: time.perf_counter() - begun > limit)
     if rows is None and not reason:
-        tried = f"no way was found in {search.iterations} iterations"
-        remedy = "raise horizon, rate, iterations or seconds"
-        reason = f"{tried}, and {cut_short}" if cut_short else f"{tried}; {remedy}"
+        reason = _not_found(search, cut_short)
     run = None if rows is None else _record(problem, search, rows, options)
     return TimedPlan(run, reason, options.slot * search.least, search.iterations, time.perf_counter() - begun)
 
@@ -187,6 +185,17 @@ def _hopeless(search: TimeSearch, options: _Options, cut_short: str) -> str:
     if not search.worlds.free(0, search.ends.start, search.ends.start):
         return "the start is not proven free in the first slot of time; raise rate, or lower margin or clearance"
     return ""
+
+
+def _not_found(search: TimeSearch, cut_short: str) -> str:
+    """Why a search has ended with nothing."""
+    if search.shut:
+        tried = f"the goal is not proven free at any of the {search.shut} arrivals that were tried"
+        remedy = "raise horizon, or lower margin or clearance"
+    else:
+        tried = f"no way was found in {search.iterations} iterations"
+        remedy = "raise horizon, rate, iterations or seconds"
+    return f"{tried}, and {cut_short}" if cut_short else f"{tried}; {remedy}"
 
 
 def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Options) -> ReplanRun:

@@ -68,6 +68,11 @@ class TimeSearch:
         self.least, self.iterations = int(self._each_least.min()), 0
         self._begin_anew(None)
 
+    @property
+    def shut(self) -> int:
+        """How many arrivals were tried, if the goal was free at none of them; else 0."""
+        return 0 if self._trees[1].size else len(self._rooted)
+
     def _begin_anew(self, earlier: int | None) -> None:
         """A round with new trees; with a last slot that is ``earlier`` than what was found, or the first one."""
         self._trees = (TimeTree(self.pace, 1), TimeTree(self.pace, -1))
