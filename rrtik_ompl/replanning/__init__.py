@@ -68,7 +68,8 @@ def replan(  # noqa: D417 - the settings are described in one place
         problem: Robot, scene at the begin, start and goal. Of a pose, position or region all configurations are goals:
             if one is blocked another one is tried.
         scene_feed: The scene over time: a scene whose obstacles state their motion, a function of time [s], or
-            pairs of a time and a scene; the problem's scene if None. The obstacles' names and shapes stay the same.
+            pairs of a time and a scene; the problem's scene if None. The obstacles' names and shapes stay the
+            same, and so do attached objects, which are those of the problem.
             A feed with fewer scenes than ticks makes obstacles jump; their speed is that of the jump in one tick.
         step: This and all arguments that are not explained here: see :class:`ReplanSettings`.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.

@@ -22,7 +22,7 @@ from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.motion_queries import Stop
-from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.moving_world import MovingWorld, check_held
 
 Clock = Callable[[], float]
 
@@ -47,8 +47,8 @@ class Loop:
         clock: Clock = time.perf_counter,
     ) -> None:
         self._clock: Clock = lambda: finite_number(clock(), "clock: what it gives")
-        robot, scene = problem.robot, feed(0.0)
         self._problem, self._feed, self._settings, self._goal_feed = problem, feed, settings, goal_feed
+        robot, scene = problem.robot, self._seen(0.0)
         first = problem.world.with_accuracy("exact").with_scene(scene)
         self._world = MovingWorld(first, copies=PREDICTED_PLACES if settings.lookahead_ticks else 1)
         self._near = MovingWorld(first, self_collision=False)
@@ -106,9 +106,15 @@ class Loop:
         self.q = place
         return True
 
+    def _seen(self, now: float) -> Scene:
+        """What the feed has, in which the arm must hold what it holds in the problem."""
+        scene = self._feed(now)
+        check_held(scene, self._problem.world.scene)
+        return scene
+
     def _read_scene(self, now: float) -> bool:
         """Read the scene; whether anything has moved."""
-        scene = self._feed(now)
+        scene = self._seen(now)
         if not self._tracker.update(now, scene):
             return False
         settings = self._settings

@@ -101,12 +101,14 @@ class MovingWorld:
                 its own.
 
         Raises:
-            InputError: If a scene has other obstacles than the world began with, or an inflation is not 0 or more.
+            InputError: If a scene has other obstacles or attached objects than the world began with, or an inflation is
+                not 0 or more.
             UnknownNameError: If an inflation is given for what is no obstacle.
         """
         places = [{o.name: o for o in scene.obstacles} for scene in scenes]
         for scene in scenes:
             _check_obstacles(scene, self._known)
+            check_held(scene, self.scene)
         for name, metres in (inflation or {}).items():
             if name not in self._known:
                 raise UnknownNameError("obstacle", name, self._known, where="inflation")
@@ -178,6 +180,18 @@ def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
         clouds = isinstance(before, PointCloud) and isinstance(obstacle.shape, PointCloud)
         if not clouds and not same_shape(obstacle.shape, before):
             raise InputError(f"scene: '{obstacle.name}' has another shape than before; make a new world")
+
+
+def check_held(scene: Scene, before: Scene) -> None:
+    """Refuse a scene in which the arm holds something else than before: that is a part of the arm, and never moved.
+
+    Raises:
+        InputError: It names what is held.
+    """
+    now, held = ({a.name for a in each.attached} for each in (scene, before))
+    if now != held:
+        given, wanted = (", ".join(sorted(names)) or "nothing" for names in (now, held))
+        raise InputError(f"scene: the arm held {wanted}, and now {given}; give scenes with the same attached objects")
 
 
 def _with_copies(

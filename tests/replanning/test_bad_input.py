@@ -8,11 +8,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning import SpeedWarning, load_run, replan
-from rrtik_ompl.scene import Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import Box, HalfSpace
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene, TimedPoses
+from rrtik_ompl.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.world import World
 from rrtik_tests.moving_plane import OPTIONS, box, crossing, plane
 
 
@@ -128,3 +131,16 @@ def test_a_floor_that_slides_has_a_speed_like_any_obstacle():
         assert replan(plane(floor), speed_bound=0.6, **OPTIONS).arrived
     with pytest.warns(SpeedWarning, match="'floor' moves at 0.5 m/s"):
         assert replan(plane(floor), speed_bound=0.4, **OPTIONS).arrived
+
+
+@pytest.mark.parametrize("seen", [0.0, 0.2])
+def test_a_feed_whose_scenes_forget_what_the_arm_holds_is_refused(seen):
+    robot = load_robot("planar", lengths=[1.0, 1.0])
+    far, held = box("far", 9.0, 9.0), AttachedObject("tool", robot.tip, Sphere(0.05))
+    problem = Problem(World(robot, Scene((far,), (held,))), [0.0, 0.3], [1.0, 0.3])
+
+    def feed(time):
+        return Scene((far,), () if time >= seen else (held,))
+
+    with pytest.raises(InputError, match="the arm held tool, and now nothing; give scenes with"):
+        replan(problem, feed, step=0.02, rate=20.0)
