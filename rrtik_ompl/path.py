@@ -142,7 +142,7 @@ class JointPath:
             together = ", ".join(np.array(self.joint_names)[changes[several[0]]])
             edge = int((moved(self.waypoints[:-1], self.waypoints[1:]).sum(axis=1) > 1).argmax())
             raise InputError(
-                f"path: edge {edge + 1} moves several joints at once ({together}); it is no list of moves: "
+                f"path: motion {edge + 1} moves several joints at once ({together}); it is no list of moves: "
                 "convert it with one_joint_moves(path, problem)"
             )
         joints, units = changes.argmax(axis=1), joint_units(self.prismatic)

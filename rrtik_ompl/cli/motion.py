@@ -170,7 +170,7 @@ def _valid_path(path: Path, task: Problem) -> JointPath:
     route = load_path(path, task.robot)
     faults = route.violations(task.world)
     if faults:
-        raise InputError(f"{path}: not valid for {task.name}: edge {faults[0].edge + 1}: {faults[0].reason}")
+        raise InputError(f"{path}: not valid for {task.name}: motion {faults[0].edge + 1}: {faults[0].reason}")
     return route
 
 

@@ -224,7 +224,7 @@ def certified(problem: Problem, path: JointPath, found: Certificate) -> tuple[st
 
 def faults_of_path(problem: Problem, route: JointPath) -> list[str]:
     """A line for each motion of a path that is not free, and for ends that are not the problem's."""
-    lines = [f"edge {v.edge + 1}: {v.reason}" for v in route.violations(problem.world)]
+    lines = [f"motion {v.edge + 1}: {v.reason}" for v in route.violations(problem.world)]
     return lines + wrong_ends(problem, route)
 
 

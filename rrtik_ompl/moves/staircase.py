@@ -70,7 +70,7 @@ def one_joint_moves(
         raise InputError("path to convert: it has one waypoint, so there is nothing to convert")
     faults = path.violations(world)
     if faults:
-        raise InputError(f"path to convert: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
+        raise InputError(f"path to convert: motion {faults[0].edge + 1} is not valid: {faults[0].reason}")
     least = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
     check_route_clearance(world, clearance, path.waypoints)
     for kept in provable_clearances(world, path.waypoints, clearance):
@@ -183,7 +183,7 @@ def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
 def _halves(piece: _Piece, world: World, finest: float) -> list[_Piece]:
     if world.weights @ np.abs(piece.b - piece.a) <= finest:
         raise InputError(
-            f"path to convert: edge {piece.edge + 1} passes too close to something to be walked one joint at a time in "
+            f"path to convert: motion {piece.edge + 1} passes too close to something to be walked one joint at a time in "
             f"steps of {1e3 * finest:.3g} mm; use a planner of single-joint moves instead, such as the default one"
         )
     middle = 0.5 * (piece.a + piece.b)

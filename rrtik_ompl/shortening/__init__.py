@@ -278,7 +278,7 @@ def _checked(
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
     faults = () if path.proven_in(problem.world) else path.violations(problem.world)
     if faults:
-        raise InputError(f"path to shorten: edge {faults[0].edge + 1} is not valid: {faults[0].reason}")
+        raise InputError(f"path to shorten: motion {faults[0].edge + 1} is not valid: {faults[0].reason}")
     check_route_clearance(problem.world, clearance, path.waypoints)
     if one_joint and not path.one_joint_at_a_time:
         raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")

@@ -104,7 +104,7 @@ def test_where_no_staircase_passes_one_line_names_the_edge_and_the_remedy():
     world = corridor(0.05)
     path = JointPath.of(world.robot, [[3.5, 3.5], [3.51, 3.51], [9.0, 9.0]])
     assert path.violations(world) == ()
-    with pytest.raises(InputError, match=r"edge 2 passes too close.*planner of single-joint moves"):
+    with pytest.raises(InputError, match=r"motion 2 passes too close.*planner of single-joint moves"):
         one_joint_moves(path, world, finest=0.5)
 
 
@@ -146,13 +146,13 @@ def test_a_path_of_one_waypoint_is_refused():
 
 def test_the_edge_of_several_joints_is_named_as_it_stands_in_the_path():
     path = JointPath([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 1.0]])
-    with pytest.raises(InputError, match="edge 3 moves several joints"):
+    with pytest.raises(InputError, match="motion 3 moves several joints"):
         path.moves()
 
 
 def test_a_path_that_is_not_valid_is_not_converted():
     problem = load_problem("titan4_sdu")
-    with pytest.raises(InputError, match="edge 1 is not valid"):
+    with pytest.raises(InputError, match="motion 1 is not valid"):
         one_joint_moves(JointPath.of(problem.robot, [problem.start, problem.goal.q]), problem)
 
 
