@@ -183,8 +183,8 @@ def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
 def _halves(piece: _Piece, world: World, finest: float) -> list[_Piece]:
     if world.weights @ np.abs(piece.b - piece.a) <= finest:
         raise InputError(
-            f"path to convert: motion {piece.edge + 1} passes too close to something to be walked one joint at a time in "
-            f"steps of {1e3 * finest:.3g} mm; use a planner of single-joint moves instead, such as the default one"
+            f"path to convert: motion {piece.edge + 1} passes too close to something to be walked one joint at a time "
+            f"in steps of {1e3 * finest:.3g} mm; use a planner of single-joint moves instead, such as the default one"
         )
     middle = 0.5 * (piece.a + piece.b)
     ends = ((piece.a, middle), (middle, piece.b))
