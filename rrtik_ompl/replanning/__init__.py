@@ -19,7 +19,7 @@ from rrtik_ompl.replanning.loop import Clock, Loop
 from rrtik_ompl.replanning.patient import PATIENCE_SECONDS, PatientFeed
 from rrtik_ompl.replanning.record import ReplanRun, Tick, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, ReplanSettings, refuse_renamed
-from rrtik_ompl.replanning.start_and_goals import GoalFeed
+from rrtik_ompl.replanning.start_and_goals import GoalFeed, refuse_constraints
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory.limits import RateLimits
 
@@ -83,7 +83,7 @@ def replan(  # noqa: D417 - the settings are described in one place
 
     Raises:
         InputError: If a number is out of range, times go backwards, an obstacle begins in contact with the robot, no
-            configuration reaches the goal, or a feed does not answer.
+            configuration reaches the goal, a feed does not answer, or the problem has path constraints.
         UnknownNameError: If there is no planner of that name.
 
     Example:
@@ -120,6 +120,7 @@ def replan_with(
     """
     require(settings, ReplanSettings, "settings", "use ReplanSettings(step=..., rate=...)")
     require(problem, Problem, "problem to replan", "use Problem(world, start, goal) or load_scenario(name)")
+    refuse_constraints(problem, "replan")
     if goal_feed is not None:
         called(goal_feed, "goal_feed", "time [s]")
     called(clock, "clock")

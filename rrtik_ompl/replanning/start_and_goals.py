@@ -20,6 +20,16 @@ from rrtik_ompl.world.moving_world import MovingWorld
 GoalFeed = Callable[[float], ArrayLike]
 
 
+def refuse_constraints(problem: Problem, verb: str) -> None:
+    """Refuse a problem with path constraints, of which nothing here knows.
+
+    Raises:
+        InputError: If it has some.
+    """
+    if problem.constraints:
+        raise InputError(f"{verb}: path constraints are not kept there; leave them out, or use plan()")
+
+
 def check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> None:
     """Refuse a run that begins in contact, or nearer to contact than the margin.
 

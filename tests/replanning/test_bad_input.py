@@ -12,8 +12,10 @@ from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning import SpeedWarning, load_run, replan
+from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene, TimedPoses
 from rrtik_ompl.shapes import Box, HalfSpace, Sphere
+from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.world import World
 from rrtik_tests.moving_plane import OPTIONS, box, crossing, plane
@@ -144,3 +146,13 @@ def test_a_feed_whose_scenes_forget_what_the_arm_holds_is_refused(seen):
 
     with pytest.raises(InputError, match="the arm held tool, and now nothing; give scenes with"):
         replan(problem, feed, step=0.02, rate=20.0)
+
+
+def test_path_constraints_are_refused_for_they_would_not_be_kept():
+    robot = load_robot("planar", lengths=[1.0, 1.0])
+    bounds = [[-9, 9]] * 3 + [[-7, 7]] * 3
+    held = Problem(World(robot), [0.0, 0.3], [1.0, 0.3], constraints=[TaskRegion(np.eye(4), bounds)])
+    with pytest.raises(InputError, match="replan: path constraints are not kept there"):
+        replan(held, step=0.02, rate=20.0)
+    with pytest.raises(InputError, match="plan in time: path constraints are not kept there"):
+        plan_in_time(held)

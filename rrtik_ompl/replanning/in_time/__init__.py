@@ -10,7 +10,7 @@ import numpy as np
 from rrtik_ompl.arrays import TAU, Matrix, not_negative, positive, whole_number
 from rrtik_ompl.choices import TickEvent
 from rrtik_ompl.copies import in_one_line
-from rrtik_ompl.errors import InputError, at_most, require
+from rrtik_ompl.errors import at_most, require
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.poses import pose_row
 from rrtik_ompl.problem import Problem
@@ -19,7 +19,7 @@ from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.search import Ends, TimeSearch
 from rrtik_ompl.replanning.in_time.tree import Pace
 from rrtik_ompl.replanning.record import ReplanRun, Tick
-from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs
+from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.world.kept_clearance import CLEARANCE
@@ -120,8 +120,7 @@ def plan_in_time(
         True
     """
     require(problem, Problem, "problem to plan in time", "use Problem(world, start, goal) or load_scenario(name)")
-    if problem.constraints:
-        raise InputError("plan in time: path constraints are not kept there; leave them out, or use plan()")
+    refuse_constraints(problem, "plan in time")
     options = _Options(
         slot=1.0 / positive(rate, "rate", "give slots a second, such as 10"),
         horizon=positive(horizon, "horizon", "give the latest arrival [s]"),
