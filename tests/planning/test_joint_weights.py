@@ -55,7 +55,7 @@ def problem():
 @pytest.mark.kernels
 def test_paths_are_shorter_in_the_weighted_length_and_free():
     plain, weighted = 0.0, 0.0
-    for seed, (world, heavy, start, goal, weights) in enumerate(cases(8)):
+    for seed, (world, heavy, start, goal, weights) in enumerate(cases(32)):
         one = rrtik.plan(rrtik.Problem(world, start, goal), seed=seed)
         other = rrtik.plan(rrtik.Problem(heavy, start, goal), seed=seed)
         assert other.found, other.reason
@@ -65,7 +65,7 @@ def test_paths_are_shorter_in_the_weighted_length_and_free():
         assert (other.path.end == goal).all()
         plain += weighted_length(one.path, weights)
         weighted += weighted_length(other.path, weights)
-    assert weighted < 0.99 * plain
+    assert weighted < 0.98 * plain
 
 
 @pytest.mark.kernels
