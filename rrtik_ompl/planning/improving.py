@@ -141,9 +141,9 @@ class _Work:
         return self._seconds - (time.perf_counter() - self._begin)
 
     def _shortened(self, path: JointPath, checks: int | None) -> JointPath:
-        """A path after some work, kept if it is the best; as it was if there is no time."""
+        """A path after some work, kept if it is the best; as it was if there is no time, or it does not move."""
         left = self._left()
-        if left <= LEAST_SECONDS:
+        if left <= LEAST_SECONDS or len(path.waypoints) < 2:
             return path
         self._shortenings += 1
         end, seed = time.perf_counter() + left, self._request.seed + self._shortenings

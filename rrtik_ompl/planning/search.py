@@ -103,7 +103,7 @@ class Search:
         """The path that stays at the start, or None and a reason."""
         self.reason = self._check.impossible()
         path = JointPath.of(self._problem.robot, self._problem.start[None])
-        return None if self.reason else path.proved(self._problem.world) if self._check.proves else path
+        return None if self.reason else self._check.still(path) if self._check.proves else path
 
     def _done(self) -> bool:
         """Whether there is no time left, or nothing better to be expected."""

@@ -78,6 +78,11 @@ class SecondCheck:
             return f"the {what} is not proven free: {self._first_gap(np.stack([q, q]))}"
         return ""
 
+    def still(self, path: JointPath) -> JointPath:
+        """A path that stays where it is, with a proof of the clearance, or of what there is of it."""
+        room = self._room(path.waypoints)
+        return proved_as_clear(path, self._problem.world, 0.0 if room is None else room.kept)
+
     def strict(self, *, proving: bool) -> Problem:
         """The problem for searches that leave room: motions keep more than the clearance in steps, and may be proven.
 

@@ -292,3 +292,15 @@ def test_an_arm_without_solids_is_planned_in_an_empty_scene(planner):
     assert found.proven
     assert found.path.violations(world) == ()
     assert not world.prove([[-1.0], [2.5]]).proven
+
+
+@pytest.mark.parametrize("planner", [None, "RRTConnect", "bicrdt"])
+@pytest.mark.parametrize("objective", ["length", "time", "clearance"])
+def test_a_start_that_is_the_goal_keeps_the_clearance_and_is_as_good_as_can_be(planner, objective):
+    world, start = rrtik.World(rrtik.load_robot("ur5")), [-1.2, -0.9, 1.2, -0.3, 1.6, 0.0]
+    for goal in (start, rrtik.PoseGoal(world.robot.fk(start))):
+        problem = rrtik.Problem(world, start, goal)
+        found = rrtik.plan(problem, planner, seed=1, clearance=0.01, improve=1.0, objective=objective)
+        assert found.path.waypoints.tolist() == [start]
+        assert found.path.proof.clearance == 0.01
+        assert found.statistics["improving_rounds"] == 0
