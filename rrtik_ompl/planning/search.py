@@ -24,6 +24,7 @@ BRIEF_ROUNDS = 2  # attempts to find one that keeps the clearance, once there is
 IN_KERNELS = 5  # of them, without proofs while searching, for planners that run in kernels
 MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")  # options of planners, see MoveRules
 SEPARATED = 2  # attempts with further goal configurations, once none that is known can be reached
+SHORT_WAY_EFFORT = 16  # for the short way round alone, before the long way is tried; some 0.2 s of kernels
 ANYTIME_SHARE = 0.8  # of the time, for the first attempt of an anytime planner, which keeps a clearance
 
 
@@ -171,7 +172,7 @@ class Search:
             roomy = aims[strict.world.valid_batch(aims)]
             if len(roomy) or self._aimless:
                 return self._strict_path(strict, number, roomy, base=2 if proving else 4)
-        effort = 2**number if self._traits.supports_iteration_limit and self._others(number) else None
+        effort = self._effort(number)
         dense = self._traits.anytime or self._check.rejected
         asked = densely_checked(self._problem) if dense else self._problem
         checked = asked.world.accuracy == "exact"  # by the problem and by the search for goals
@@ -179,6 +180,14 @@ class Search:
         outcome = self._attempt(asked, number, aims, seconds, effort, checked=checked)
         self._count(outcome, room=False)
         return self._accepted(outcome)
+
+    def _effort(self, number: int) -> int | None:
+        """Of an attempt after which others aim elsewhere, of planners that have it; None for all there is time for."""
+        if not self._traits.supports_iteration_limit:
+            return None
+        if self._short_way(number):
+            return SHORT_WAY_EFFORT
+        return 2**number if self._others(number) else None
 
     def _strict_problem(self, proving: bool) -> Problem:
         """See :meth:`SecondCheck.strict`; made once."""
@@ -209,7 +218,7 @@ class Search:
         self._spent[room] += int(outcome.statistics.get("checked_motions", 0)) + EFFORT_MOTIONS
 
     def _share(self, number: int) -> float:
-        """Of the time left, what an attempt gets: half for the short way round, before the long way is tried."""
+        """Of time and iterations left, what an attempt gets: half for the short way round, before the long one."""
         return 0.5 if self._short_way(number) else 1.0
 
     def _accepted(self, outcome: Attempt) -> JointPath | None:
@@ -236,7 +245,8 @@ class Search:
     ) -> Attempt:
         """One attempt, counted; ``checked``: start and goals are known to be free."""
         if self._iterations is not None:
-            left = -(-(self._iterations - int(self.totals.get("iterations", 0))) // EFFORT_ITERATIONS)
+            open_ = self._share(number) * (self._iterations - int(self.totals.get("iterations", 0)))
+            left = int(-(-open_ // EFFORT_ITERATIONS))
             effort = max(left if effort is None else min(effort, left), 1)
         outcome = attempt(
             problem,

@@ -11,12 +11,13 @@ from ompl import base as ob
 from ompl import control as oc
 
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal, PositionGoal
 from rrtik_ompl.ompl_bridge.planner_names import find_planner, list_planners
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.planning import plan
+from rrtik_ompl.planning import plan, plan_counted
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.scene import Obstacle, Scene
@@ -189,6 +190,24 @@ def test_a_continuous_joint_goes_the_short_way_round():
     assert found.found, found.reason
     (move,) = shorten(found.path, problem).moves()
     assert move.end - move.start == pytest.approx(2 * np.pi - 6.0, abs=1e-9)
+
+
+@pytest.mark.kernels
+def test_where_the_short_way_round_is_blocked_the_long_one_does_not_wait_for_half_of_the_time():
+    text = '<robot name="r"><link name="base"/><link name="car"/><link name="arm"><collision><origin xyz="0.3 0 0"/>'
+    text += '<geometry><box size="0.5 0.04 0.04"/></geometry></collision></link><joint name="lift" type="prismatic">'
+    text += '<parent link="base"/><child link="car"/><axis xyz="0 0 1"/><limit lower="0" upper="0.5" effort="1" '
+    text += 'velocity="1"/></joint><joint name="turn" type="continuous"><parent link="car"/><child link="arm"/>'
+    text += '<axis xyz="0 0 1"/></joint></robot>'
+    tall, low = (Obstacle(f"{z}", Box([0.2, 0.1, z]), [0.0, 0.4 if z > 1 else -0.4, 0.0]) for z in (2.0, 0.6))
+    problem = Problem(World(robot_from_urdf_text(text), Scene([tall, low])), [0.1, 0.0], [0.1, 2.8])
+    for planner in ("fastrrtconnect", "auto"):
+        one, other = (plan(problem, planner, seconds=120.0, seed=1) for _ in range(2))
+        assert one.found
+        assert one.seconds < 30.0
+        assert one.path.end == pytest.approx([0.1, 2.8 - 2 * np.pi])
+        assert one.statistics == other.statistics
+    assert plan_counted(problem, 4000, seconds=120.0, seed=1).found  # as tasks do at first
 
 
 @pytest.mark.parametrize(
