@@ -7,7 +7,6 @@ free at every time of the slot.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import replace
 from hashlib import blake2b
 from itertools import pairwise
@@ -27,7 +26,7 @@ from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld
 
 ROUNDING = 1e-9  # [m]: of places that are computed from times
-MOST_WORLDS = 256  # that are kept at once: up to 1 MB each, and there may be thousands of slots
+MOST_WORLDS = 1024  # that are kept at once: 0.5 to 1.5 MB each, and there may be ten thousand slots
 FINEST = 1e-4  # [m]: of an obstacle's way; if it may touch the base within so little, it counts as touching it
 
 
@@ -46,8 +45,9 @@ class ForeseenWorlds:
     def __init__(self, world: World, slot: float, room: float) -> None:
         self._world, self._slot, self._room = world.with_accuracy("exact"), slot, room
         self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in world.scene.obstacles}
-        self._worlds: OrderedDict[bytes, MovingWorld] = OrderedDict()  # the one that was asked last comes last
-        self._keys: dict[int, bytes] = {}
+        self._worlds: dict[bytes, MovingWorld] = {}
+        self._keys: dict[int, bytes] = {}  # of the slots' worlds
+        self._rng = np.random.default_rng(0)
 
     def free(self, slot: int, a: Vector, b: Vector) -> bool:
         """Whether the straight motion from a to b, shape (n,), both inside the limits, is proven free in a slot."""
@@ -104,7 +104,6 @@ class ForeseenWorlds:
         """The world in a slot; where all is at rest one world serves every slot."""
         key = self._keys.get(slot)
         if key is not None and key in self._worlds:
-            self._worlds.move_to_end(key)
             return self._worlds[key]
         begin, end = slot * self._slot, (slot + 1) * self._slot
         scene = self.scene_at(0.5 * (begin + end))
@@ -118,10 +117,13 @@ class ForeseenWorlds:
         return self._worlds[key]
 
     def _world_to_place(self) -> MovingWorld:
-        """A new world, or the one that was asked the longest time ago."""
+        """A new world, or any of those that are kept.
+
+        Not the oldest one: searches go through the slots in order, and would always come for what was just taken.
+        """
         if len(self._worlds) < MOST_WORLDS:
             return MovingWorld(self._world)
-        return self._worlds.popitem(last=False)[1]
+        return self._worlds.pop(list(self._worlds)[int(self._rng.integers(len(self._worlds)))])
 
 
 def _placed(obstacle: Obstacle, time: float) -> pin.SE3:
