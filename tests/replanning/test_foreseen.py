@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.replanning import in_time
 from rrtik_ompl.replanning.in_time import foreseen, hurry, plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.tree import NEVER, Pace
@@ -100,6 +101,19 @@ def test_a_search_ends_in_the_midst_of_what_takes_long(monkeypatch):
         plan = plan_in_time(problem, speed=5.0, limits=FAST, rate=20.0, seconds=seconds, seed=1)
         kept = len(plan.run.ticks) if plan.found else 0  # the record says of every move whether it is proven
         assert len(asked) <= seconds + kept + 2
+
+
+def test_what_a_search_has_to_wait_for_is_not_taken_from_its_time(monkeypatch):
+    clock = [0.0]
+    hopeless = in_time._hopeless
+
+    def compiled(*of):
+        clock[0] += 1000.0
+        return hopeless(*of)
+
+    monkeypatch.setattr("rrtik_ompl.replanning.in_time.time.perf_counter", lambda: clock[0])
+    monkeypatch.setattr(in_time, "_hopeless", compiled)
+    assert plan_in_time(crossing(), speed=5.0, limits=FAST, seconds=1.0, seed=1).found
 
 
 def test_who_is_stopped_while_he_hurries_keeps_the_way_that_there_is():

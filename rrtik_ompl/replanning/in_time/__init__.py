@@ -135,7 +135,8 @@ def plan_in_time(
     begun = time.perf_counter()
     search, cut_short = _search(problem, options)
     reason = _hopeless(search, options, cut_short)
-    rows = None if reason else search.run(most, lambda: time.perf_counter() - begun > limit)
+    end = time.perf_counter() + limit  # kernels may have been compiled and goals been looked for until now
+    rows = None if reason else search.run(most, lambda: time.perf_counter() > end)
     if rows is None and not reason:
         reason = _not_found(search, cut_short)
     run = None if rows is None else _record(problem, search, rows, options)
