@@ -33,7 +33,7 @@ def why_stopped(robot: Robot, rail: Rail, followed: Followed) -> str:
     values = np.linalg.svd(plain, compute_uv=False)
     missed = twist - jacobian @ (np.linalg.pinv(jacobian, CUT_OFF) @ twist)
     if np.linalg.norm(missed) > LOST * np.linalg.norm(twist) and len(values) < 6:
-        return f"{robot.dof} joints cannot move the tip like this"
+        return f"{robot.dof} joint{'s' * (robot.dof > 1)} cannot move the tip like this"
     return f"singular posture, or the end of the reach: the smallest singular value is {values[-1]:.3g}"
 
 

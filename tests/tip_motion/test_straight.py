@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.tip_motion.attempts import ENDS, RANDOM_REFERENCES, Way, _leanings, attempt
@@ -306,3 +307,18 @@ def test_the_clock_does_not_decide_which_ways_a_redundant_arm_tries(monkeypatch)
     hurried = [leaning.reference for leaning in _leanings(world, way, q, 3)]
     assert len(usual) == 2 + ENDS + RANDOM_REFERENCES
     assert np.array_equal(usual, hurried)
+
+
+@pytest.mark.filterwarnings("ignore:.*all is free")
+@pytest.mark.parametrize(("joints", "said"), [(1, "1 joint cannot move"), (3, "3 joints cannot move")])
+def test_too_few_joints_are_counted(joints, said):
+    links = "".join(f'<link name="l{k}"/>' for k in range(joints + 1))
+    links += "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="0.3 0 0"/>'
+        '<axis xyz="0 0 1"/></joint>'
+        for k in range(joints)
+    )
+    world = rrtik.World(robot_from_urdf_text(f'<robot name="flat">{links}</robot>'))
+    q = np.full(joints, 0.4)
+    result = rrtik.straight(world, q, beside(world.robot.fk(q), 0.0, 0.0, 0.1))
+    assert result.reason.startswith(said)
