@@ -66,7 +66,7 @@ def _trial(
     moment = float(rng.uniform(0.001, LATEST * seconds))
     fault: dict[str, Callable[[], object]] = {
         "kill": lambda: _timer(work.waits, moment, signal.SIG_DFL),
-        "interrupt": lambda: _timer(work.waits, moment, signal.default_int_handler),
+        "interrupt": lambda: _timer(work.waits, moment, lambda *_: signal.raise_signal(signal.SIGINT)),
         "full disk": lambda: _full_disk(int(rng.integers(0, size + 1))),
         "clock": _clock_goes_back,
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import warnings
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from enum import Enum
@@ -24,9 +23,8 @@ from rrtik_ompl.cli.reach import reach
 from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.task import straight, task
-from rrtik_ompl.cli.terminal import ProblemName, command, drop_output, note, prepare_streams, say, suggest, warn
+from rrtik_ompl.cli.terminal import ProblemName, command, drop_output, prepare_terminal, say, stoppable, suggest
 from rrtik_ompl.errors import RrtikError, printable
-from rrtik_ompl.files import notice
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -236,9 +234,7 @@ def main() -> None:
 
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
-    warnings.showwarning = warn
-    notice.listener = note
-    prepare_streams()
+    prepare_terminal()
     given = sys.argv[1:] if arguments is None else arguments
     try:
         if not given and COMPLETING in os.environ:
@@ -247,7 +243,8 @@ def run(arguments: list[str] | None = None) -> int:
             with redirect_stdout(sys.stderr):
                 command_line(given)(args=["--help"], prog_name="rrtik", standalone_mode=False)
             return BAD_INPUT
-        code = command_line(given)(args=given, prog_name="rrtik", standalone_mode=False)
+        with stoppable():
+            code = command_line(given)(args=given, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()
         if code == INTERRUPTED:  # what typer makes of KeyboardInterrupt
             raise KeyboardInterrupt

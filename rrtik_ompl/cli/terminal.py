@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import os
 import shlex
+import signal
 import sys
+import warnings
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from threading import Timer
+from threading import Timer, current_thread, main_thread
 from typing import TYPE_CHECKING, Annotated, Any
 from unicodedata import east_asian_width
 
 import typer
+
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.files import notice
 
 if TYPE_CHECKING:
     from rich.status import Status
@@ -62,8 +67,12 @@ def note(message: str) -> None:
     print(f"rrtik: {message}", file=sys.stderr)
 
 
-def prepare_streams() -> None:
-    """Make printing safe: a stream that was closed leads nowhere, a letter that a terminal lacks is spelt out."""
+def prepare_terminal() -> None:
+    """Say warnings and notices here, and make printing safe.
+
+    A stream that was closed leads nowhere; a letter that a terminal lacks is spelt out.
+    """
+    warnings.showwarning, notice.listener = warn, note
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
@@ -75,6 +84,33 @@ def prepare_streams() -> None:
 def drop_output() -> None:
     """Let what could not be printed go, so that the end of the process does not try again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Let Ctrl-C end what is done here with KeyboardInterrupt, also where a library makes another error of it.
+
+    numpy does, where it compares rows.
+    """
+    usual, came = signal.getsignal(signal.SIGINT), False
+
+    def interrupted(*_: object) -> None:
+        nonlocal came
+        came = True
+        raise KeyboardInterrupt
+
+    if usual is not signal.default_int_handler or current_thread() is not main_thread():
+        yield
+        return
+    signal.signal(signal.SIGINT, interrupted)
+    try:
+        yield
+    except Exception as error:
+        if came and not isinstance(error, InputError):
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        signal.signal(signal.SIGINT, usual)
 
 
 def say(*items: Any) -> None:

@@ -329,6 +329,20 @@ def test_an_interrupted_command_says_everything_and_takes_nothing_down():
     assert (done.returncode, done.stdout) == (130, "said\n")
 
 
+def test_ctrl_c_that_a_library_makes_another_error_of_is_one_line():
+    code = (
+        "import signal, rrtik_ompl.cli.app as app\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "def compare(**_):\n"
+        "    try: signal.raise_signal(signal.SIGINT)\n"
+        "    except KeyboardInterrupt: raise TypeError('no common dtype') from None\n"
+        "app.command_line = lambda given: compare\n"
+        "raise SystemExit(app.run(['list']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "rrtik: interrupted; no file is half-written\n")
+
+
 def test_rrtik_alone_prints_the_help(capsys):
     code, _, err = rrtik(capsys)
     assert code == 2
