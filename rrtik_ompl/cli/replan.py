@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from rrtik_ompl.replanning.scenario import Scenario as Chosen
 
 PLANNER = "drrt-con"
+REMEDIES = {  # of plan_in_time(), and what the command has in their place
+    "raise horizon": "raise --seconds, or call plan_in_time(), which has more options",
+    "raise rate": "lower --clearance or the scenario's margin, or call plan_in_time(), which has a rate",
+}
 Scenario = Annotated[str, typer.Argument(help="A problem with a run: section, shipped or a YAML file.")]
 
 
@@ -134,8 +138,9 @@ def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun 
 
 def _in_options(reason: str) -> str:
     """Why nothing was found, with what the command offers in the place of arguments that it has not."""
-    what, given, _ = reason.partition("; raise horizon")
-    return f"{what}; raise --seconds, or call plan_in_time(), which has more options" if given else reason
+    what, _, remedy = reason.partition("; ")
+    here = next((ours for theirs, ours in REMEDIES.items() if remedy.startswith(theirs)), remedy)
+    return f"{what}; {here}" if here else what
 
 
 def _recorded(file: Path, problem: str) -> ReplanRun:

@@ -124,6 +124,8 @@ def test_the_command_plans_in_time_and_says_when_there_is_no_way(tmp_path, capsy
     reason = json.loads(capsys.readouterr().out)["reason"]
     assert "speeds allow no arrival" in reason
     assert "raise --seconds" in reason  # there is no --horizon
+    assert run_command(["replan", "replan_planar_arm", "--foreseen", "--clearance", "5"]) == 1
+    assert "lower --clearance" in capsys.readouterr().out
 
 
 def test_the_way_of_an_obstacle_bounds_every_point_of_it():
