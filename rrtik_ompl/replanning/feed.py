@@ -117,13 +117,13 @@ class MotionTracker:
         self._velocities = {}
         for obstacle in scene.obstacles:
             last = old.get(obstacle.name, obstacle)
-            if not np.array_equal(last.pose.homogeneous, obstacle.pose.homogeneous):
-                changed = True
-                self._measure(obstacle, last.pose, time - before[0], time)
             if not same_shape(obstacle.shape, last.shape):  # a cloud that was seen anew: its points may have moved
                 changed = True
                 self.speeds.setdefault(obstacle.name, 0.0)
                 self._reshaped.add(obstacle.name)
+            if not np.array_equal(last.pose.homogeneous, obstacle.pose.homogeneous):
+                changed = True
+                self._measure(obstacle, last.pose, time - before[0], time)
             changed |= obstacle.margin != last.margin
         return changed
 
@@ -148,9 +148,10 @@ class MotionTracker:
         name = obstacle.name
         shift, turn = obstacle.pose.translation - old.translation, pin.log3(old.rotation.T @ obstacle.pose.rotation)
         angle = float(np.linalg.norm(turn))
-        rotation_path = (
-            self._radii[name] * angle if angle > ROTATION_NOISE else 0.0
-        )  # a half-space has no farthest point
+        if name in self._reshaped:
+            self._radii[name] = max(self._radii[name], farthest(obstacle.shape, pin.SE3.Identity()))
+        # a half-space has no farthest point
+        rotation_path = self._radii[name] * angle if angle > ROTATION_NOISE else 0.0
         speed = (float(np.linalg.norm(shift)) + rotation_path) / seconds
         self._velocities[name] = (shift / seconds, turn / seconds)
         self.speeds[name] = max(speed, self.speeds.get(name, 0.0))

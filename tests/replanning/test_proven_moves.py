@@ -7,8 +7,9 @@ import pytest
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.replanning import load_run, replan
+from rrtik_ompl.replanning.feed import MotionTracker
 from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
+from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, PointCloud, Prism, Sphere
 from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_tests.moving_plane import OPTIONS, crossing, plane
@@ -125,3 +126,14 @@ def test_a_clearance_that_the_start_cannot_keep_is_refused():
 def test_a_clearance_that_makes_no_sense_is_refused(clearance):
     with pytest.raises(InputError, match="clearance"):
         replan(crossing(), clearance=clearance, **OPTIONS)
+
+
+def test_a_cloud_that_has_grown_and_turns_is_as_fast_as_its_farthest_point():
+    def seen(reach, angle):
+        turned = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.zeros(3))
+        return Scene([Obstacle("seen", PointCloud([[reach, 0.0, 0.0], [0.0, 0.1, 0.0]], 0.01), turned)])
+
+    tracker = MotionTracker(seen(0.1, 0.0), None)
+    for number, (reach, angle) in enumerate([(0.1, 0.0), (2.0, 0.0), (2.0, 0.3)]):
+        tracker.update(0.1 * number, seen(reach, angle))
+    assert tracker.speeds["seen"] >= 2.0 * 0.3 / 0.1
