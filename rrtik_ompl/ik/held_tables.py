@@ -128,8 +128,8 @@ def _record(region: HeldRegion) -> Matrix:
 
 
 def projected_onto(robot: Robot, constraints: HeldRegions, rows: Matrix) -> Matrix:
-    """Configurations, shape (m, dof), moved into all regions; those that got there, shape (k, dof)."""
-    tables = held_tables(robot, constraints)
+    """Configurations, shape (m, dof), moved into all regions and limits; those that got there, shape (k, dof)."""
+    tables, rows = held_tables(robot, constraints), robot.clamp(rows)  # one that is there already is not moved
     moved, there = projected_rows(robot, constraints, rows) if tables is None else tables.project(rows)
     held: Matrix = moved[there & constraints.held(moved)]
     return held

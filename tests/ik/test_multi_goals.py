@@ -68,3 +68,12 @@ def test_methods_for_one_tip_and_unknown_tips_are_refused(arms, goal):
         solve_ik(arms, goal, method="fast")
     with pytest.raises(UnknownNameError, match="left_grp"):
         solve_ik(arms, MultiGoal({"left_grp": PositionGoal([1.0, 0.0, 0.0])}))
+
+
+def test_a_posture_outside_the_limits_is_no_solution_though_it_is_at_the_goals():
+    panda = load_robot("panda")
+    near = panda.posture("default").copy()
+    near[3] = 0.3  # its limit is -0.07
+    goal = MultiGoal({panda.tip: PoseGoal(panda.fk(near))})
+    found = solve_ik(panda, goal, near=near, all=True, seconds=0.0)
+    assert panda.within_limits(found.solutions).all()
