@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.choices import IkMethod
 from rrtik_ompl.copies import as_value, in_one_line
-from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal
+from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
@@ -131,6 +131,21 @@ def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
         if not kept or np.abs(rows[k] - rows[kept]).max(axis=1).min() > SAME_POSTURE:
             kept.append(k)
     return np.array(kept, dtype=np.intp)
+
+
+def unwind(robot: Robot, rows: Matrix, start: Vector | None) -> None:
+    """Turn continuous joints to where they were in the row before, in place; rows of NaN are passed over.
+
+    Args:
+        robot: The arm.
+        rows: Shape (k, dof).
+        start: Before the first row, shape (dof,); None for nowhere.
+    """
+    last = start
+    for k in np.flatnonzero(~np.isnan(rows[:, 0])) if has_continuous(robot) else ():
+        if last is not None:
+            rows[k] = np.where(robot.continuous, last + joint_difference(robot, rows[k], last), rows[k])
+        last = rows[k]
 
 
 @lru_cache(maxsize=64)

@@ -20,7 +20,7 @@ from rrtik_ompl.ik.analytic.branch_choice import JUMP, follow
 from rrtik_ompl.ik.analytic.closed_form import check_poses, form_of
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
-from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.ik.method_interface import Target, unwind
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric.track import Tracker
 from rrtik_ompl.ik.random_stream import RandomStream
@@ -149,6 +149,7 @@ def solve_ik_trajectory(
     )
     name = _chosen(task, method)
     q, iterations = FOLLOWERS[name](task)
+    unwind(robot, q, task.near)
     residuals = _keep_only_checked(task, q)
     reasons, detail = _why(task, name, q)
     return IkTrajectory(

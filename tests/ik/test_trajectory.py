@@ -183,3 +183,19 @@ def test_bad_input_is_refused_in_a_line():
     with pytest.raises(InputError, match="another robot"):
         rrtik.solve_ik_trajectory(robot, poses, world=rrtik.World(rrtik.load_robot("ur5")))
     assert set(list_ik_trajectory_methods()) == {"closed-form", "numeric", "genetic"}
+
+
+@pytest.mark.parametrize("method", ["numeric", "genetic"])
+def test_joints_without_limits_go_on_from_the_posture_before_however_often_it_has_turned(method, tmp_path):
+    links = "".join(
+        f'<link name="l{k}"/><joint name="j{k}" type="continuous"><parent link="l{k - 1}"/><child link="l{k}"/>'
+        '<origin xyz="0.5 0 0"/><axis xyz="0 0 1"/><limit velocity="1" effort="1"/></joint>'
+        for k in (1, 2, 3)
+    )
+    (tmp_path / "arm.urdf").write_text(f'<robot name="arm"><link name="l0"/>{links}</robot>')
+    robot = rrtik.load_robot(tmp_path / "arm.urdf")
+    rows = [0.4, 0.6, -0.3] + np.linspace(0.0, 0.5, 8)[:, None] * [1.0, 0.3, -0.2] + 4.0 * np.pi
+    found = rrtik.solve_ik_trajectory(robot, robot.fk_batch(rows), method=method, near=rows[0])
+    assert found.found
+    assert np.abs(found.q[0] - rows[0]).max() <= np.pi
+    assert np.abs(np.diff(found.q, axis=0)).max() < 1.0
