@@ -23,10 +23,9 @@ from rrtik_ompl.problem import usable_configurations
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.search.roadmap_in_python import PythonGraph
 from rrtik_ompl.world import World
-from rrtik_ompl.world.motion_queries import MotionQueries, Stop, decider, has_kernels
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop, decider, has_kernels, keeps_constraints
 
-VERTICES = 2000
-NEAR = 10
+VERTICES, NEAR = 2000, 10
 SECONDS = 60.0  # that making one takes at most, where next to nothing is free
 MOST_VERTICES = 1_000_000
 FORMAT = 1
@@ -111,7 +110,7 @@ class Roadmap:
         near: See above.
 
     Raises:
-        InputError: If a number makes no sense.
+        InputError: If a number makes no sense, or the world has path constraints, which a roadmap does not keep.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -127,8 +126,9 @@ class Roadmap:
         require(world, World, "world of a roadmap", "use World(robot, scene)")
         if not 0 <= whole_number(vertices, "vertices") <= MOST_VERTICES:
             raise InputError(f"vertices must be {MOST_VERTICES} or less, got {vertices}")
-        self.near = checked_near(near)
-        self.world, self.seed = world, whole_number(seed, "seed")
+        if keeps_constraints(world):  # no sample keeps them, and files say nothing of them
+            raise InputError("world of a roadmap: it has path constraints, which a roadmap does not keep; use cbirrt")
+        self.near, self.world, self.seed = checked_near(near), world, whole_number(seed, "seed")
         self.graph = graph_in(world, *_box(world.robot), near=near, seed=self.seed, checks=world)
         self.grow(vertices)
 
@@ -211,7 +211,7 @@ class Roadmap:
         others are checked again as soon as a query comes to them. This roadmap stays as it is.
 
         Raises:
-            InputError: If the world is of another robot.
+            InputError: If the world is of another robot or has path constraints.
         """
         require(world, World, "world of a roadmap", "use World(robot, scene)")
         if robot_digest(world.robot) != robot_digest(self.world.robot):
@@ -247,7 +247,7 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
             :meth:`Roadmap.moved_to`.
 
     Raises:
-        InputError: If the file cannot be used or is of another world.
+        InputError: If the file cannot be used or is of another world, or this one has path constraints.
 
     Example:
         >>> world = rrtik.World(rrtik.load_robot("planar3"))

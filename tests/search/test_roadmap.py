@@ -143,6 +143,18 @@ def test_a_roadmap_is_saved_and_read_with_all_that_it_knows(tmp_path):
     assert len(np.unique(read.vertices, axis=0)) == 350  # no sample twice
 
 
+def test_a_world_with_path_constraints_is_refused_for_a_roadmap_keeps_none(tmp_path):
+    free = problem().world
+    held = rrtik.Problem(
+        free, problem().start, problem().goal.q, constraints=[rrtik.inside(np.eye(4), [9.0] * 3)]
+    ).world
+    made = rrtik.Roadmap(free, vertices=20)
+    made.save(tmp_path / "free.npz")
+    for use in (rrtik.Roadmap, made.moved_to, lambda world: rrtik.load_roadmap(tmp_path / "free.npz", world)):
+        with pytest.raises(InputError, match="world of a roadmap: it has path constraints"):
+            use(held)
+
+
 def test_a_roadmap_of_another_world_is_refused_in_one_line(tmp_path):
     file = tmp_path / "wall.npz"
     rrtik.Roadmap(wall(0.5), vertices=50).save(file)
