@@ -56,17 +56,34 @@ def _between(region: HeldRegion, start: Vector, goal: Vector) -> str:
     turns, end = _turns(region)
     for place, turn in enumerate(turns):
         first, last = (_angle_of(region, turn, q) for q in (start, goal))
-        low, high = min(first, last), max(first, last)
-        values = GRID * np.arange(np.floor(low / GRID) + 1, np.ceil(high / GRID))
-        values = values[np.unique(np.round((values % TAU) / GRID) % round(TAU / GRID), return_index=True)[1]]
-        walls = values[_blocked(region, turns, end, place, values)]
-        if len(walls):
+        if _turns_without_limits(region, turn):  # the same posture lies the other way round too
+            there = first + (last - first) % TAU
+            ways = [(first, there), (there, first + TAU)]
+        else:
+            ways = [(min(first, last), max(first, last))]
+        walls = [_walls(region, turns, end, place, *way) for way in ways]
+        if all(map(len, walls)):
+            passed = " or ".join(f"{np.degrees(each[0]):.1f}" for each in walls)
             return (
                 f"{region.label} keeps start and goal apart: {_named(region, turn)} {np.degrees(first):.1f} degrees at "
-                f"the start and {np.degrees(last):.1f} at the goal, and cannot pass {np.degrees(walls[0]):.1f} while "
+                f"the start and {np.degrees(last):.1f} at the goal, and cannot pass {passed} while "
                 f"frame '{region.frame}' is kept; take a goal of the same branch"
             )
     return ""
+
+
+def _walls(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, low: float, high: float) -> Vector:
+    """Values between two of the joint of one turn that are walls, each once for all whole turns."""
+    values = GRID * np.arange(np.floor(low / GRID) + 1, np.ceil(high / GRID))
+    values = values[np.unique(np.round((values % TAU) / GRID) % round(TAU / GRID), return_index=True)[1]]
+    walls: Vector = values[_blocked(region, turns, end, place, values)]
+    return walls
+
+
+def _turns_without_limits(region: HeldRegion, turn: Turn) -> bool:
+    """Whether a joint of a turn has no limits, so that a posture is reached both ways round."""
+    moving = (region.robot.chain.gain[list(turn.joints)] != 0.0).any(axis=0)
+    return bool((moving & region.robot.continuous).any())
 
 
 def _angle_of(region: HeldRegion, turn: Turn, q: Vector) -> float:

@@ -65,3 +65,31 @@ def test_the_sum_of_the_joints_of_an_arm_in_a_plane_cannot_turn_while_its_orient
         assert held.held(np.vstack([turned, swung])).all()
         assert "keeps start and goal apart: the sum of joints 'joint1'" in separation(held, start, turned[None])
         assert separation(held, start, swung[None]) == ""
+
+
+def joint(number, kind, axis, limit):
+    ends = "".join(f'{side}="{value}" ' for side, value in zip(("lower", "upper"), limit, strict=False))
+    return (
+        f'<link name="l{number}"/><joint name="j{number}" type="{kind}"><parent link="l{number - 1}"/>'
+        f'<child link="l{number}"/><axis xyz="{axis}"/><limit {ends}velocity="1" effort="1"/></joint>'
+    )
+
+
+@pytest.mark.kernels
+def test_a_joint_without_limits_may_go_the_other_way_round(tmp_path):
+    joints = [("continuous", "1 0 0", ()), ("revolute", "0 1 0", (-2.9, -0.2)), ("revolute", "0 0 1", (-1.3, 1.3))]
+    text = "".join(joint(number, *each) for number, each in enumerate(joints, 1))
+    (tmp_path / "arm.urdf").write_text(f'<robot name="arm"><link name="l0"/>{text}</robot>')
+    robot = rrtik.load_robot(tmp_path / "arm.urdf")
+    first = np.array([0.67, -0.704, 1.073])
+    held = held_regions(robot, Scene(), [rrtik.upright(robot, "x", tolerance_deg=59.0)], first)
+    start, goal = np.array([-np.pi, -0.2, -1.2]), np.array([1.99, -0.3125, 1.19])
+    nearer = goal - 2.0 * np.pi * np.eye(3)[0]
+    assert held.held(np.array([start, goal, nearer])).all()
+    tables, side = held_tables(robot, held), np.array([4.0 * np.pi, 3.0, 3.0])
+    with pytest.warns(match="no collision geometry"):
+        motions = rrtik.World(robot).motions
+    search = ConstrainedSearch(motions, tables.address, -side, side)
+    assert search.solve(start[None], goal[None], 1, max_iterations=5000, unchecked=True) is not None
+    assert separation(held, start, goal[None]) == ""
+    assert separation(held, start, nearer[None]) == ""
