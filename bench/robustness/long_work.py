@@ -14,6 +14,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.benchmark.records import NAME, key_of, read_head, read_records
 from rrtik_ompl.certificates.certificate import load_certificate
 from rrtik_ompl.cli.app import FOUND, NOT_FOUND, run
+from rrtik_ompl.cli.terminal import stoppable
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.overlay.film import write_film
 from rrtik_ompl.pilot.records.record import read_record
@@ -117,6 +118,7 @@ def _drawn_film() -> int:
 def _session(name: str) -> Callable[[], int]:
     """A session of a simulated pilot who drives all joints, recorded."""
 
+    @stoppable()  # as the command is
     def work() -> int:
         opened = open_session(SessionOptions("titan4_sdu", record=Path(name)))
         engine = opened.engine

@@ -88,21 +88,31 @@ def drop_output() -> None:
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Let Ctrl-C end what is done here with KeyboardInterrupt, also where a library makes another error of it.
+    """Let Ctrl-C end what is done here with KeyboardInterrupt, wherever it comes.
 
-    numpy does, where it compares rows.
+    Where numpy compares rows it makes another error of it, and where the collector of garbage calls something Python
+    prints it and goes on: then it comes once more.
     """
-    usual, came = signal.getsignal(signal.SIGINT), False
+    usual, unraised, came = signal.getsignal(signal.SIGINT), sys.unraisablehook, False
 
     def interrupted(*_: object) -> None:
         nonlocal came
         came = True
         raise KeyboardInterrupt
 
+    def lost(what: sys.UnraisableHookArgs) -> None:
+        if not issubclass(what.exc_type, KeyboardInterrupt):
+            unraised(what)
+            return
+        again = Timer(1e-3, os.kill, (os.getpid(), signal.SIGINT))  # which ends what waits, too
+        again.daemon = True
+        again.start()
+
     if usual is not signal.default_int_handler or current_thread() is not main_thread():
         yield
         return
     signal.signal(signal.SIGINT, interrupted)
+    sys.unraisablehook = lost
     try:
         yield
     except Exception as error:
@@ -111,6 +121,7 @@ def stoppable() -> Iterator[None]:
         raise
     finally:
         signal.signal(signal.SIGINT, usual)
+        sys.unraisablehook = unraised
 
 
 def say(*items: Any) -> None:

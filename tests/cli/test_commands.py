@@ -329,14 +329,28 @@ def test_an_interrupted_command_says_everything_and_takes_nothing_down():
     assert (done.returncode, done.stdout) == (130, "said\n")
 
 
-def test_ctrl_c_that_a_library_makes_another_error_of_is_one_line():
-    code = (
-        "import signal, rrtik_ompl.cli.app as app\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "def compare(**_):\n"
+LOST = {
+    "another error": (
         "    try: signal.raise_signal(signal.SIGINT)\n"
         "    except KeyboardInterrupt: raise TypeError('no common dtype') from None\n"
-        "app.command_line = lambda given: compare\n"
+    ),
+    "at the end of an object": (
+        "    class Held:\n"
+        "        def __del__(self): signal.raise_signal(signal.SIGINT)\n"
+        "    held = Held()\n"
+        "    del held\n"
+        "    time.sleep(60.0)\n"
+    ),
+}
+
+
+@pytest.mark.parametrize("way", LOST)
+def test_ctrl_c_is_one_line_also_where_python_or_a_library_loses_it(way):
+    code = (
+        "import signal, time, rrtik_ompl.cli.app as app\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        f"def work(**_):\n{LOST[way]}"
+        "app.command_line = lambda given: work\n"
         "raise SystemExit(app.run(['list']))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
