@@ -72,8 +72,9 @@ def solve_ik(
         near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None. A closed form
             gives the nearest one there is (of a singular pose its nearest representative; where joints have weights, by
             their weighted way), a numeric method the first that it finds on its way from there.
-        all: Every solution that the method finds, not just one: a closed form gives all there are (of a singular
-            pose representatives), a numeric one those it comes across, full turns of a joint counted apart.
+        all: Every solution that the method finds, not just one: a closed form gives all branches (of a singular pose
+            representatives), each in the turns nearest to ``near``; a numeric one those it comes across, full turns
+            of a joint counted apart.
         world: If given, solutions in collision are left out. Its robot must be this one.
         seconds: Wall time that a numeric method may take; the clock is read between rounds, of which the first is done.
         seed: Of the random numbers; the same seed gives the same answer as long as the time does not cut in.

@@ -1,5 +1,7 @@
 """Choice among branches: nearest to a posture, and without jumps along a trajectory."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -133,3 +135,15 @@ def test_an_unreachable_target_has_no_nearest_solution():
     q, reached = nearest(robot, pose, np.zeros(6))
     assert not reached[0]
     assert np.isnan(q).all()
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_a_wrist_that_may_turn_several_times_is_followed_through_all_turns(near):
+    arm = load_robot("puma560")
+    wide = replace(arm, lower=np.append(arm.lower[:5], -20.0), upper=np.append(arm.upper[:5], 20.0))
+    rows = np.tile([0.3, 0.5, -0.4, 0.2, 0.6, -19.0], (400, 1))
+    rows[:, 5] = np.linspace(-19.0, 19.0, 400)
+    track = follow(wide, wide.fk_batch(rows), rows[0] if near else None)
+    assert (track.gaps, track.jumps) == ((), ())
+    assert wide.within_limits(track.q).all()
+    assert np.allclose(wide.fk_batch(track.q), wide.fk_batch(rows), atol=1e-9)

@@ -18,6 +18,7 @@ JUMP = 0.2  # [rad] or [m] of any joint between two points of a trajectory: more
 JUMP_COST = 1e3  # more than any motion can cost
 TIE = 1e-9  # distances this near count as equal
 MAX_CANDIDATES = 32  # candidates kept of a singular point
+MOST_TURNED = 1024  # candidates of a point in all turns; two points have the square of that to compare
 REFINEMENTS = 6  # sweeps along the curve of a singular pose, each 18 times finer than the one before
 
 
@@ -175,13 +176,23 @@ def _candidates(
 
 
 def _in_every_turn(robot: Robot, q: Matrix, tags: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
-    """The same postures also with joints a full turn further, where the limits have room for that."""
-    for joint in np.flatnonzero(~robot.prismatic & ~robot.continuous & (robot.upper - robot.lower >= TAU)):
-        for turn in (TAU, -TAU):
+    """The same postures also with joints full turns further, where the limits have room for that.
+
+    Where many joints have room for many turns, the last of these joints stay in the turn that they are in.
+    """
+    span = robot.upper - robot.lower
+    for joint in np.flatnonzero(~robot.prismatic & ~robot.continuous & (span >= TAU)):
+        rows, owners = [q], [tags]
+        most = int(span[joint] / TAU)
+        for turn in (*range(-most, 0), *range(1, most + 1)):
             other = q.copy()
-            other[:, joint] += turn
+            other[:, joint] += turn * TAU
             fits = robot.within_limits(other)
-            q, tags = np.vstack([q, other[fits]]), np.concatenate([tags, tags[fits]])
+            rows.append(other[fits])
+            owners.append(tags[fits])
+        if sum(map(len, rows)) > MOST_TURNED:
+            break
+        q, tags = np.vstack(rows), np.concatenate(owners)
     return q, tags
 
 
