@@ -41,6 +41,7 @@ from rrtik_ompl.world.check_world import check_world
 SECONDS = 1.0
 METHOD = "inverse kinematics method"
 DRAWS = 32  # targets drawn from a goal that leaves freedom; one for each part if it has more parts
+COMPARED = 1_000_000  # rows times parts of a goal at once, some tenths of a second
 DIGITS = 9  # of metres and degrees in a message: less is rounding
 
 
@@ -207,10 +208,34 @@ def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
 
 
 def _reaching(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
-    """The rows of q inside the limits and at the goal, shape (k, dof), their residuals, and which are accepted."""
-    robot = request.robot
-    rows, residuals = _at_goal(robot, request.goal, robot.clamp(q[robot.within_limits(q)]))
-    return rows, residuals, request.accept(rows)
+    """Rows of q inside the limits and at the goal, shape (k, dof), their residuals, and which are accepted.
+
+    The accepted ones, of which the nearest are enough unless all are wanted; if there is none, some of the others.
+    """
+    robot, goal = request.robot, request.goal
+    rows = robot.clamp(q[robot.within_limits(q)])
+    free, some = request.accept(rows), _block(goal)
+    chosen = rows[free]
+    if not request.all and len(chosen) > some:
+        away = weighted_difference(robot, chosen, request.near)
+        chosen = chosen[np.vecdot(away, away).argsort(kind="stable")]
+    found = []
+    for k in range(0, len(chosen), some):
+        found.append(_at_goal(robot, goal, chosen[k : k + some]))
+        if len(found[-1][0]) and not request.all:
+            break
+    at, residuals = (
+        (np.concatenate(each) for each in zip(*found, strict=True)) if found else _at_goal(robot, goal, chosen)
+    )
+    if len(at):
+        return at, residuals, np.ones(len(at), dtype=bool)
+    at, residuals = _at_goal(robot, goal, rows[~free][:some])
+    return at, residuals, np.zeros(len(at), dtype=bool)
+
+
+def _block(goal: TipGoal) -> int:
+    """How many rows are compared with a goal at once: thousands of rows with thousands of grasps take minutes."""
+    return max(1, COMPARED // len(parts_of(goal)))
 
 
 def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
@@ -230,7 +255,8 @@ def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[
     """Reason and detail of a failure of a method that found q, shape (k, dof), all in collision."""
     robot, goal = request.robot, request.goal
     if len(q) and request.world is not None:
-        return "collision", f"{len(q)} configurations reach the goal, all in collision: {request.world.explain(q[0])}"
+        count = f"{len(q)} configurations" + (" or more" if len(q) >= _block(goal) else "")
+        return "collision", f"{count} reach the goal, all in collision: {request.world.explain(q[0])}"
     fault = robot.limit_fault(answer.nearest)
     reached = bool(goal.satisfied(robot, answer.nearest[None])[0])
     if reached and not fault:

@@ -1,5 +1,7 @@
 """One face of inverse kinematics."""
 
+import time
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -319,3 +321,16 @@ def test_numeric_takes_targets_drawn_from_task_regions():
     result = solve_ik(robot, goal, method="numeric", seconds=20.0)
     assert result.found
     assert bar.satisfied(robot, result.solutions).all()
+
+
+def test_thousands_of_grasps_that_all_collide_cost_seconds_and_say_so():
+    robot = rrtik.load_robot("ur5")
+    rows = np.random.default_rng(5).uniform(-0.5, 0.5, (3000, robot.dof))
+    grasps = rrtik.GoalSet([rrtik.PoseGoal(tip) for tip in robot.fk_batch(rows)])
+    world = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("rock", Box([4.0, 4.0, 4.0]), [0.0, 0.0, 0.0])]))
+    begin = time.process_time()
+    found = solve_ik(robot, grasps, world=world, seconds=0.3)
+    assert time.process_time() - begin < 8.0  # a second or two; comparing all with all took twenty
+    assert (found.found, found.reason) == (False, "collision")
+    assert "configurations or more reach the goal, all in collision" in found.detail
+    assert solve_ik(robot, grasps, world=rrtik.World(robot), seconds=0.3).found
