@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.constraints.held_region import HeldRegion, frame_place, held_region
+from rrtik_ompl.constraints.held_region import HeldRegion, Turning, frame_place, held_region
 from rrtik_ompl.errors import InputError, listed
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
@@ -107,7 +107,13 @@ def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: V
     if region.from_start and start is not None:
         _, joint, T_joint_frame = frame_place(robot, scene, region.frame, label)
         region = region.started_at(pin.SE3(robot.joint_frames(start)[0, joint]) * T_joint_frame)
-    return held_region(robot, scene, region, label)
+    held, tolerance = held_region(robot, scene, region, label), region.orientation_tolerance
+    if held.turning != Turning.FREE and tolerance > 0.5 * np.pi:  # whose sine would shrink again
+        raise InputError(
+            f"{label}: orientation_tolerance is {np.degrees(tolerance):g} degrees, and more than 90 cannot be held; "
+            "take less, or leave the angles free"
+        )
+    return held
 
 
 def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: Matrix) -> Mask:

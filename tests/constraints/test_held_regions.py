@@ -217,3 +217,11 @@ def line_of(robot, a, b):
     """A point and the direction of the line between the tips of two configurations."""
     first, second = (robot.fk(q).translation for q in (a, b))
     return first, (second - first) / np.linalg.norm(second - first)
+
+
+def test_an_angle_that_cannot_be_held_is_refused_in_a_line():
+    robot = rrtik.load_robot("ur5")
+    bounds = np.outer([1000.0] * 3 + [0.0] * 3, [-1.0, 1.0])
+    wide = rrtik.TaskRegion(robot.fk(np.zeros(6)), bounds, orientation_tolerance=np.radians(120.0))
+    with pytest.raises(InputError, match="path constraint 1: orientation_tolerance is 120 degrees, and more than 90"):
+        rrtik.Problem(rrtik.World(robot), np.zeros(6), np.full(6, 0.1), constraints=[wide])
