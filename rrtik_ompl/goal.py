@@ -87,7 +87,7 @@ class PositionGoal(HasTipErrors):
         """Distance of the tip from the point for each row of Q, shape (m,) [m]."""
         return self.errors(robot, Q)[0]
 
-    def errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+    def _errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
         """Distance [m] of poses of the tip, shape (m, 4, 4), and an angle of 0, shapes (m,)."""
         return np.linalg.norm(tips[:, :3, 3] - self.position, axis=1), np.zeros(len(tips))
 
@@ -111,7 +111,7 @@ class PoseGoal(WithinTolerances):
         positive(self.position_tolerance, "goal position_tolerance")
         positive(self.orientation_tolerance, "goal orientation_tolerance")
 
-    def errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+    def _errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
         """Position error [m] and rotation angle [rad] of poses of the tip, shape (m, 4, 4), shapes (m,)."""
         return pose_errors(tips, self.T_world_tip)
 

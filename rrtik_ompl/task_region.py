@@ -32,13 +32,17 @@ class HasTipErrors(ABC):
     __slots__ = ()
 
     @abstractmethod
-    def errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+    def _errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+        """As :meth:`errors_at`, of poses that are known to be such."""
+
+    def errors_at(self, tips: ArrayLike) -> tuple[Vector, Vector]:
         """Distance [m] and angle [rad] of poses of the tip, shape (m, 4, 4), from the goal, shapes (m,)."""
+        return self._errors_at(finite_array(tips, (None, 4, 4), "poses of the tip"))
 
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
         """Distance [m] and angle [rad] of the tip from the goal, for each row of Q, shapes (m,)."""
         require(robot, Robot, "robot of a goal")
-        return self.errors_at(robot.fk_batch(Q))
+        return self._errors_at(robot.fk_batch(Q))
 
 
 class WithinTolerances(HasTipErrors):
@@ -180,7 +184,7 @@ class TaskRegion(WithinTolerances):
         place = (tips[:, :3, 3] - self.T_world_w.translation) @ R_w - rpy_matrices(angles) @ self.T_w_tip.translation
         return np.hstack([np.clip(place, self.bounds[:3, 0], self.bounds[:3, 1]), angles])
 
-    def errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+    def _errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
         """Distance [m] and angle [rad] of poses of the tip, shape (m, 4, 4), from the nearest pose, shapes (m,)."""
         poses = self.poses(self.nearest(tips))
         position: Vector = np.linalg.norm(tips[:, :3, 3] - poses[:, :3, 3], axis=1)

@@ -64,17 +64,29 @@ def _thickness(points: Matrix) -> float:
 
 def convexified(geometry: Any) -> Any:
     """The convex hull of a mesh that is convex (see ``DEEPEST_DENT``); any other geometry as it is."""
-    if not is_mesh(geometry):
+    if not fills_its_hull(geometry):
         return geometry
     vertices, triangles = mesh_arrays(geometry)
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
-    if not _thickness(vertices) >= FLATTEST * _extent(vertices):
-        return geometry
-    solid = hull(vertices)
-    if volume < CONVEX_VOLUME_RATIO * solid.computeVolume() or len(triangles) * solid.num_polygons > MOST_COMPARED:
+    solid = around(geometry)
+    if len(triangles) * solid.num_polygons > MOST_COMPARED:
         return geometry
     return solid if _depth(vertices, triangles, solid) <= DEEPEST_DENT else geometry
+
+
+def fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
+    """Whether a coal geometry is a mesh whose volume is nearly that of its convex hull; False for what is no mesh."""
+    return is_mesh(geometry) and _fills_its_hull(SameObject(geometry))
+
+
+@lru_cache(maxsize=128)
+def _fills_its_hull(key: SameObject) -> bool:
+    solid = around(key.geometry)
+    if is_mesh(solid):  # which is flat
+        return False
+    vertices, triangles = mesh_arrays(key.geometry)
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
+    return bool(volume >= CONVEX_VOLUME_RATIO * solid.computeVolume())
 
 
 def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -> float:

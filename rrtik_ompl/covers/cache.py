@@ -15,7 +15,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.shape_table import sizes_of
-from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.collision.solids import around, fills_its_hull, is_mesh, mesh_arrays
 from rrtik_ompl.covers.shipped import shipped_cover
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.cache import cache_folder, nobody_else_s, write_whole
@@ -29,14 +29,15 @@ PIECES = 2  # counts up when rrtik_ompl.covers.mesh_pieces makes other pieces of
 
 
 def cached_outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
-    """``outer_cover``, from the cache if it is there."""
+    """``outer_cover``, from the cache if it is there; of the hull of a mesh that nearly fills it, which is tighter."""
+    covered = around(geometry) if fills_its_hull(geometry) else geometry
 
     def make() -> Matrix:
         from rrtik_ompl.covers.spheres import outer_cover  # with scipy, which takes longer to load than covers to read
 
-        return outer_cover(geometry, protrusion=protrusion)
+        return outer_cover(covered, protrusion=protrusion)
 
-    return _cached(geometry, f"outer {protrusion!r}", make)
+    return _cached(covered, f"outer {protrusion!r}", make)
 
 
 def cached_inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None) -> Matrix:
