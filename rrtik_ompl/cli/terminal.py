@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 TRAJECTORY_FORMATS = (".json", ".csv", ".yaml", ".mcap")
 SPINNER_AFTER = 0.3  # [s]; what takes no longer is done before anybody has read what it is
 GAP = "   "  # between two columns
+AGAIN_SECONDS = 0.02  # until a Ctrl-C that was lost comes once more
 
 
 class Table:
@@ -93,18 +94,27 @@ def stoppable() -> Iterator[None]:
     Where numpy compares rows it makes another error of it, and where the collector of garbage calls something Python
     prints it and goes on: then it comes once more.
     """
-    usual, unraised, came = signal.getsignal(signal.SIGINT), sys.unraisablehook, False
+    usual, unraised = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    came = in_hook = False
 
     def interrupted(*_: object) -> None:
         nonlocal came
         came = True
-        raise KeyboardInterrupt
+        if not in_hook:
+            raise KeyboardInterrupt
+        once_more()  # for Python would lose this one, too
 
     def lost(what: sys.UnraisableHookArgs) -> None:
+        nonlocal in_hook
         if not issubclass(what.exc_type, KeyboardInterrupt):
             unraised(what)
             return
-        again = Timer(1e-3, os.kill, (os.getpid(), signal.SIGINT))  # which ends what waits, too
+        in_hook = True
+        once_more()
+        in_hook = False
+
+    def once_more() -> None:
+        again = Timer(AGAIN_SECONDS, os.kill, (os.getpid(), signal.SIGINT))  # which ends what waits, too
         again.daemon = True
         again.start()
 
