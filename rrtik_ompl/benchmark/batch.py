@@ -38,8 +38,8 @@ def plan_batch(
 
     Planners of ours, which end in time and run side by side, work in threads of this process, so that nobody waits for
     others to begin. Those of OMPL, and shortening, work in processes: a query there that crashes, hangs or takes too
-    much memory is lost alone. Workers of a cluster are sent names of problems or
-    files, not worlds: each makes the world of a problem once, as long as its queries follow each other.
+    much memory is lost alone. Workers of a cluster are sent names of problems or files, not worlds: each makes the
+    world of a problem once, as long as its queries follow each other.
 
     The same seed gives the same paths however the queries are spread, as long as no time limit cuts in.
 

@@ -22,6 +22,8 @@ DEEPEST_DENT = 1e-6
 CONVEX_VOLUME_RATIO = 0.999
 COMPARED_AT_ONCE, MOST_COMPARED = 20_000, 400_000_000  # triangles times faces of the hull; one of more stays a mesh
 
+SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal, twice
+
 # Hulls below these are refused: thickness over extent, and extent [m].
 FLATTEST, SMALLEST = 1e-7, 1e-6
 
@@ -95,11 +97,7 @@ def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -
     All of a triangle is as near to a plane beside the hull as its farthest corner; the plane is that of the face which
     is nearest to the triangle's middle.
     """
-    points, faces = convex_arrays(solid)
-    normals = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
-    normals *= np.where((normals * (points[faces[:, 0]] - points.mean(axis=0))).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
-    sizes = np.linalg.norm(normals, axis=1)
-    normals = normals[sizes > 0.0] / sizes[sizes > 0.0, None]
+    normals, _ = face_normals(*convex_arrays(solid))
     corners, parts = vertices[triangles], 1 + len(triangles) * len(normals) // COMPARED_AT_ONCE
     tops = np.concatenate([(vertices @ part.T).max(axis=0) for part in np.array_split(normals, parts)])
     middles = np.array_split(corners.mean(axis=1), parts)
@@ -157,6 +155,19 @@ def convex_arrays(solid: coal.Convex) -> tuple[Matrix, NDArray[np.int64]]:
     points = np.array(solid.points(), dtype=np.float64).reshape(-1, 3)
     corners = (solid.polygons(k) for k in range(solid.num_polygons))
     return points, np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
+
+
+def face_normals(points: Matrix, triangles: NDArray[np.int64]) -> tuple[Matrix, Vector]:
+    """Outward unit normals of the faces of a convex solid, shape (k, 3), and twice their areas [m^2], shape (k,).
+
+    Faces that have none are left out.
+    """
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    faces = areas > SMALLEST_AREA
+    normals, outward = normals[faces] / areas[faces, None], (a - points.mean(axis=0))[faces]
+    return normals * np.where(np.einsum("ij,ij->i", normals, outward) < 0.0, -1.0, 1.0)[:, None], areas[faces]
 
 
 def is_closed(geometry: Any) -> bool:

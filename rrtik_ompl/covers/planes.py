@@ -8,10 +8,9 @@ from typing import Any, cast
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.solids import SameObject, convex_arrays
+from rrtik_ompl.collision.solids import SameObject, convex_arrays, face_normals
 
 MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
-SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal
 
 
 def most_different(planes: Matrix, count: int) -> Matrix:
@@ -47,14 +46,9 @@ def outward_planes(solid: Any) -> Matrix | None:
     points, triangles = convex_arrays(solid)
     if len(triangles) < 4:
         return None
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    areas = np.linalg.norm(normals, axis=1)
-    solid_faces = areas > SMALLEST_AREA
-    normals, outward = normals[solid_faces] / areas[solid_faces, None], (a - points.mean(axis=0))[solid_faces]
+    normals, areas = face_normals(points, triangles)
     if len(normals) < 4:
         return None
-    normals *= np.where(np.einsum("ij,ij->i", normals, outward) < 0.0, -1.0, 1.0)[:, None]
-    normals = normals[np.argsort(-areas[solid_faces])]  # of almost parallel faces the largest stands for the others
+    normals = normals[np.argsort(-areas)]  # of almost parallel faces the largest stands for the others
     normals = normals[np.sort(np.unique(np.round(normals, 6), axis=0, return_index=True)[1])]
     return np.column_stack([normals, (points @ normals.T).max(axis=0)])

@@ -66,8 +66,8 @@ def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int |
         InputError: If a row is too short, too long, or has something else.
     """
     for begin in range(0, len(data) - LONGEST_LINE, LONGEST_LINE):
-        window = data[begin : begin + LONGEST_LINE]
-        if b"\n" not in window and b"\r" not in window:
+        end = begin + LONGEST_LINE
+        if data.find(b"\n", begin, end) < 0 and data.find(b"\r", begin, end) < 0:
             most = LONGEST_LINE // 2**20
             raise InputError(f"{what}: not rows of numbers: a line is longer than {most} MiB, the most that is read")
     plain = data.replace(b",", b" ") if b"," in data else data
