@@ -1,9 +1,8 @@
-"""Figures of the house: rooms and their modules, imports between rooms, circles, complexity, lengths, untyped values.
+"""Figures of the house: rooms and their modules, imports between rooms, circles, complexity, untyped values.
 
-    python bench/house.py [--json] [--tables]
+    python bench/house.py [--json]
 
 Prints what is measured beside its bound; exit code 1 if a bound is broken. ``tests/house`` holds the same bounds.
-``--tables`` prints an order of the modules of each package that holds, as ``tests/house/package_tables.yaml`` has it.
 """
 
 from __future__ import annotations
@@ -19,17 +18,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from house_imports import (
     LIBRARY,
     REPOSITORY,
-    inner_arrows,
     knots,
-    levels,
     module_graph,
     module_name,
-    packages,
     place,
     room_arrows,
     room_of,
@@ -40,15 +34,9 @@ from house_imports import (
 KERNEL_DECORATORS = {"kernel", "entry", "inlined", "intrinsic", "overload", "type_callable", "lower_builtin"}
 INTRINSICS = tuple(f"rrtik_ompl/fast/simd/{name}.py" for name in ("lanes", "wide_lanes", "access"))  # kernels' words
 COMMANDS = REPOSITORY / LIBRARY / "cli"  # each option of a command is a parameter, and the caller is typer
-PACKAGE_TABLES = REPOSITORY / "tests" / "house" / "package_tables.yaml"
-MODULES_WITHOUT_TABLE = 1
 BOUNDS = {
-    "modules in the root": 17,
-    "modules in a folder": 18,
     "cyclomatic complexity": 15,
     "positional parameters": 8,
-    "lines of a module": 300,
-    "lines of a test file": 400,
     "circles of imports": 0,
     "repeated runs of logic": 0,
     "files with private sources": 0,
@@ -75,26 +63,6 @@ class Finding:
     def broken(self) -> bool:
         """Whether it is beyond its bound."""
         return self.value > BOUNDS[self.what]
-
-
-def folder_sizes() -> Iterator[Finding]:
-    """Modules of each folder of the library, ``__init__`` counted."""
-    counts = Counter(file.parent for file in sources() if file.is_relative_to(REPOSITORY / LIBRARY))
-    for folder, count in sorted(counts.items()):
-        root = folder == REPOSITORY / LIBRARY
-        yield Finding("modules in the root" if root else "modules in a folder", place(folder), count)
-
-
-def file_lengths() -> Iterator[Finding]:
-    """Lines of every source file and of every test."""
-    for file in sources():
-        yield Finding("lines of a module", place(file), _lines(file))
-    for file in sorted((REPOSITORY / "tests").rglob("*.py")):
-        yield Finding("lines of a test file", place(file), _lines(file))
-
-
-def _lines(file: Path) -> int:
-    return len(file.read_text(encoding="utf-8").splitlines())
 
 
 def functions(file: Path) -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
@@ -207,8 +175,6 @@ def words() -> Finding:
 def findings() -> list[Finding]:
     """Everything that is measured."""
     return [
-        *folder_sizes(),
-        *file_lengths(),
         *complexities(),
         *parameters(),
         bare_any(),
@@ -240,35 +206,14 @@ def rooms() -> str:
     return "\n".join(["room                     modules   imports of other rooms", *lines])
 
 
-def package_tables() -> str:
-    """An order of each package's modules by what they import, in the form of ``tests/house/package_tables.yaml``."""
-    lines = []
-    for package, rows in listed_tables().items():
-        apart = [name for row in rows for name in row.split() if "." in name]
-        lines.append(f"{package}:")
-        for level in levels(inner_arrows(package, apart)):
-            lines += [f"  - {line}" for line in textwrap.wrap(" ".join(level), 112)]
-    return "\n".join(lines)
-
-
-def listed_tables() -> dict[str, list[str]]:
-    """The tables of ``tests/house/package_tables.yaml``; packages that have none and should are there without rows."""
-    listed: dict[str, list[str]] = yaml.safe_load(PACKAGE_TABLES.read_text(encoding="utf-8"))
-    unlisted: dict[str, list[str]] = {package: [] for package in packages(MODULES_WITHOUT_TABLE) if package != LIBRARY}
-    return dict(sorted({**unlisted, **listed}.items()))
-
-
 def main() -> int:
     """Print the figures, rooms and arrows; 1 if a bound is broken."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="all findings, for machines")
-    parser.add_argument("--tables", action="store_true", help="an order of the modules of each package")
     options = parser.parse_args()
     found = findings()
     if options.json:
         print(json.dumps([{"what": item.what, "where": item.where, "value": item.value} for item in found]))
-    elif options.tables:
-        print(package_tables())
     else:
         print(f"{report(found)}\n\n{rooms()}")
     return int(any(item.broken for item in found))

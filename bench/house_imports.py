@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter, defaultdict
-from collections.abc import Collection
 from functools import cache
 from pathlib import Path
 
@@ -13,7 +12,6 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 SOURCE_ROOTS = ("rrtik_ompl", "planners/rrtik_planners", "robots/rrtik_robots", "bench/rrtik_bench")
 LIBRARY, SHORT_NAME = "rrtik_ompl", "rrtik"
 KERNELS = f"{LIBRARY}.fast"
-INIT = "__init__"
 LADDER_MARKS = "<!-- ladder", "<!-- end of ladder -->"
 FLOOR = re.compile(r"^\| *\d+ *\| *([^|]+?) *\|", re.MULTILINE)
 ROOT_ROW = re.compile(r"^\| *`[^|]*` *\| *`(rrtik_\w+)`[^|]*\|[^|]*\| *([^|]+?) *\|", re.MULTILINE)
@@ -194,35 +192,6 @@ def _architecture(begin: str, end: str) -> str:
     return text.partition(begin)[2].partition(end)[0]
 
 
-def packages(more_than: int) -> list[str]:
-    """Packages that have more than so many modules and folders, ``__init__`` not counted."""
-    counts = Counter(name.rpartition(".")[0] for name in module_names())
-    return sorted(name for name, count in counts.items() if name and count > more_than)
-
-
-def inner_arrows(package: str, apart: Collection[str] = ()) -> dict[str, set[str]]:
-    """For each module and folder of a package those beside it that it imports; ``__init__`` only where it has code.
-
-    ``apart`` names modules of inner folders, such as ``numeric.descent``, that stand beside their folder.
-    """
-    own = {module for module in module_names() if f"{module}.".startswith(f"{package}.")}
-    if package in face_homes() or not arrows()[package]:
-        own.discard(package)
-    found: dict[str, set[str]] = {_child(package, module, apart): set() for module in own}
-    for module in own:
-        source = _child(package, module, apart)
-        found[source] |= {_child(package, target, apart) for target in arrows()[module] & own} - {source}
-    return found
-
-
-def _child(package: str, module: str, apart: Collection[str]) -> str:
-    """The part of a package that a module of it is or lies in."""
-    if module == package:
-        return INIT
-    inner = module.removeprefix(f"{package}.")
-    return inner if inner in apart else inner.split(".")[0]
-
-
 def knots(graph: dict[str, set[str]]) -> list[list[str]]:
     """Groups of nodes that reach each other (strongly connected components of more than one node)."""
     reach = {node: _reached(graph, node) for node in graph}
@@ -238,14 +207,3 @@ def _reached(graph: dict[str, set[str]], start: str) -> set[str]:
         seen |= fresh
         open_ += fresh
     return seen
-
-
-def levels(graph: dict[str, set[str]]) -> list[list[str]]:
-    """The nodes in rows, so that each leads to rows before its own alone; nodes of circles, and above them, last."""
-    rows: list[list[str]] = []
-    placed: set[str] = set()
-    while row := sorted(node for node in graph if node not in placed and graph[node] <= placed):
-        rows.append(row)
-        placed.update(row)
-    rest = sorted(set(graph) - placed)
-    return rows + ([rest] if rest else [])

@@ -1,14 +1,12 @@
-"""Who may import whom: rooms by the floors of ARCHITECTURE.md, modules of a package by the table of the package."""
+"""Who may import whom: rooms by the floors of ARCHITECTURE.md."""
 
 import re
 
 import pytest
 
-import house
 import house_imports
 
 LIBRARY = house_imports.LIBRARY
-TABLES = house.listed_tables()
 
 
 @pytest.fixture(scope="module")
@@ -67,24 +65,6 @@ def test_a_package_imports_no_more_of_the_library_than_its_floor(package, ladder
     above = [f"{module} -> {target}" for module, target in pairs if target != LIBRARY and room(target) not in allowed]
     assert pairs
     assert above == []
-
-
-# --- modules of a package ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("package", TABLES)
-def test_modules_of_a_package_import_only_those_before_them(package):
-    order = [name for row in TABLES[package] for name in row.split()]
-    graph = house_imports.inner_arrows(package, [name for name in order if "." in name])
-    assert len(order) == len(set(order))
-    assert set(order) == set(graph), f"{house.PACKAGE_TABLES.name}, {package}: a module has no place, or is gone"
-    upwards = [
-        f"{name} -> {other}"
-        for name, others in sorted(graph.items())
-        for other in sorted(others)
-        if order.index(other) > order.index(name)
-    ]
-    assert upwards == [], f"imports against the order of {house.PACKAGE_TABLES.name}, {package}"
 
 
 # --- what the finder sees ----------------------------------------------------------------------------------------
