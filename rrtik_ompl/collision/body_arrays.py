@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from weakref import WeakValueDictionary
 
 import coal
 import numpy as np
@@ -16,7 +16,7 @@ from rrtik_ompl.collision.bodies import Body
 UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class BodyArrays:
     """Numbers of n bodies.
 
@@ -47,12 +47,19 @@ class BodyArrays:
         return np.where(standing, 0.0, kept + self.paddings[first] + self.paddings[second])
 
 
+# Several checks of one world ask for the same; kept for as long as one of them holds them.
+_KNOWN: WeakValueDictionary[tuple[Body, ...], BodyArrays] = WeakValueDictionary()
+
+
 def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
-    """Numbers of bodies; kept, for several checks of one world ask for the same."""
-    return _body_arrays(tuple(bodies))
+    """Numbers of bodies."""
+    key = tuple(bodies)
+    known = _KNOWN.get(key)
+    if known is None:
+        _KNOWN[key] = known = _body_arrays(key)
+    return known
 
 
-@lru_cache(maxsize=4)
 def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
     boxes = [body.geometry.aabb_local for body in bodies]
     half_spaces = np.array([isinstance(body.geometry, coal.Halfspace) for body in bodies], dtype=bool)

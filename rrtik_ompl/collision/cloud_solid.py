@@ -5,6 +5,7 @@ Near is what lies close to the other body's bounding box; the cloud's tree finds
 
 from __future__ import annotations
 
+import weakref
 from typing import Any, NamedTuple, TypeAlias
 
 import coal
@@ -26,13 +27,11 @@ class CloudSolid(coal.Sphere):  # type: ignore[misc]
 
     Attributes:
         cloud: The cloud.
-        table: What the kernels make of it, once they have.
     """
 
     def __init__(self, cloud: PointCloud) -> None:
         super().__init__(float(np.linalg.norm(np.maximum(*np.abs(cloud.bounds)))))
         self.cloud = cloud
-        self.table: object | None = None
 
     def computeLocalAABB(self) -> None:
         """Set the bounding box and sphere to those of the points' balls."""
@@ -43,12 +42,17 @@ class CloudSolid(coal.Sphere):  # type: ignore[misc]
 
 
 def cloud_solid(cloud: PointCloud) -> CloudSolid:
-    """What collision checks take a cloud for: the same object each time, as its table is made but once."""
-    if not hasattr(cloud, "solid"):
+    """What collision checks take a cloud for: the same object each time, for as long as a world holds it.
+
+    The cloud does not hold it: Python cannot see what an object of coal's refers to, so that a circle of the two would
+    never be freed.
+    """
+    solid = cloud.solid() if hasattr(cloud, "solid") else None
+    if solid is None:
         solid = CloudSolid(cloud)
         solid.computeLocalAABB()
-        object.__setattr__(cloud, "solid", solid)
-    return cloud.solid  # type: ignore[return-value]
+        object.__setattr__(cloud, "solid", weakref.ref(solid))
+    return solid
 
 
 def has_cloud(ends: Ends) -> bool:

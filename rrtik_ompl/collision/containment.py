@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import coal
@@ -16,7 +16,7 @@ from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.enclosure import enclosure
 from rrtik_ompl.collision.shape_table import has_core
-from rrtik_ompl.collision.solids import SameObject, inside_mesh, is_closed, is_mesh, mesh_arrays
+from rrtik_ompl.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays, once_per_geometry
 
 ROUNDING = 1e-9  # [m]
 END_POINTS = np.concatenate([np.eye(3), -np.eye(3)])  # of a body about its origin, in half extents
@@ -154,18 +154,18 @@ def _end_points(geometries: Sequence[Any], halves: Matrix) -> NDArray[np.float64
     points: NDArray[np.float64] = END_POINTS * halves[:, None, :]
     for k, geometry in enumerate(geometries):
         if not has_core(geometry):
-            points[k] = _extremes(SameObject(geometry))
+            points[k] = _extremes(geometry)
     return points
 
 
-@lru_cache(maxsize=512)
-def _extremes(key: SameObject) -> Matrix:
+@once_per_geometry
+def _extremes(geometry: Any) -> Matrix:
     """The vertices of a mesh or a convex solid that are farthest along the axes, shape (6, 3); 0 of other kinds."""
-    if is_mesh(key.geometry):
-        vertices, triangles = mesh_arrays(key.geometry)
+    if is_mesh(geometry):
+        vertices, triangles = mesh_arrays(geometry)
         points = vertices[distinct(triangles)]
-    elif isinstance(key.geometry, coal.ConvexBase):
-        points = np.array(key.geometry.points()).reshape(-1, 3)
+    elif isinstance(geometry, coal.ConvexBase):
+        points = np.array(geometry.points()).reshape(-1, 3)
     else:
         return np.zeros((6, 3))
     return frozen(points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])

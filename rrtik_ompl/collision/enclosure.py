@@ -6,14 +6,13 @@ than about a cell are closed by that; a surface with a wide opening encloses not
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.solids import SameObject, mesh_arrays
+from rrtik_ompl.collision.solids import mesh_arrays, once_per_geometry
 
 if TYPE_CHECKING:
     import coal
@@ -57,14 +56,10 @@ class Enclosure:
         return bool(self.inside[tuple(cells[known].T)].any())
 
 
+@once_per_geometry
 def enclosure(geometry: coal.CollisionGeometry) -> Enclosure:
     """What a coal mesh encloses."""
-    return _enclosure(SameObject(geometry))
-
-
-@lru_cache(maxsize=64)
-def _enclosure(key: SameObject) -> Enclosure:
-    return Enclosure(*mesh_arrays(key.geometry))
+    return Enclosure(*mesh_arrays(geometry))
 
 
 def _small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:

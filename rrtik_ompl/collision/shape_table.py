@@ -19,7 +19,6 @@ import pinocchio as pin
 from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.collision.cloud_solid import CloudSolid, cloud_solid
 from rrtik_ompl.collision.solids import (
-    SameObject,
     bvh,
     convex_arrays,
     convexified,
@@ -27,6 +26,7 @@ from rrtik_ompl.collision.solids import (
     is_mesh,
     measured,
     mesh_arrays,
+    once_per_geometry,
 )
 from rrtik_ompl.shapes import (
     Box,
@@ -267,14 +267,14 @@ def has_core(geometry: Any) -> bool:
 
 def core_of(geometry: Any) -> Core | None:
     """The core of a coal geometry; None if it has none of the simple ones."""
-    return _core(SameObject(geometry)) if has_core(geometry) else None
+    return _core(geometry) if has_core(geometry) else None
 
 
-@lru_cache(maxsize=4096)  # a solid that moves keeps its own
-def _core(key: SameObject) -> Core:
-    row = _BY_GEOMETRY[type(key.geometry)]
+@once_per_geometry  # a solid that moves keeps its own
+def _core(geometry: Any) -> Core:
+    row = _BY_GEOMETRY[type(geometry)]
     assert row.core is not None
-    return row.core(*row.sizes(key.geometry).tolist())
+    return row.core(*row.sizes(geometry).tolist())
 
 
 def shape_of(geometry: Any) -> Shape | None:

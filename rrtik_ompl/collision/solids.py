@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable, Iterable
-from functools import lru_cache
+from functools import lru_cache, wraps
 from typing import Any, TypeVar
 
 import coal
@@ -26,6 +27,26 @@ SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal, twice
 
 # Hulls below these are refused: thickness over extent, and extent [m].
 FLATTEST, SMALLEST = 1e-7, 1e-6
+
+
+def once_per_geometry(find: Callable[[Any], Found]) -> Callable[[Any], Found]:
+    """A function of a coal geometry that is called once for each object, and forgets its answer when that is gone.
+
+    What it returns must not hold the geometry, which would otherwise never go.
+    """
+    known: dict[int, tuple[weakref.ref[Any], Found]] = {}
+
+    @wraps(find)
+    def found(geometry: Any) -> Found:
+        key = id(geometry)
+        if key in known:
+            return known[key][1]
+
+        answer = find(geometry)
+        known[key] = weakref.ref(geometry, lambda _: known.pop(key, None)), answer
+        return answer
+
+    return found
 
 
 def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> Any:
@@ -77,15 +98,15 @@ def convexified(geometry: Any) -> Any:
 
 def fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
     """Whether a coal geometry is a mesh whose volume is nearly that of its convex hull; False for what is no mesh."""
-    return is_mesh(geometry) and _fills_its_hull(SameObject(geometry))
+    return is_mesh(geometry) and _fills_its_hull(geometry)
 
 
-@lru_cache(maxsize=128)
-def _fills_its_hull(key: SameObject) -> bool:
-    solid = around(key.geometry)
+@once_per_geometry
+def _fills_its_hull(geometry: Any) -> bool:
+    solid = around(geometry)
     if is_mesh(solid):  # which is flat
         return False
-    vertices, triangles = mesh_arrays(key.geometry)
+    vertices, triangles = mesh_arrays(geometry)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
     return bool(volume >= CONVEX_VOLUME_RATIO * solid.computeVolume())
@@ -110,21 +131,6 @@ def is_mesh(geometry: Any) -> bool:
     return isinstance(geometry, coal.BVHModelBase)
 
 
-class SameObject:
-    """Makes a coal geometry a key: equal only to itself."""
-
-    __slots__ = ("geometry",)
-
-    def __init__(self, geometry: Any) -> None:
-        self.geometry = geometry
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, SameObject) and other.geometry is self.geometry
-
-    def __hash__(self) -> int:
-        return id(self.geometry)
-
-
 def of_each(geometries: Iterable[Any], find: Callable[[Any], Found]) -> list[Found]:
     """What is found of each of some coal geometries; looked for once where several are one object."""
     known: dict[int, Found] = {}
@@ -133,21 +139,29 @@ def of_each(geometries: Iterable[Any], find: Callable[[Any], Found]) -> list[Fou
 
 def around(geometry: Any) -> Any:
     """A convex solid that contains a coal geometry: a mesh's hull (the mesh, if it is flat), a solid itself."""
-    return _around(SameObject(geometry)) if is_mesh(geometry) else geometry
+    found = _hull_of_mesh(geometry) if is_mesh(geometry) else None
+    return geometry if found is None else found
 
 
-@lru_cache(maxsize=128)
-def _around(key: SameObject) -> Any:
-    vertices, triangles = mesh_arrays(key.geometry)
+@once_per_geometry
+def _hull_of_mesh(mesh: Any) -> Any:
+    """The convex hull of a mesh; None if it is flat."""
+    vertices, triangles = mesh_arrays(mesh)
     used = vertices[distinct(triangles)]
     if len(used) < 4 or not _thickness(used) >= FLATTEST * _extent(used):
-        return key.geometry
+        return None
     return hull(used)
 
 
+@once_per_geometry  # coal hands out one triangle at a time
 def mesh_arrays(geometry: Any) -> tuple[Matrix, NDArray[np.int64]]:
     """Vertices, shape (n, 3), and triangles, shape (m, 3), of a coal mesh, read-only."""
-    return _mesh_arrays(SameObject(geometry))
+    vertices = np.array(geometry.vertices(), dtype=np.float64).reshape(-1, 3)
+    corners = (geometry.tri_indices(k) for k in range(geometry.num_tris))
+    triangles = np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
+    vertices.flags.writeable = False
+    triangles.flags.writeable = False
+    return vertices, triangles
 
 
 def convex_arrays(solid: coal.Convex) -> tuple[Matrix, NDArray[np.int64]]:
@@ -170,33 +184,19 @@ def face_normals(points: Matrix, triangles: NDArray[np.int64]) -> tuple[Matrix, 
     return normals * np.where(np.einsum("ij,ij->i", normals, outward) < 0.0, -1.0, 1.0)[:, None], areas[faces]
 
 
+@once_per_geometry
 def is_closed(geometry: Any) -> bool:
     """Whether a coal mesh has an inside: every edge is passed as often one way as the other.
 
     Then winding numbers are whole, and change only where the surface is crossed.
     """
-    return _is_closed(SameObject(geometry))
-
-
-@lru_cache(maxsize=128)
-def _is_closed(key: SameObject) -> bool:
-    vertices, triangles = mesh_arrays(key.geometry)
+    vertices, triangles = mesh_arrays(geometry)
     _, welded = np.unique(vertices, axis=0, return_inverse=True)
     corners = np.asarray(welded).ravel()[triangles]
     start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     edges = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
     _, which = np.unique(edges, return_inverse=True)
     return not np.bincount(np.asarray(which).ravel(), weights=np.sign(end - start)).any()
-
-
-@lru_cache(maxsize=128)  # coal hands out one triangle at a time
-def _mesh_arrays(key: SameObject) -> tuple[Matrix, NDArray[np.int64]]:
-    geometry = key.geometry
-    vertices = np.array(geometry.vertices(), dtype=np.float64).reshape(-1, 3)
-    corners = (geometry.tri_indices(k) for k in range(geometry.num_tris))
-    triangles = np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
-    vertices.flags.writeable = triangles.flags.writeable = False
-    return vertices, triangles
 
 
 @lru_cache(maxsize=16)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
 
 from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.solids import SameObject, convex_arrays, face_normals
+from rrtik_ompl.collision.solids import convex_arrays, face_normals, once_per_geometry
 
 MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
 
@@ -25,14 +24,14 @@ def most_different(planes: Matrix, count: int) -> Matrix:
     return planes[taken]
 
 
-@lru_cache(maxsize=4096)
-def known_planes(solid: SameObject) -> Matrix | None:
+@once_per_geometry
+def known_planes(solid: Any) -> Matrix | None:
     """See :func:`outward_planes`; a solid that moves keeps them."""
-    return outward_planes(solid.geometry)
+    return outward_planes(solid)
 
 
-@lru_cache(maxsize=1024)
-def outer_planes(solid: SameObject) -> Matrix:
+@once_per_geometry
+def outer_planes(solid: Any) -> Matrix:
     """The planes of the outer polyhedron of a convex solid."""
     return most_different(cast(Matrix, known_planes(solid)), MOST_PLANES)
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,10 +40,11 @@ Points: TypeAlias = NDArray[np.float32]
 class _Kept:
     """What is made of a cloud once, when somebody asks for it first."""
 
-    __slots__ = ("_tree", "solid")
+    __slots__ = ("_tree", "solid", "table")
 
     _tree: PointTree
-    solid: object  # what collision checks take it for
+    solid: Callable[[], Any]  # a weak reference to what collision checks take it for
+    table: object  # what the kernels make of its tree
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,6 @@ import numpy as np
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.shape_table import core_of
-from rrtik_ompl.collision.solids import SameObject
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.simd.processor import WIDTH
@@ -192,7 +191,7 @@ def _packed_shape(body: Body) -> dict[str, Any] | None:
     core = None if body.kind != "obstacle" else core_of(body.geometry)
     if core is None or len(convex_solids(body.geometry).around) != 1:
         return None
-    kind, half = primitive_kind(SameObject(body.geometry)), core.half_sides
+    kind, half = primitive_kind(body.geometry), core.half_sides
     if kind is None or kind >= layout.CENTRED_KINDS:
         return None
     return {

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.collision.cloud_solid import cloud_gap, has_cloud
 from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.collision.containment import Containment
@@ -52,6 +53,7 @@ class ExactChecker:
     @collector_waits
     def __init__(self, robot: Robot, bodies: Items[Body], pairs: Pairs, *, conservative: bool = False) -> None:
         self.conservative = conservative
+        self._arrays = body_arrays(bodies.whole)  # held, so that all that asks for them finds them
         arm = arm_cache(robot)
         covers = arm.covers_of(bodies.whole)
         self._tables = TakenTables(arm.pack(bodies.whole, pairs, covers))

@@ -88,7 +88,7 @@ class MovedObstacles:
         if not numbers:
             return
         table[layout.CLOUD_POSES][:] = cloud_poses(bodies).ravel()
-        self._clouds = [cloud_table(bodies[k].geometry) for k in numbers]
+        self._clouds = [cloud_table(bodies[k].geometry.cloud) for k in numbers]
         table[layout.CLOUDS][:] = [cloud.address for cloud in self._clouds]
         sizes = table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)
         kinds = table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)[:, layout.SOLID_KIND]

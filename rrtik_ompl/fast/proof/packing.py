@@ -129,7 +129,7 @@ def proof_pairs(
     sides = rows[:, layout.PAIR_SIZE :]
     named = np.sort(sides[:, ::2], axis=1)
     packed = _solid_arrays(bodies, parts, list(together))
-    clouds = [cloud_table(bodies[k].geometry) for k in cloud_bodies(bodies)]
+    clouds = [cloud_table(bodies[k].geometry.cloud) for k in cloud_bodies(bodies)]
     made = table(
         {
             layout.JOINT_COUNT: joints,

@@ -8,13 +8,13 @@ from rrtik_ompl.fast.tables.cloud_layout import BLOCKS, FIRSTS, GROUPS, LEVEL_CO
 from rrtik_ompl.fast.tables.memory import Table, table
 
 if TYPE_CHECKING:
-    from rrtik_ompl.collision.cloud_solid import CloudSolid
+    from rrtik_ompl.shapes import PointCloud
 
 
-def cloud_table(solid: CloudSolid) -> Table:
-    """The tree of a cloud's points for the kernels."""
-    if solid.table is None:
-        tree = solid.cloud.tree
+def cloud_table(cloud: PointCloud) -> Table:
+    """The tree of a cloud's points for the kernels; the cloud keeps it."""
+    if not hasattr(cloud, "table"):
+        tree = cloud.tree
         fields = {FIRSTS: tree.firsts, GROUPS: tree.boxes, BLOCKS: tree.blocks}
-        solid.table = table({LEVEL_COUNT: len(tree.firsts), **fields})
-    return cast(Table, solid.table)
+        object.__setattr__(cloud, "table", table({LEVEL_COUNT: len(tree.firsts), **fields}))
+    return cast(Table, cloud.table)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.shape_table import Core, core_of
-from rrtik_ompl.collision.solids import SameObject
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables import layout
 from rrtik_ompl.fast.tables.memory import Table
@@ -192,7 +191,7 @@ class _SolidRows:
 
 def _primitives(body: Body, spheres: tuple[Spheres, Spheres]) -> tuple[Primitives, Primitives]:
     """Primitives that contain a body, and primitives inside it."""
-    kind, core = primitive_kind(SameObject(body.geometry)), core_of(body.geometry)
+    kind, core = primitive_kind(body.geometry), core_of(body.geometry)
     if kind in MAKERS and core is not None:  # both by one call of its formula
         kept = body.margin + body.padding
         beside = np.array([kept, kept if kind in ROUNDED else 0.0])

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
-from typing import cast
+from typing import Any, cast
 
 import coal
 import numpy as np
@@ -19,7 +18,7 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.shape_table import Core, core_of
-from rrtik_ompl.collision.solids import SameObject, of_each
+from rrtik_ompl.collision.solids import of_each, once_per_geometry
 from rrtik_ompl.covers.planes import known_planes, outer_planes
 from rrtik_ompl.fast.tables.cloud_tables import cloud_table
 from rrtik_ompl.fast.tables.layout import (
@@ -60,7 +59,7 @@ PLANE_SLACK = 1e-5  # [m] for planes that stand for a few others with almost the
 
 def needs_covers(body: Body) -> tuple[bool, bool]:
     """Whether a body needs outer and inner spheres: what stands still and has a formula can do without."""
-    kind = None if body.joint > 0 else primitive_kind(SameObject(body.geometry))
+    kind = None if body.joint > 0 else primitive_kind(body.geometry)
     return kind is None, kind in (None, CONVEX)
 
 
@@ -112,16 +111,15 @@ def fits(primitives: Primitives) -> Mask:
 def _byprimitive_kind(bodies: Sequence[Body]) -> dict[int | None, list[int]]:
     """Places of the bodies by their kinds of primitive, None for those without a formula."""
     found: dict[int | None, list[int]] = {}
-    kinds = of_each((body.geometry for body in bodies), lambda solid: primitive_kind(SameObject(solid)))
+    kinds = of_each((body.geometry for body in bodies), primitive_kind)
     for k, kind in enumerate(kinds):
         found.setdefault(kind, []).append(k)
     return found
 
 
-@lru_cache(maxsize=4096)
-def primitive_kind(key: SameObject) -> int | None:
+@once_per_geometry
+def primitive_kind(solid: Any) -> int | None:
     """The kind of primitive, of the layout's, that a coal geometry is; None if it is none."""
-    solid = key.geometry
     if isinstance(solid, CloudSolid):
         return CLOUD
     if isinstance(solid, coal.ShapeBase) and solid.getSweptSphereRadius() != 0.0:
@@ -129,7 +127,7 @@ def primitive_kind(key: SameObject) -> int | None:
     if isinstance(solid, coal.Halfspace):
         return HALF_SPACE
     if isinstance(solid, coal.ConvexBase):
-        return None if known_planes(key) is None else CONVEX
+        return None if known_planes(solid) is None else CONVEX
     core = core_of(solid)
     if core is None:
         return None
@@ -265,12 +263,12 @@ def _half_space(body: Body, place: int, grow: float, inflation: float) -> Primit
 
 def _convex(body: Body, place: int, grow: float, inflation: float) -> Primitives:
     """A convex solid by its planes; a ball meets the inner primitive if its centre lies behind all of them."""
-    planes = cast(Matrix, known_planes(SameObject(body.geometry)))
+    planes = cast(Matrix, known_planes(body.geometry))
     rotation, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
     corners = np.array(body.geometry.points()).reshape(-1, 3) @ rotation.T + origin
     low, high = corners.min(axis=0), corners.max(axis=0)
     inflation += float(_slack(0.5 * (low + high)[None], (high - low).max(keepdims=True))[0])
-    kept = outer_planes(SameObject(body.geometry)) if grow > 0.0 else planes
+    kept = outer_planes(body.geometry) if grow > 0.0 else planes
     world = np.empty_like(kept)
     normals = world[:, PLANE_NORMAL : PLANE_NORMAL + 3]
     normals[:] = kept[:, :3] @ rotation.T
@@ -287,7 +285,7 @@ def _cloud(body: Body, place: int, grow: float, inflation: float) -> Primitives:
     slack = 3.0 * float(_slack(centre[None], np.abs(origin - centre).max(keepdims=True) + spread.max())[0])
     radius, reach = solid.cloud.radius + grow * slack + inflation, spread + grow * slack + inflation + slack
     numbers = record(SHAPE_FLOATS, {SHAPE_CENTRE: origin, CLOUD_AXES: rotation.T.ravel(), CLOUD_RADIUS: radius})
-    made = _single(CLOUD, place, numbers, centre - reach, centre + reach, cloud_table(solid))
+    made = _single(CLOUD, place, numbers, centre - reach, centre + reach, cloud_table(solid.cloud))
     return made.only(np.array([radius > 0.0]))
 
 

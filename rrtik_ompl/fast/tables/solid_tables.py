@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import coal
@@ -19,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.shape_table import core_of
-from rrtik_ompl.collision.solids import SameObject, is_mesh
+from rrtik_ompl.collision.solids import is_mesh, once_per_geometry
 from rrtik_ompl.covers.cache import cached_convex_pieces
 from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.cloud_layout import LEAF
@@ -95,20 +94,16 @@ class Solids:
 NO_SOLIDS = Solids()
 
 
+@once_per_geometry
 def convex_solids(geometry: Any) -> Solids:
     """Convex solids around and inside a coal geometry, in its frame; none for a kind that is not known here."""
-    return _convex_solids(SameObject(geometry))
-
-
-@lru_cache(maxsize=1024)
-def _convex_solids(key: SameObject) -> Solids:
-    if isinstance(key.geometry, CloudSolid):
-        return _cloud(key.geometry)
-    if is_mesh(key.geometry):
-        around, inside, points = cached_convex_pieces(key.geometry)
+    if isinstance(geometry, CloudSolid):
+        return _cloud(geometry)
+    if is_mesh(geometry):
+        around, inside, points = cached_convex_pieces(geometry)
         held = (*map(ConvexSolid, inside), *(ConvexSolid(p, kind=MERE_CORNERS) for p in points))
         return Solids(tuple(ConvexSolid(p, inside=False) for p in around), held)
-    own = _own_solid(key.geometry)
+    own = _own_solid(geometry)
     return NO_SOLIDS if own is None else Solids((own,), (own,))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import coal
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.collision.shape_table import shape_of
-from rrtik_ompl.collision.solids import SameObject, is_mesh
+from rrtik_ompl.collision.solids import is_mesh, once_per_geometry
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Mesh, PointCloud, Shape, Sphere
 from rrtik_ompl.shapes.surfaces import Faces
@@ -122,16 +121,16 @@ def look_of_coal(geometry: Any, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | N
         cone = CylinderGeometry(2.0 * geometry.halfLength, 0.0, geometry.radius)
         return _primitive(cone, _Y_TO_Z, half)
     try:
-        shape = _shape_of(SameObject(geometry))
+        shape = _shape_of(geometry)
         return None if shape is None else look_of_shape(shape, limit)
     except InputError:  # a link's mesh without area: nothing to see
         return None
 
 
-@lru_cache(maxsize=64)
-def _shape_of(key: SameObject) -> Shape | None:
+@once_per_geometry
+def _shape_of(geometry: Any) -> Shape | None:
     """The shape of a coal geometry; an arm and its ghosts, which have fewer triangles, ask for the same."""
-    return shape_of(key.geometry)
+    return shape_of(geometry)
 
 
 def _primitive(geometry: Geometry, placement: NDArray[np.float64], half: ArrayLike) -> Look:

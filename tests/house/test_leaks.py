@@ -1,0 +1,112 @@
+"""What nobody holds any more is gone: living instances are counted after the examples of all public types."""
+
+import contextlib
+import doctest
+import gc
+import inspect
+import weakref
+from collections import Counter
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_tests.sizes import how_many
+
+OURS = ("rrtik_ompl", "rrtik_planners", "rrtik_robots")
+KEPT_WITH_ROBOTS = {"Body"}  # of links: caches keep those of some robots; the last test bounds these
+REACH = "robot = rrtik.load_robot('planar3')"
+SHORT_OF_AN_EXAMPLE = {
+    "AttachedObject": "rrtik.AttachedObject('tool', 'link3', rrtik.Box([0.1, 0.1, 0.1]))",
+    "ConstantVelocity": "rrtik.Obstacle('b', rrtik.Sphere(0.1), motion=rrtik.ConstantVelocity([0.1, 0.0, 0.0]))",
+    "TimedPoses": "rrtik.TimedPoses([0.0, 1.0], [rrtik.pose([0, 0, 0]), rrtik.pose([1, 0, 0])])",
+    "Obstacle": "rrtik.Obstacle('b', rrtik.Sphere(0.1), rrtik.pose([1, 0, 0]))",
+    "Scene": "rrtik.Scene([rrtik.Obstacle('b', rrtik.Sphere(0.1), rrtik.pose([1, 0, 0]))])",
+    "World": f"{REACH}\nworld = rrtik.World(robot)\nworld.valid([0, 0, 0])\nworld.clearance([0, 0, 0])",
+    "Robot": f"{REACH}\nrobot.fk([0, 0, 0])",
+    "JointGoal": "rrtik.JointGoal([0.0, 0.0])",
+    "PoseGoal": "rrtik.PoseGoal(rrtik.pose([1, 0, 0]))",
+    "PositionGoal": "rrtik.PositionGoal([1, 0, 0])",
+    "GoalSet": "rrtik.GoalSet([rrtik.PositionGoal([1, 0, 0]), rrtik.PositionGoal([0, 1, 0])])",
+    "IkResult": f"{REACH}\nrrtik.solve_ik(robot, rrtik.PositionGoal(robot.fk([0, 1, 0]).translation))",
+    "IkTrajectory": f"{REACH}\nrrtik.solve_ik_trajectory(robot, [robot.fk([0, 1, 0]), robot.fk([0, 1.01, 0])])",
+    "JointPath": f"{REACH}\nrrtik.JointPath(robot, [[0, 0, 0], [0, 1, 0]]).length",
+    "BenchmarkNotes": "from ompl import tools\n"
+    "setup = rrtik.simple_setup(rrtik.load_problem('planar3_boxes'))\n"
+    "rrtik.BenchmarkNotes(tools.Benchmark(setup))",
+    "Trajectory": f"{REACH}\nrrtik.time_parameterize(rrtik.JointPath(robot, [[0, 0, 0], [0, 1, 0]]))",
+}
+
+
+def example(name):
+    """The statements of a public name's example."""
+    text = inspect.getdoc(getattr(rrtik, name)) or ""
+    shown = doctest.DocTestParser().get_examples(text)
+    run = (each.source for each in shown if not each.options.get(doctest.SKIP))
+    return "".join(run) or SHORT_OF_AN_EXAMPLE.get(name, "")
+
+
+TYPES = [name for name in dir(rrtik) if name[0] != "_" and inspect.isclass(getattr(rrtik, name))]
+
+
+def living():
+    """Instances of our types, counted by their names."""
+    gc.collect()
+    kinds = (type(each) for each in gc.get_objects())
+    return Counter(kind.__name__ for kind in kinds if str(kind.__module__).split(".")[0] in OURS)
+
+
+def run(code):
+    given = {"np": np, "rrtik": rrtik, "__name__": "example"}
+    with contextlib.suppress(rrtik.RrtikError):  # some examples show what is refused
+        exec(code, given)
+
+
+def test_every_public_type_has_an_example_to_be_counted_with():
+    assert [name for name in TYPES if not example(name)] == []
+
+
+@pytest.mark.parametrize("name", [name for name in TYPES if example(name)])
+def test_what_an_example_makes_is_gone_when_it_has_ended(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code = compile(example(name), name, "exec")
+    run(code)
+    before = living()
+    run(code)
+    grown = {kind: count - before[kind] for kind, count in living().items() if count > before[kind]}
+    assert grown.keys() <= KEPT_WITH_ROBOTS, grown
+
+
+def scans(count, alive):
+    """Worlds of one scan after another, as a camera's loop makes them; adds weak references to the clouds' solids."""
+    robot = rrtik.load_robot("planar3")
+    rng = np.random.default_rng(0)
+    for _ in range(count):
+        cloud = rrtik.PointCloud(rng.normal(size=(50, 3)) * 0.1 + [1.5, 0, 0], radius=0.01)
+        world = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("scan", cloud)]))
+        world.motion_valid([0.0, 0.0, 0.0], [0.1, 0.0, 0.0])
+        world.moved("scan", [0.0, 0.1, 0.0]).valid([0.0, 0.0, 0.0])
+        world.prove([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
+        world.clearance([0.0, 0.0, 0.0])
+        alive.append(weakref.ref(world.bodies[-1].geometry))
+
+
+def test_a_scan_is_gone_when_nobody_holds_it():
+    alive = []
+    before = living()["PointCloud"]
+    scans(how_many(1000, 60), alive)
+    assert living()["PointCloud"] == before
+    assert not any(solid() for solid in alive)  # no collector can count objects of coal's
+
+
+def test_the_robots_that_caches_keep_have_a_bound():
+    for _ in range(80):
+        robot = rrtik.load_robot("planar3")
+        rrtik.World(robot).valid([0.0, 0.0, 0.0])
+        rrtik.solve_ik(robot, rrtik.PositionGoal([1.0, 0.0, 0.0]))
+    first = living()["Robot"]
+    for _ in range(80):
+        robot = rrtik.load_robot("planar3")
+        rrtik.World(robot).valid([0.0, 0.0, 0.0])
+        rrtik.solve_ik(robot, rrtik.PositionGoal([1.0, 0.0, 0.0]))
+    assert living()["Robot"] <= max(first, 64) + 2
