@@ -1,7 +1,7 @@
 """Tables as an image of another memory: every table and array gets a place there, and fields that point move along.
 
-Which fields point is said, not guessed: to an array of the table itself (the table knows), to another table or an array
-that belongs to nobody (``links``), to where another field of the same table points (``same``).
+Which fields point is said, not guessed: to an array of the table itself or to a part of it (the table knows), to another
+table or an array that belongs to nobody (``links``), to where another field of the same table points (``same``).
 """
 
 from __future__ import annotations
@@ -59,8 +59,10 @@ class MemoryImage:
         if isinstance(block, np.ndarray):
             return self._append(address, block)
         header = block.header.copy()
+        parts = block.parts if isinstance(block, Table) else ()
+        there = {part.address: self.add(part) for part in parts}
         for place, array in block.arrays.items():
-            header[place] = self.add(array)
+            header[place] = self._add_pointing(array, there)
         for place, other in (links or {}).items():
             header[place] = self.place(other)
         for place, other_place in (same or {}).items():
@@ -74,6 +76,13 @@ class MemoryImage:
             start = place - self._base
             whole[start : start + data.nbytes] = np.frombuffer(data.tobytes(), dtype=np.uint8)
         return whole.tobytes()
+
+    def _add_pointing(self, array: NDArray[Any], there: Mapping[int, int]) -> int:
+        """Add an array of a table; one that holds the addresses of the table's parts holds those of the other memory."""
+        addresses = array.tolist() if there and array.dtype == np.int64 else []
+        if not addresses or not there.keys() >= set(addresses):
+            return self.add(array)
+        return self._append(_address(array), np.array([there[address] for address in addresses]))
 
     def _append(self, address: int, data: NDArray[Any]) -> int:
         place, self._end = self._end, self._end + -(-max(data.nbytes, 1) // ALIGNMENT) * ALIGNMENT
