@@ -17,11 +17,11 @@
     if (choice < 0.5) select(choice < 0.25 ? "goal" : "start");
     else if (choice < 0.58) addShape(["box", "sphere", "cylinder", "capsule"][Math.floor(4 * random())]);
     else {
-      const shown = planning.obstacles.filter((_, k) => state.obstacles[k].shown);
-      if (shown.length) select(shown[Math.floor(shown.length * random())].name);
-      if (choice < 0.62 && !ENDS[selected]) removeSelected();
-      else if (choice < 0.7 && !ENDS[selected]) {
-        const k = numberOf(selected);
+      const shown = [...planning.obstacles.keys()].filter((k) => state.obstacles[k].shown);
+      if (shown.length) select(shown[Math.floor(shown.length * random())]);
+      if (choice < 0.62 && !isEnd(selected)) removeSelected();
+      else if (choice < 0.7 && !isEnd(selected)) {
+        const k = selected;
         state.obstacles[k].sizes = state.obstacles[k].sizes.map((length) => length * (0.5 + random()));
         applyObstacle(k);
       }
@@ -38,7 +38,7 @@
   /** The files of what the page finds now, without waiting for frames; null where an end is blocked or no path is found. */
   function filesNow() {
     shortening += 1;
-    if (Object.keys(ENDS).some((end) => !kernels.free(state[end]))) return null;
+    if ([...ENDS.keys()].some((end) => !kernels.free(state[end]))) return null;
     const { search, shorten } = PLANNERS[state.planner];
     const found = last(search(state.seed), true);
     if (!found) return null;

@@ -322,6 +322,40 @@ def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tm
     np.testing.assert_array_equal(saved.goal.q, goal)
 
 
+# What every object of JavaScript's has, and the words by which the page tells its ends apart.
+TRICKY_NAMES = ["constructor", "__proto__", "toString", "hasOwnProperty", "_proto__", "start", "goal", "robot", ":goal"]
+TRICKY_ARM = """<robot name="__proto__"><link name="valueOf"/>
+<link name="isPrototypeOf"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+<link name="propertyIsEnumerable"><collision>
+<origin xyz="0.3 0 0"/><geometry><box size="0.5 0.1 0.1"/></geometry></collision></link>
+<joint name="constructor" type="revolute"><parent link="valueOf"/><child link="isPrototypeOf"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" velocity="1" effort="1"/></joint>
+<joint name="__proto__" type="revolute"><parent link="isPrototypeOf"/><child link="propertyIsEnumerable"/>
+<axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" velocity="1" effort="1"/></joint></robot>"""
+
+
+@needs_chromium
+def test_a_name_of_javascripts_own_is_a_name_like_any_other(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.urdf").write_text(TRICKY_ARM)
+    robot = rrtik.load_robot("arm.urdf", tip="propertyIsEnumerable")
+    places = [rrtik.pose([0.9, 0.3 * k - 1.2, 0.0]) for k in range(len(TRICKY_NAMES))]
+    boxes = map(rrtik.Obstacle, TRICKY_NAMES, [rrtik.Box([0.1, 0.1, 0.1])] * len(TRICKY_NAMES), places)
+    problem = Problem(rrtik.World(robot, Scene(tuple(boxes))), [0.0, 0.0], [1.0, 0.3])
+    with planning_page(page(problem, rrtik.plan(problem, seed=1).path), tmp_path) as browser:
+        for k in range(len(TRICKY_NAMES)):
+            browser.ask(f"select({k}); moveSelected(new THREE.Vector3(0.5, 0, 0), 0)")
+        assert browser.ask("nameOf(selected)") == TRICKY_NAMES[-1]
+        browser.ask("select('goal'); moveSelected(new THREE.Vector3(0, 0, 0.01), 0)")
+        found = browser.ask("problemText()")
+    (tmp_path / "moved.yaml").write_text(found, encoding="utf-8")
+    moved = rrtik.load_problem(tmp_path / "moved.yaml").world.scene
+    assert [each.name for each in moved.obstacles] == TRICKY_NAMES
+    for each, before in zip(moved.obstacles, places, strict=True):
+        np.testing.assert_allclose(each.pose.translation, before.translation + np.array([0.5, 0.0, 0.0]), atol=1e-9)
+
+
 TEMPTED = """<script>
 window.broken = [];
 addEventListener("securitypolicyviolation", (event) => window.broken.push(event.effectiveDirective));

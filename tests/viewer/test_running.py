@@ -114,7 +114,7 @@ def test_a_run_by_the_button_moves_the_arm_and_stops(browser: Browser, problem: 
 
 
 def test_an_obstacle_on_stated_poses_cannot_be_dragged_and_others_can(browser: Browser) -> None:
-    names = browser.ask("[...document.getElementById('plan-selected').options].map((each) => each.value)")
+    names = browser.ask("[...document.getElementById('plan-selected').options].map((each) => each.textContent)")
     assert names == ["start", "goal", "ball", "pillar"]
 
 

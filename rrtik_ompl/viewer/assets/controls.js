@@ -1,8 +1,8 @@
 // What a person sets beside the picture: what is selected, its numbers, planner, seed, undo.
 // The controls -----------------------------------------------------------------------------------------------------
-function select(name) {
-  selected = name;
-  document.getElementById("plan-selected").value = name;
+function select(thing) {
+  selected = thing;
+  document.getElementById("plan-selected").value = String(thing);
   showSelected();
 }
 
@@ -10,10 +10,10 @@ const fields = [];
 /** Sliders of an end's joints, or numbers of an obstacle's place. */
 function showSelected() {
   const table = document.getElementById("plan-fields");
-  if (table.dataset.shows !== selected) {
-    table.dataset.shows = selected;
+  if (table.dataset.shows !== String(selected)) {
+    table.dataset.shows = String(selected);
     fields.length = 0;
-    table.replaceChildren(...(ENDS[selected] ? jointFields() : placeFields()));
+    table.replaceChildren(...(isEnd(selected) ? jointFields() : placeFields()));
   }
   fields.forEach((show) => show());
 }
@@ -37,13 +37,13 @@ function jointFields() {
 
 /** A number that a person types; `set` gets it, `told` says what it is now. */
 function numberRow(text, unit, step, told, set, fault) {
-  const input = make("input", { type: "number", step, ariaLabel: `${selected}: ${text} in ${unit}` });
+  const input = make("input", { type: "number", step, ariaLabel: `${nameOf(selected)}: ${text} in ${unit}` });
   input.addEventListener("change", () => {
     const wanted = Number(input.value);
     const bad = input.value === "" || !Number.isFinite(wanted) ? "must be a number" : fault(wanted);
     if (bad) {
       showSelected();
-      planRefusal(`${selected}: ${text} ${bad}`);
+      planRefusal(`${nameOf(selected)}: ${text} ${bad}`);
       return;
     }
     remember();
@@ -57,7 +57,7 @@ function numberRow(text, unit, step, told, set, fault) {
 
 /** Where an obstacle is, how it is turned, how large it is. */
 function placeFields() {
-  const k = numberOf(selected);
+  const k = selected;
   const step = Number((0.01 * story.grid).toPrecision(1));
   const now = () => state.obstacles[k];
   const degrees = (radians) => (180 * radians) / Math.PI;
@@ -90,9 +90,9 @@ function showState() {
 }
 
 function fillSelection() {
-  const names = [...Object.keys(ENDS), ...planning.obstacles.filter((_, k) => isMovable(k)).map(({ name }) => name)];
-  document.getElementById("plan-selected").replaceChildren(...names.map((name) => make("option", { value: name, textContent: name })));
-  select(names.includes(selected) ? selected : "goal");
+  const things = [...ENDS.keys(), ...planning.obstacles.keys()].filter((thing) => isEnd(thing) || isMovable(thing));
+  document.getElementById("plan-selected").replaceChildren(...things.map((thing) => make("option", { value: String(thing), textContent: nameOf(thing) })));
+  select(things.includes(selected) ? selected : "goal");
 }
 
 function addShape(shape) {
@@ -102,15 +102,15 @@ function addShape(shape) {
   const tip = tipPosition(state.goal.map((value, j) => 0.5 * (value + state.start[j])));
   state.obstacles[k] = { pose: [1, 0, 0, tip.x, 0, 1, 0, tip.y, 0, 0, 1, tip.z, 0, 0, 0, 1], shown: true, sizes: planning.obstacles[k].first.sizes.slice() };
   applyObstacle(k);
-  selected = planning.obstacles[k].name;
+  selected = k;
   fillSelection();
   return changed();
 }
 
 function removeSelected() {
-  if (ENDS[selected]) return planRefusal("start and goal stay; select an obstacle to remove it");
+  if (isEnd(selected)) return planRefusal("start and goal stay; select an obstacle to remove it");
   remember();
-  const k = numberOf(selected);
+  const k = selected;
   state.obstacles[k].shown = false;
   applyObstacle(k);
   fillSelection();
@@ -132,7 +132,7 @@ function wireGoals() {
 
 function wireControls() {
   const on = (id, event, action) => document.getElementById(id).addEventListener(event, action);
-  on("plan-selected", "change", (event) => select(event.target.value));
+  on("plan-selected", "change", (event) => select(ENDS.has(event.target.value) ? event.target.value : Number(event.target.value)));
   on("plan-planner", "change", (event) => {
     remember();
     state.planner = event.target.value;

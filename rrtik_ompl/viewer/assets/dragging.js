@@ -47,7 +47,7 @@ function moveObstacle(k, shift, turn) {
 const numberOf = (name) => planning.obstacles.findIndex((obstacle) => obstacle.name === name);
 
 function moveSelected(shift, turn) {
-  const moved = ENDS[selected] ? moveEnd(selected, shift, turn) : (moveObstacle(numberOf(selected), shift, turn), true);
+  const moved = isEnd(selected) ? moveEnd(selected, shift, turn) : (moveObstacle(selected, shift, turn), true);
   if (moved) {
     showSelected();
     changed();
@@ -64,14 +64,14 @@ function pointerAt(event) {
 }
 
 function thingsToDrag() {
-  const ends = Object.keys(ENDS).map((end) => ({ name: end, object: node(ENDS[end]) }));
-  const solids = planning.obstacles.map((obstacle, k) => ({ name: obstacle.name, object: node("obstacles", obstacle.node), shown: isMovable(k) }));
+  const ends = [...ENDS].map(([end, ghost]) => ({ thing: end, object: node(ghost) }));
+  const solids = planning.obstacles.map((obstacle, k) => ({ thing: k, object: node("obstacles", obstacle.node), shown: isMovable(k) }));
   return [...ends, ...solids].filter(({ object, shown }) => shown !== false && object.visible);
 }
 
 function hitThing() {
-  const hits = thingsToDrag().flatMap(({ name, object }) => ray.intersectObject(object, true).slice(0, 1).map((hit) => ({ name, hit })));
-  const away = ({ name, hit }) => hit.distance - (ENDS[name] ? GHOSTS_FIRST * size : 0);
+  const hits = thingsToDrag().flatMap(({ thing, object }) => ray.intersectObject(object, true).slice(0, 1).map((hit) => ({ thing, name: nameOf(thing), hit })));
+  const away = ({ thing, hit }) => hit.distance - (isEnd(thing) ? GHOSTS_FIRST * size : 0);
   return hits.sort((a, b) => away(a) - away(b))[0];
 }
 
@@ -84,9 +84,9 @@ function startDrag(event) {
   event.stopPropagation();
   event.preventDefault();
   remember();
-  select(found.name);
+  select(found.thing);
   const { point } = found.hit;
-  if (ENDS[found.name]) held = tipOf(found.hit.object, state[found.name], new THREE.Vector3(point.x, -point.z, point.y));  // meshcat's picture has y up
+  if (isEnd(found.thing)) held = tipOf(found.hit.object, state[found.thing], new THREE.Vector3(point.x, -point.z, point.y));  // meshcat's picture has y up
   const away = viewer.camera.getWorldDirection(new THREE.Vector3());
   drag = { plane: new THREE.Plane().setFromNormalAndCoplanarPoint(away, found.hit.point), last: found.hit.point.clone(), x: event.clientX };
   pane.setPointerCapture(event.pointerId);

@@ -4,7 +4,10 @@ const LIVE_MILLISECONDS = 8;  // of shortening in one frame
 const AWAY = 1e3;  // [m] where removed obstacles stand
 const CLEARANCE_SAMPLES = 200;
 const UNDO_STEPS = 200;
-const ENDS = { start: "start ghost", goal: "goal ghost" };
+const ENDS = new Map([["start", "start ghost"], ["goal", "goal ghost"]]);
+// What can be selected: an end by its name, an obstacle by its number, as one may be called "goal" too.
+const isEnd = (thing) => ENDS.has(thing);
+const nameOf = (thing) => (isEnd(thing) ? thing : planning.obstacles[thing].name);
 let kernels = null;
 let state = null;  // { start, goal, planner, seed, obstacles: [{ pose, shown, sizes }] }
 let shortening = 0;  // number of the path that is being made shorter
@@ -25,7 +28,7 @@ const planRefusal = (text) => {
 
 // The picture ------------------------------------------------------------------------------------------------------
 function moveGhost(end, q, free) {
-  const name = ENDS[end];
+  const name = ENDS.get(end);
   const color = free ? story.colors[end] : "#c2185b";
   if (!viewer.scene_tree.find([...ROOT, name]).object.children.length) addGhost(name, color, q);
   for (const copy of node(name).children[0].children) {
@@ -148,7 +151,7 @@ function changed() {
 function plan() {
   shortening += 1;
   const begin = performance.now();
-  const blocked = Object.keys(ENDS).filter((end) => {
+  const blocked = [...ENDS.keys()].filter((end) => {
     const free = kernels.free(state[end]);
     moveGhost(end, state[end], free);
     return !free;

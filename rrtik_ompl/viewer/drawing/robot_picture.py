@@ -42,8 +42,12 @@ class Part:
 
 
 def node_name(name: str) -> str:
-    """A name that is one step of a path in the scene tree."""
-    return name.replace("/", "|") or "|"
+    """A name as one step of a path in the scene tree.
+
+    It begins with a colon, as the viewer keeps nodes in objects of JavaScript's, which have names such as
+    ``constructor`` of their own.
+    """
+    return ":" + name.replace("/", "|")
 
 
 def joint_nodes(robot: Robot) -> list[str]:
