@@ -34,6 +34,16 @@ def test_a_path_saved_with_its_proof_is_read_as_a_path_and_as_a_certificate(prob
     assert "certificate" not in json.loads(file.read_text())
 
 
+def test_a_zero_with_a_sign_is_a_zero(problem, tmp_path):
+    file = tmp_path / "path.json"
+    signed = rrtik.JointPath(problem.robot, [[0.0, -0.0, 0.0], [0.1, -0.0, 0.0]])
+    assert np.signbit(signed.waypoints[:, 1]).all()
+    signed.proved(problem.world).save(file, proof=True)
+    again = rrtik.load_path(file, problem.robot)
+    assert rrtik.verify_certificate(rrtik.load_certificate(file), problem.world, again.waypoints) == ""
+    assert rrtik.verify_certificate(rrtik.load_certificate(file), problem.world, signed.waypoints) == ""
+
+
 def test_a_certificate_may_be_asked_for_waypoints(problem, path):
     of_rows = rrtik.certificate_of(problem.world, path.waypoints.tolist(), path.proof.clearance)
     assert of_rows.document() == rrtik.certificate_of(problem.world, path, path.proof.clearance).document()
