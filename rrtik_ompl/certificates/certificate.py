@@ -110,7 +110,7 @@ class Certificate:
             "scene_digest": self.scene_digest,
             "clearance": self.clearance,
             "self_margin": self.self_margin,
-            "waypoints": (self.waypoints + 0.0).tolist(),  # as in a path's file: 0.0, not -0.0
+            "waypoints": self.waypoints.tolist(),
             "motions": motions,
         }
 

@@ -36,7 +36,7 @@ def test_a_path_saved_with_its_proof_is_read_as_a_path_and_as_a_certificate(prob
 
 def test_a_zero_with_a_sign_is_a_zero(problem, tmp_path):
     file = tmp_path / "path.json"
-    signed = rrtik.JointPath(problem.robot, [[0.0, -0.0, 0.0], [0.1, -0.0, 0.0]])
+    signed = rrtik.JointPath.of(problem.robot, [[0.0, -0.0, 0.0], [0.1, -0.0, 0.0]])
     assert np.signbit(signed.waypoints[:, 1]).all()
     signed.proved(problem.world).save(file, proof=True)
     again = rrtik.load_path(file, problem.robot)

@@ -1,6 +1,5 @@
 """What nobody holds any more is gone: living instances are counted after the examples of all public types."""
 
-import contextlib
 import doctest
 import gc
 import inspect
@@ -30,11 +29,11 @@ SHORT_OF_AN_EXAMPLE = {
     "GoalSet": "rrtik.GoalSet([rrtik.PositionGoal([1, 0, 0]), rrtik.PositionGoal([0, 1, 0])])",
     "IkResult": f"{REACH}\nrrtik.solve_ik(robot, rrtik.PositionGoal(robot.fk([0, 1, 0]).translation))",
     "IkTrajectory": f"{REACH}\nrrtik.solve_ik_trajectory(robot, [robot.fk([0, 1, 0]), robot.fk([0, 1.01, 0])])",
-    "JointPath": f"{REACH}\nrrtik.JointPath(robot, [[0, 0, 0], [0, 1, 0]]).length",
+    "JointPath": f"{REACH}\nrrtik.JointPath.of(robot, [[0, 0, 0], [0, 1, 0]]).length",
     "BenchmarkNotes": "from ompl import tools\n"
     "setup = rrtik.simple_setup(rrtik.load_problem('planar3_boxes'))\n"
     "rrtik.BenchmarkNotes(tools.Benchmark(setup))",
-    "Trajectory": f"{REACH}\nrrtik.time_parameterize(rrtik.JointPath(robot, [[0, 0, 0], [0, 1, 0]]))",
+    "Trajectory": f"{REACH}\nrrtik.time_parameterize(rrtik.JointPath.of(robot, [[0, 0, 0], [0, 1, 0]]), rrtik.RateLimits(1.0, 2.0, 20.0))",
 }
 
 
@@ -42,7 +41,7 @@ def example(name):
     """The statements of a public name's example."""
     text = inspect.getdoc(getattr(rrtik, name)) or ""
     shown = doctest.DocTestParser().get_examples(text)
-    run = (each.source for each in shown if not each.options.get(doctest.SKIP))
+    run = (each.source for each in shown if not each.options.get(doctest.SKIP) and each.exc_msg is None)
     return "".join(run) or SHORT_OF_AN_EXAMPLE.get(name, "")
 
 
@@ -57,13 +56,12 @@ def living():
 
 
 def run(code):
-    given = {"np": np, "rrtik": rrtik, "__name__": "example"}
-    with contextlib.suppress(rrtik.RrtikError):  # some examples show what is refused
-        exec(code, given)
+    exec(code, {"np": np, "rrtik": rrtik, "__name__": "example"})
 
 
 def test_every_public_type_has_an_example_to_be_counted_with():
-    assert [name for name in TYPES if not example(name)] == []
+    errors = {name for name in TYPES if issubclass(getattr(rrtik, name), BaseException)}
+    assert {name for name in TYPES if not example(name)} <= errors
 
 
 @pytest.mark.parametrize("name", [name for name in TYPES if example(name)])

@@ -63,7 +63,7 @@ def test_a_start_in_collision_is_shown_with_its_bodies_red(tmp_path, capsys):
     shown = Shown(world.robot, world.scene, None, start, contacts_along(world, start[None]))
     (told,) = story_of(subject_of(shown), draw(subject_of(shown))[1], "")["contacts"]
     assert "'prism_10'" in told["text"]
-    assert ["obstacles", "prism_10"] in told["nodes"]
+    assert ["obstacles", ":prism_10"] in told["nodes"]
 
 
 def test_a_robot_is_shown_alone_and_in_a_scene(tmp_path, capsys):
