@@ -17,10 +17,10 @@ from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
 from rrtik_ompl.collision.boxes import Boxes, PlacedBoxes
-from rrtik_ompl.collision.cloud_solid import cloud_gap, has_cloud
 from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, request
 from rrtik_ompl.collision.motion_bound import approach_weights
+from rrtik_ompl.collision.own_distances import is_ours, own_gap
 from rrtik_ompl.robot import Robot
 
 MAX_PAIR_CHECKS = 1 << 16  # runs of rows times pairs checked together, to bound memory
@@ -177,8 +177,8 @@ def distance(
     """
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
     ends, result = (first, transforms[0], second, transforms[1]), coal.CollisionResult()
-    if has_cloud(ends):
-        return cloud_gap(ends, margin)
+    if is_ours(ends):
+        return own_gap(ends, margin)
     if coal.collide(*ends, request(margin), result):
         return None
     return float(result.distance_lower_bound)

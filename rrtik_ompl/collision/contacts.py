@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.cloud_solid import Ends, cloud_gap, has_cloud, nearest_of_cloud
+from rrtik_ompl.collision.cloud_solid import Ends
 from rrtik_ompl.collision.margins import kept_apart, request
+from rrtik_ompl.collision.own_distances import is_ours, own_gap, own_nearest
 from rrtik_ompl.collision.solids import is_mesh
 from rrtik_ompl.copies import as_value, in_one_line
 
@@ -82,8 +83,8 @@ def measured(
 
 def _near(ends: Ends, margin: float) -> bool:
     """Whether two geometries touch or come nearer than a margin [m]."""
-    if has_cloud(ends):
-        return cloud_gap(ends, margin) is None
+    if is_ours(ends):
+        return own_gap(ends, margin) is None
     return bool(coal.collide(*ends, request(margin), coal.CollisionResult()))
 
 
@@ -95,8 +96,8 @@ def inside(first: str, second: str) -> Contact:
 
 def _distance(ends: Ends, *, depth: bool) -> tuple[float, Vector, Vector]:
     """Signed distance of two geometries at their places [m], and the points that it is between."""
-    if has_cloud(ends):
-        return nearest_of_cloud(ends)
+    if is_ours(ends):
+        return own_nearest(ends)
     touching, result = coal.CollisionResult(), coal.DistanceResult()
     distance = float(coal.distance(*ends, coal.DistanceRequest(), result))
     meshes = depth and distance <= 0.0 and is_mesh(ends[0]) and is_mesh(ends[2])

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.body_arrays import body_arrays
-from rrtik_ompl.collision.cloud_solid import cloud_gap, has_cloud
 from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
+from rrtik_ompl.collision.own_distances import is_ours, own_gap
 from rrtik_ompl.collision.solids import around
 from rrtik_ompl.copies import Items, Once, shallow_copy
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
@@ -204,8 +204,8 @@ def distance(first: Any, first_pose: Any, second: Any, second_pose: Any, margin:
     checked first: where those are apart, the meshes are.
     """
     ends = first, first_pose, second, second_pose
-    if has_cloud(ends):
-        return cloud_gap(ends, margin)
+    if is_ours(ends):
+        return own_gap(ends, margin)
     result = coal.CollisionResult()
     hulls = around(first), around(second)
     if not coal.collide(hulls[0], first_pose, hulls[1], second_pose, request(margin), result):

@@ -33,7 +33,8 @@ SHORT_OF_AN_EXAMPLE = {
     "BenchmarkNotes": "from ompl import tools\n"
     "setup = rrtik.simple_setup(rrtik.load_problem('planar3_boxes'))\n"
     "rrtik.BenchmarkNotes(tools.Benchmark(setup))",
-    "Trajectory": f"{REACH}\nrrtik.time_parameterize(rrtik.JointPath.of(robot, [[0, 0, 0], [0, 1, 0]]), rrtik.RateLimits(1.0, 2.0, 20.0))",
+    "Trajectory": f"{REACH}\npath = rrtik.JointPath.of(robot, [[0, 0, 0], [0, 1, 0]])\n"
+    "rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 2.0, 20.0))",
 }
 
 

@@ -41,8 +41,8 @@ def test_fingers_are_where_the_robot_of_each_motion_has_them(closing):
     assert plan.found, plan.reason
     subject = subject_of_task(world, plan)
     poses = {name: rows for (_, name), rows in subject.fingers.poses.items()}
-    assert poses.keys() == {"left_0", "right_0"}
-    for name, sign in (("left_0", 1.0), ("right_0", -1.0)):
+    assert poses.keys() == {":left_0", ":right_0"}
+    for name, sign in ((":left_0", 1.0), (":right_0", -1.0)):
         assert np.allclose(poses[name], [[0, 0, 0, 0, 0, 0, 1], [-0.4 * sign, 0, 0, 0, 0, 0, 1]], atol=1e-12)
     at, clock = subject.fingers.at, subject.run.times
     (begin, end), begins = rrtik.time_task(plan).pauses[0], rrtik.time_task(plan).begins

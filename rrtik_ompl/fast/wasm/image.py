@@ -1,7 +1,8 @@
 """Tables as an image of another memory: every table and array gets a place there, and fields that point move along.
 
-Which fields point is said, not guessed: to an array of the table itself or to a part of it (the table knows), to another
-table or an array that belongs to nobody (``links``), to where another field of the same table points (``same``).
+Which fields point is said, not guessed: to an array of the table itself or to a part of it (the table knows), to
+another table or an array that belongs to nobody (``links``), to where another field of the same table points
+(``same``).
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ class MemoryImage:
         return whole.tobytes()
 
     def _add_pointing(self, array: NDArray[Any], there: Mapping[int, int]) -> int:
-        """Add an array of a table; one that holds the addresses of the table's parts holds those of the other memory."""
+        """Add an array of a table; addresses of the table's parts in it become those of the other memory."""
         addresses = array.tolist() if there and array.dtype == np.int64 else []
         if not addresses or not there.keys() >= set(addresses):
             return self.add(array)
