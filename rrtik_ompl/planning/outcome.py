@@ -42,7 +42,8 @@ class Plan:
     Attributes:
         found: Whether there is a path.
         path: The path, or None.
-        reason: "" if found, else a line that says why not.
+        reason: A line that says why there is no path or, where not all of it is proven free, which two bodies are not
+            proven apart, where, and how far they are apart there; else "".
         seconds: Wall time of everything: planning, restarts and re-checks [s]; without what it took to count how
             large an OMPL planner's graph has become.
         planner: Name of the planner; with "auto" of the one that found the path, or that tried last.
@@ -70,6 +71,11 @@ class Plan:
     problem: Problem | None = field(default=None, repr=False)
 
     __repr__, _repr_html_ = in_one_line, in_notebook
+
+    def __post_init__(self) -> None:
+        if self.path is not None:
+            gaps = () if self.path.proof is None else self.path.proof.unproven
+            object.__setattr__(self, "reason", f"not proven free: {gaps[0]}" if gaps else "")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return as_value(replace(self, problem=None))

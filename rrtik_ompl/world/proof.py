@@ -73,7 +73,9 @@ class Gap:
     def __str__(self) -> str:
         if not self.second:
             return f"motion {self.motion}: {self.first or 'not looked at'}"
-        return f"motion {self.motion} at {self.share:.4f} of it: '{self.first}' and '{self.second}'"
+        text = f"motion {self.motion} at {self.share:.4f} of it: '{self.first}' and '{self.second}'"
+        distance = self.distance
+        return f"{text}, {1e3 * distance:.4g} mm apart" if distance >= 0.0 else text
 
 
 @dataclass(frozen=True, slots=True)

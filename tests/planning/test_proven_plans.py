@@ -1,6 +1,7 @@
 """plan(): proven paths, detours, clearances, and what is said where nothing can be proven."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -126,7 +127,11 @@ def test_bodies_that_touch_are_named_with_the_remedy():
     """A disc that stands on a wall, five nanometres above it."""
     world = disc_world((5.0, 2.0 - 0.3 - 0.5 - 5e-9, 8.0, 1.0))
     problem = rrtik.Problem(world, [2.0, 2.0], [8.0, 5.0])
-    assert plan(problem, "RRTConnect", seed=1).proven is False
+    found = plan(problem, "RRTConnect", seed=1)
+    assert found.proven is False
+    assert re.fullmatch(r"not proven free: motion 0 at 0.\d+ of it: 'disc' and 'box0', .* mm apart", found.reason)
+    assert "not proven free: motion 0" in repr(found)
+    assert plan(problem, "RRTConnect", seed=1, proof="off").reason == ""
     refused = plan(problem, "RRTConnect", seed=1, proof="required")
     assert not refused.found
     assert "touch; list the pair in allowed_collisions" in refused.reason
