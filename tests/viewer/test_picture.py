@@ -24,6 +24,7 @@ from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.viewer.drawing.framing import frame_around
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin
 from rrtik_ompl.viewer.drawing.objects import TriangleGeometry
+from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.drawing.viewpoint import behind, overview
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
@@ -71,7 +72,7 @@ def test_margins_are_drawn_with_their_obstacles_and_told(crane: Robot) -> None:
     subject = subject_of(problem(crane, Scene(obstacles)), WAYPOINTS)
     window, _ = draw(subject)
     drawn = {path.split("/")[3] for path in window.paths if path.endswith("/margin")}
-    assert drawn == {"box", "can"}
+    assert drawn == {":box", ":can"}
     told = story(page(problem(crane, Scene(obstacles)), WAYPOINTS))["obstacles"]
     assert [(o["margin"], o["margin_drawn"]) for o in told] == [(0.05, True), (0.02, True), (0.0, False), (0.1, False)]
 
@@ -87,10 +88,11 @@ def test_every_solid_is_in_the_picture(crane: Robot, scene: Scene) -> None:
     window, _ = draw(subject_of(problem(crane, scene), WAYPOINTS))
     paths = set(window.paths)
     drawn = {path.split("/")[3] for path in paths if path.startswith("/meshcat/obstacles/")}
-    assert drawn == {o.name.replace("/", "|") for o in scene.obstacles}
-    assert "/meshcat/robot/spin/attached hook" in paths
-    assert {p.split("/")[3] for p in paths if p.startswith("/meshcat/robot/")} == set(crane.model.names)
-    assert {p.split("/")[3] for p in paths if p.startswith("/meshcat/later/")} == {"buoy", "door"}
+    assert drawn == {node_name(o.name) for o in scene.obstacles}
+    assert "/meshcat/robot/:spin/:attached hook" in paths
+    joints = {path.split("/")[3] for path in paths if path.startswith("/meshcat/robot/")}
+    assert joints == {node_name(name) for name in crane.model.names}
+    assert {p.split("/")[3] for p in paths if p.startswith("/meshcat/later/")} == {":buoy", ":door"}
     assert {p for p in paths if p.startswith("/meshcat/trail/")} == {f"/meshcat/trail/piece {k}" for k in (0, 1, 3)}
 
 
