@@ -27,7 +27,7 @@ def scans(count: int) -> list[list[float]]:
     told = []
     for number in range(count):
         points = rng.normal(MIDDLE, 0.05, (POINTS, 3))
-        world = World(robot, Scene([Obstacle("scan", PointCloud(points, radius=0.005))]))
+        world = World(robot, Scene((Obstacle("scan", PointCloud(points, radius=0.005)),)))
         if world.valid(start) and world.valid(goal):
             plan(Problem(world, start, goal), seed=0)
         if number % EVERY == EVERY - 1 or number == count - 1:

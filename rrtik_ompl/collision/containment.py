@@ -159,7 +159,7 @@ def _end_points(geometries: Sequence[Any], halves: Matrix) -> NDArray[np.float64
 
 
 @once_per_geometry
-def _extremes(geometry: Any) -> Matrix:
+def _extremes(geometry: coal.CollisionGeometry) -> Matrix:
     """The vertices of a mesh or a convex solid that are farthest along the axes, shape (6, 3); 0 of other kinds."""
     if is_mesh(geometry):
         vertices, triangles = mesh_arrays(geometry)

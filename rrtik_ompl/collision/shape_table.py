@@ -259,19 +259,19 @@ def sizes_of(geometry: Any) -> Vector | None:
     return None if row is None else row.sizes(geometry)
 
 
-def has_core(geometry: Any) -> bool:
+def has_core(geometry: coal.CollisionGeometry) -> bool:
     """Whether a coal geometry has one of the simple cores."""
     row = _BY_GEOMETRY.get(type(geometry))
     return row is not None and row.core is not None
 
 
-def core_of(geometry: Any) -> Core | None:
+def core_of(geometry: coal.CollisionGeometry) -> Core | None:
     """The core of a coal geometry; None if it has none of the simple ones."""
     return _core(geometry) if has_core(geometry) else None
 
 
 @once_per_geometry  # a solid that moves keeps its own
-def _core(geometry: Any) -> Core:
+def _core(geometry: coal.CollisionGeometry) -> Core:
     row = _BY_GEOMETRY[type(geometry)]
     assert row.core is not None
     return row.core(*row.sizes(geometry).tolist())

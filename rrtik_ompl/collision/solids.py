@@ -37,7 +37,7 @@ def once_per_geometry(find: Callable[[Any], Found]) -> Callable[[Any], Found]:
     known: dict[int, tuple[weakref.ref[Any], Found]] = {}
 
     @wraps(find)
-    def found(geometry: Any) -> Found:
+    def found(geometry: coal.CollisionGeometry) -> Found:
         key = id(geometry)
         if key in known:
             return known[key][1]
@@ -102,7 +102,7 @@ def fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
 
 
 @once_per_geometry
-def _fills_its_hull(geometry: Any) -> bool:
+def _fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
     solid = around(geometry)
     if is_mesh(solid):  # which is flat
         return False
@@ -126,7 +126,7 @@ def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -
     return float((tops[nearest, None] - np.einsum("tcj,tj->tc", corners, normals[nearest])).max())
 
 
-def is_mesh(geometry: Any) -> bool:
+def is_mesh(geometry: coal.CollisionGeometry) -> bool:
     """Whether a coal geometry is a hollow triangle mesh (everything else is solid)."""
     return isinstance(geometry, coal.BVHModelBase)
 
@@ -137,14 +137,14 @@ def of_each(geometries: Iterable[Any], find: Callable[[Any], Found]) -> list[Fou
     return [known[key] if (key := id(each)) in known else known.setdefault(key, find(each)) for each in geometries]
 
 
-def around(geometry: Any) -> Any:
+def around(geometry: coal.CollisionGeometry) -> Any:
     """A convex solid that contains a coal geometry: a mesh's hull (the mesh, if it is flat), a solid itself."""
     found = _hull_of_mesh(geometry) if is_mesh(geometry) else None
     return geometry if found is None else found
 
 
 @once_per_geometry
-def _hull_of_mesh(mesh: Any) -> Any:
+def _hull_of_mesh(mesh: coal.CollisionGeometry) -> coal.CollisionGeometry | None:
     """The convex hull of a mesh; None if it is flat."""
     vertices, triangles = mesh_arrays(mesh)
     used = vertices[distinct(triangles)]
@@ -154,7 +154,7 @@ def _hull_of_mesh(mesh: Any) -> Any:
 
 
 @once_per_geometry  # coal hands out one triangle at a time
-def mesh_arrays(geometry: Any) -> tuple[Matrix, NDArray[np.int64]]:
+def mesh_arrays(geometry: coal.CollisionGeometry) -> tuple[Matrix, NDArray[np.int64]]:
     """Vertices, shape (n, 3), and triangles, shape (m, 3), of a coal mesh, read-only."""
     vertices = np.array(geometry.vertices(), dtype=np.float64).reshape(-1, 3)
     corners = (geometry.tri_indices(k) for k in range(geometry.num_tris))
@@ -185,7 +185,7 @@ def face_normals(points: Matrix, triangles: NDArray[np.int64]) -> tuple[Matrix, 
 
 
 @once_per_geometry
-def is_closed(geometry: Any) -> bool:
+def is_closed(geometry: coal.CollisionGeometry) -> bool:
     """Whether a coal mesh has an inside: every edge is passed as often one way as the other.
 
     Then winding numbers are whole, and change only where the surface is crossed.

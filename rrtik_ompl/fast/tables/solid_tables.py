@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import coal
 import numpy as np
@@ -95,7 +94,7 @@ NO_SOLIDS = Solids()
 
 
 @once_per_geometry
-def convex_solids(geometry: Any) -> Solids:
+def convex_solids(geometry: coal.CollisionGeometry) -> Solids:
     """Convex solids around and inside a coal geometry, in its frame; none for a kind that is not known here."""
     if isinstance(geometry, CloudSolid):
         return _cloud(geometry)
@@ -115,7 +114,7 @@ def _cloud(solid: CloudSolid) -> Solids:
     return Solids((every,), (every,))
 
 
-def _own_solid(solid: Any) -> ConvexSolid | None:
+def _own_solid(solid: coal.CollisionGeometry) -> ConvexSolid | None:
     """A convex geometry itself."""
     if isinstance(solid, coal.Halfspace):
         if solid.getSweptSphereRadius() != 0.0:
