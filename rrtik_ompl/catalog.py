@@ -29,6 +29,7 @@ from rrtik_ompl.description.padding import padded
 from rrtik_ompl.description.robot_cache import RobotCache
 from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
+from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.robot import Robot
@@ -41,6 +42,7 @@ RobotOption: TypeAlias = (
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
 FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
 PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
+OF_CALLERS = ("trust_xacro", "xacro_limits")  # which no file may give
 OF_ALL: Mapping[str, Callable[..., Robot]] = {"padding": padded, "joint_weights": weighted}  # options of any robot
 MOUNTING = ("base_pose", "tip", *OF_ALL)  # keys that stand beside that group
 
@@ -127,12 +129,21 @@ def task_files() -> dict[str, Path]:
     return _shipped("problem", "problems", "tasks/")
 
 
-def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
+def load_robot(
+    name: str | os.PathLike[str],
+    *,
+    trust_xacro: bool = False,
+    xacro_limits: Mapping[str, float] | None = None,
+    **options: RobotOption,
+) -> Robot:
     """Load a robot by name or from a file; the same call gives the same object, unless a file of it has changed.
 
     Args:
         name: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
             xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt configuration folder.
+        trust_xacro: Whether the expressions of macros go to xacro's own evaluator, which can run anything, and macros
+            may read files anywhere. Without it expressions that are not on a list are refused.
+        xacro_limits: What the expansion of macros may take: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
         **options: What the robot takes: any ``padding`` (see `rrtik_ompl.padded`) and ``joint_weights`` (`weighted`),
             and ``base_pose``, ``tip`` and ``locked`` where they apply; a URDF ``srdf, group, joints, joint_limits,
             packages, xacro_args``, a folder also ``urdf``; a shipped robot for instance ``limits="envelope"``.
@@ -153,7 +164,8 @@ def load_robot(name: str | os.PathLike[str], **options: RobotOption) -> Robot:
     key = json.dumps([recipe.target, plain(given)], sort_keys=True, default=repr)
     cached = _cache.get(key)
     if cached is None:
-        robot = recipe.make(**{option: value for option, value in given.items() if option not in OF_ALL})
+        with expanding(trusted=trust_xacro, limits=xacro_limits):
+            robot = recipe.make(**{option: value for option, value in given.items() if option not in OF_ALL})
         for option, of_all in OF_ALL.items():
             robot = of_all(robot, given[option]) if option in given else robot
         files = [recipe.target, *_paths(given), *_paths(robot.source)]
@@ -177,6 +189,7 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
     kinds = ("name", "moveit", "mjcf", "urdf", "dh", *PARAMETRIC)
     if not isinstance(entry, Mapping):
         raise InputError(f"robot: expected a name or one of the keys {', '.join(kinds)}")
+    _refuse_words_of_callers(entry)
     found = [key for key in kinds if key in entry and not (key == "urdf" and "moveit" in entry)]
     if len(found) != 1:
         raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {', '.join(found) or 'none'}")
@@ -190,6 +203,12 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
     if not isinstance(target, str):
         raise InputError(f"robot: {kind}: expected text, found {target!r}")
     return load_robot(target if kind == "name" else _beside(target, folder), **options)
+
+
+def _refuse_words_of_callers(entry: Mapping[str, object]) -> None:
+    for key in OF_CALLERS:
+        if key in entry:
+            raise InputError(f"robot: {key} is for whoever opens the file to give, not for the file; take it out")
 
 
 @dataclass(frozen=True, slots=True)

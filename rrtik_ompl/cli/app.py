@@ -24,6 +24,7 @@ from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.task import straight, task
 from rrtik_ompl.cli.terminal import ProblemName, command, drop_output, prepare_terminal, say, stoppable, suggest
+from rrtik_ompl.cli.trust import with_trust
 from rrtik_ompl.errors import RrtikError, printable
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
@@ -209,6 +210,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "warmup": warmup,
     "convert": convert,
 }
+OPEN_NO_FILES = ("reproduce", "bench", "list", "warmup")  # of robots; what `bench` opens, it opens in other processes
 HELP = "Plan collision-free paths for robot arms.\n\nExit 0: found or valid; 1: not; 2: bad input; 130: interrupted."
 MARKERS = "markers"  # a group of commands
 
@@ -223,7 +225,7 @@ def command_line(given: list[str]) -> typer.Typer:
         if name == MARKERS:
             app.add_typer(markers, name=name)
         else:
-            app.command(name)(COMMANDS[name])
+            app.command(name)(COMMANDS[name] if name in OPEN_NO_FILES else with_trust(COMMANDS[name]))
     return app
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.cli.trust import with_trust
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
 
@@ -150,6 +151,7 @@ def _tell(found: Calibration, names: list[str]) -> None:
 
 
 @markers.command("sense")
+@with_trust
 def sense(
     source: Annotated[
         list[str],

@@ -1,18 +1,86 @@
-"""Xacro: macros of XML, expanded by the package xacro, which need not be installed."""
+"""Xacro: macros of XML, expanded by the package xacro, which need not be installed, in a process with limits."""
 
 from __future__ import annotations
 
-import io
+import json
+import os
+import signal
+import subprocess
+import sys
 import threading
-from collections.abc import Iterable, Mapping
-from contextlib import redirect_stderr
+from collections import OrderedDict
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
-from rrtik_ompl.description.package_path import package_folder
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.files.text import read_text
+from rrtik_ompl.arrays import positive
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.files.text import MAX_BYTES, read_text
 
-_lock = threading.Lock()  # the package keeps the files and macros that it is at in globals
+CHILD = Path(__file__).with_name("xacro_child.py")
+MORE = 'give xacro_limits={"seconds": .., "gigabytes": ..}'
+MOST_KEPT = 32  # expanded texts
+
+
+@dataclass(frozen=True, slots=True)
+class Expansion:
+    """How macros are expanded.
+
+    Attributes:
+        trusted: Whether their expressions go to xacro's own evaluator, which can run anything.
+        seconds: The most time that an expansion may take, of the processor and by the clock [s].
+        gigabytes: The most memory that it may take [1e9 bytes].
+    """
+
+    trusted: bool = False
+    seconds: float = 10.0
+    gigabytes: float = 1.0
+
+
+_expansion: ContextVar[Expansion] = ContextVar("expansion", default=Expansion())  # noqa: B039 - it is frozen
+_lock = threading.Lock()
+_kept: OrderedDict[str, _Kept] = OrderedDict()
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """An expanded text, and the files that it came from with their times and sizes."""
+
+    text: str
+    files: tuple[str, ...]
+    stamps: tuple[tuple[int, int] | None, ...]
+
+
+@contextmanager
+def expanding(*, trusted: bool = False, limits: Mapping[str, float] | None = None) -> Iterator[None]:
+    """How macros are expanded inside the ``with`` block, in this thread: by trust, and with limits of the caller's own.
+
+    Only a caller says so, never a file. What an outer block says holds inside as well.
+
+    Args:
+        trusted: Whether expressions go to xacro's own evaluator, and files anywhere are read.
+        limits: ``{"seconds": 60, "gigabytes": 4}`` or one of these.
+
+    Raises:
+        InputError: If a value makes no sense.
+    """
+    outer = _expansion.get()
+    if not isinstance(trusted, bool):
+        raise InputError(f"trust_xacro: expected True or False, got {trusted!r}")
+    own = {"seconds": outer.seconds, "gigabytes": outer.gigabytes}
+    for key, value in (limits or {}).items():
+        if key not in own:
+            raise UnknownNameError("key", key, own, where="xacro_limits")
+        own[key] = positive(value, f"xacro_limits: {key}")
+    token = _expansion.set(Expansion(trusted or outer.trusted, **own))
+    try:
+        yield
+    finally:
+        _expansion.reset(token)
 
 
 def is_xacro(path: Path) -> bool:
@@ -24,6 +92,8 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
     """Text of a URDF or SRDF file, its macros expanded if it is named ``.xacro``.
 
     ``$(find NAME)`` is a folder of that name in ``packages``, or in a folder above the file; else what ROS finds.
+    A file is expanded in a process of its own, as `expanding` says; where nothing has changed since, that is not
+    done again.
 
     Args:
         path: The file.
@@ -31,43 +101,84 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
         arguments: Of the macros, as behind the command xacro: ``{"ur_type": "ur5e"}``.
 
     Raises:
-        InputError: If the file cannot be read or expanded, or the package xacro is not installed.
+        InputError: If the file cannot be read or expanded, holds an expression that is not on the list, reads a file
+            elsewhere, takes too long or too much, or the package xacro is not installed.
     """
     if not is_xacro(path):
         if arguments:
             raise InputError(f"{path}: xacro_args are for files named .xacro; leave them out")
         return read_text(path)
     read_text(path)  # which says what is wrong with the file itself
-    try:
-        import xacro
-        from xacro import substitution_args
-    except ImportError:
+    words = {str(key): str(value) for key, value in (arguments or {}).items()}
+    roots = [str(each) for each in packages]
+    key = json.dumps([str(path), os.getcwd(), roots, words, dict(os.environ)], sort_keys=True)
+    with _lock:
+        kept = _kept.get(key)
+    if kept is not None and kept.stamps == _stamps(kept.files):
+        return kept.text
+    if find_spec("xacro") is None:
         expanded = f"{path.stem.removesuffix('.urdf')}.urdf"  # by this ending it is read
         raise InputError(
             f"{path}: holds macros, and the package xacro is not installed: pip install xacro, "
             f"or expand it by hand: xacro {path.name} > {expanded}"
-        ) from None
-    roots, folder, usual = list(packages), path.resolve().parent, substitution_args._eval_find
-
-    def find(name: str) -> str:
-        found = package_folder(name, folder, roots)
-        if found is None:
-            try:
-                return str(usual(name))
-            except ImportError:
-                raise LookupError(f"package '{name}' is not found; give packages=[the folder that holds it]") from None
-        return str(found)
-
-    with _lock, redirect_stderr(io.StringIO()):
-        substitution_args._eval_find = substitution_args._eval_dict["find"] = find
-        try:
-            words = {str(key): str(value) for key, value in (arguments or {}).items()}
-            return str(xacro.process_file(str(path), mappings=words).toxml())
-        except (Exception, SystemExit) as error:  # of anything that a macro may do
-            said = " ".join(str(error).split()) or type(error).__name__
-            raise InputError(f"{path}: xacro: {said.removeprefix(_FOREIGN)}") from None
-        finally:
-            substitution_args._eval_find = substitution_args._eval_dict["find"] = usual
+        )
+    answer = _expanded(path, roots, words, _expansion.get())
+    files = tuple(dict.fromkeys(answer["files"]))
+    with _lock:
+        _kept[key] = _Kept(answer["text"], files, _stamps(files))
+        if len(_kept) > MOST_KEPT:
+            _kept.popitem(last=False)
+    return str(answer["text"])
 
 
-_FOREIGN = "<class 'LookupError'>: "  # how xacro passes on an error of a search for a package
+def _expanded(path: Path, packages: list[str], words: Mapping[str, str], expansion: Expansion) -> dict[str, Any]:
+    """What the process answers that expands the macros: ``{"text": .., "files": [..]}``."""
+    job = {
+        "path": [*filter(None, sys.path), str(Path(__file__).parents[2])],
+        "file": str(path),
+        "packages": packages,
+        "arguments": words,
+        "trust": expansion.trusted,
+        "seconds": expansion.seconds,
+        "bytes": expansion.gigabytes * 1e9,
+        "longest": MAX_BYTES,
+        "more": MORE,
+    }
+    environment = os.environ | {"PYTHONHASHSEED": "0"}  # sets are in the same order each time
+    slow = f"{path}: xacro: takes more than {expansion.seconds:g} s; does a macro call itself? else {MORE}"
+    try:
+        done = subprocess.run(
+            [sys.executable, str(CHILD)],
+            input=json.dumps(job).encode(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=expansion.seconds,
+            env=environment,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise InputError(slow) from None
+    except OSError as error:
+        raise InputError(f"{path}: no process could be started to expand it: {error.strerror or error}") from None
+    if done.returncode == -getattr(signal, "SIGXCPU", 0):
+        raise InputError(slow)
+    try:
+        answer: dict[str, Any] = json.loads(done.stdout)
+    except ValueError:
+        raise InputError(f"{path}: xacro: its process ended with code {done.returncode}; expand it by hand") from None
+    if "error" in answer:
+        raise InputError(f"{answer.get('where') or path}: xacro: {answer['error']}")
+    return answer
+
+
+def _stamps(files: Iterable[str]) -> tuple[tuple[int, int] | None, ...]:
+    """Time and size of each file; None for one that is gone."""
+    return tuple(_stamp(file) for file in files)
+
+
+def _stamp(file: str) -> tuple[int, int] | None:
+    try:
+        state = os.stat(file)
+    except (OSError, ValueError):
+        return None
+    return state.st_mtime_ns, state.st_size

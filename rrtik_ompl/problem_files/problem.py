@@ -15,6 +15,7 @@ from pydantic import Field
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import find_problem, list_planners, load_robot, robot_from_entry, task_files
+from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError, require
 from rrtik_ompl.files.sections import NotNegative, Positive, Section, Version, parse, without_null
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
@@ -61,12 +62,15 @@ class ProblemFile(Section):
     run: RunSection | None = Field(None, description="how to replan while the obstacles move (rrtik replan)")
 
 
-def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = None) -> Problem:
+def load_problem(
+    name_or_file: FilePath, *, robot: Robot | FilePath | None = None, trust_xacro: bool = False
+) -> Problem:
     """Load a shipped problem by name, a problem file, or a MotionBenchMaker pair by one of its two files.
 
     Args:
         name_or_file: A name without ending and folder, or a path.
         robot: Plan for this robot (or its name, or its URDF) in place of the one that the file names.
+        trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
@@ -77,6 +81,11 @@ def load_problem(name_or_file: FilePath, *, robot: Robot | FilePath | None = Non
         >>> problem.planner, problem.robot.dof
         ('bicrdt', 6)
     """
+    with expanding(trusted=trust_xacro):
+        return _problem(name_or_file, robot)
+
+
+def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
     path = problem_path(name_or_file)
     document = _read(path)
     if _is_motion_bench_maker(document.data):

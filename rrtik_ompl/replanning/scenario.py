@@ -66,8 +66,12 @@ class Scenario:
         return replan_with(settings, self.problem, scene_feed, goal_feed=self.goal_feed, record=record, clock=clock)
 
 
-def load_scenario(name_or_file: str | os.PathLike[str]) -> Scenario:
+def load_scenario(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = False) -> Scenario:
     """Load a shipped scenario by name, or from a problem file that has a ``run:`` section.
+
+    Args:
+        name_or_file: A name, or a path.
+        trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
 
     Raises:
         InputError: If the file cannot be used or has no such section; one line with file, key and remedy.
@@ -82,7 +86,7 @@ def load_scenario(name_or_file: str | os.PathLike[str]) -> Scenario:
     entry = parse(document, ProblemFile).run
     if entry is None:
         raise InputError(f"{path}: a scenario needs the key 'run'; add for instance  run: {{step: 0.05, rate: 50}}")
-    problem = load_problem(path)
+    problem = load_problem(path, trust_xacro=trust_xacro)
     with document.at(("run",)):
         return Scenario(problem, _settings(entry, problem.robot), entry.goal_motion(problem.robot))
 

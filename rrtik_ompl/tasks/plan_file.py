@@ -12,6 +12,7 @@ from pydantic import Field
 
 from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.catalog import robot_from_entry
+from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.sections import Name, NotNegative, Numbers, Positive, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
@@ -95,8 +96,12 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
     write_text(file, json.dumps(document, allow_nan=False))
 
 
-def load_task_plan(file: str | os.PathLike[str]) -> TaskPlan:
+def load_task_plan(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> TaskPlan:
     """Read a plan that :func:`save_task_plan` has written; its motions have no proofs.
+
+    Args:
+        file: The path.
+        trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
 
     Raises:
         InputError: If the file is missing, malformed, or its parts do not fit each other.
@@ -108,6 +113,11 @@ def load_task_plan(file: str | os.PathLike[str]) -> TaskPlan:
         >>> len(rrtik.load_task_plan("task.json").paths) == len(plan.paths)
         True
     """
+    with expanding(trusted=trust_xacro):
+        return _task_plan(file)
+
+
+def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
     document = read_yaml(file_name(file))
     entry = parse(document, TaskPlanFile)
     worlds: list[World] = []

@@ -14,6 +14,7 @@ from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import list_problems, robot_from_entry, task_files
+from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.sections import (
     Name,
@@ -200,8 +201,12 @@ def list_tasks() -> tuple[str, ...]:
     return tuple(sorted(task_files()))
 
 
-def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
+def load_task(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = False) -> LoadedTask:
     """Load a shipped task by name, or a task file.
+
+    Args:
+        name_or_file: A name, or a path.
+        trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
 
     Raises:
         UnknownNameError: If it is a bare word, and no name.
@@ -213,6 +218,11 @@ def load_task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
         >>> plan.found, len(plan.paths) == len(plan.worlds)
         (True, True)
     """
+    with expanding(trusted=trust_xacro):
+        return _task(name_or_file)
+
+
+def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
     path = file_name(name_or_file)
     if isinstance(name_or_file, str) and not path.suffix and len(path.parts) == 1:
         shipped = task_files()

@@ -1,0 +1,263 @@
+"""The process in which macros are expanded: it evaluates nothing that is not on a list, and reads few files.
+
+It is started as a script, gets its work as JSON on its standard input, and answers in JSON on its standard output.
+"""
+
+from __future__ import annotations
+
+import builtins
+import html
+import json
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+TRUST = "if you trust whoever wrote it, give trust_xacro=True (--trust-xacro)"
+Package: TypeAlias = Any  # xacro, which has no types
+Value: TypeAlias = Any  # of an expression
+READABLE = (".xacro", ".urdf", ".srdf", ".xml", ".yaml", ".yml")  # of folders around that do not say they are packages
+MACRO_FUNCTIONS = (
+    "abs_filename", "arg", "dotify", "error", "fatal", "load_yaml", "message", "print_location", "tokenize", "warning",
+)  # fmt: skip
+FORBIDDEN = re.compile(
+    r"os\.(exec|fork|forkpty|posix_spawn|spawn|startfile|system|kill|remove|rename|rmdir|mkdir|link|symlink|truncate"
+    r"|chmod|chown|putenv)|subprocess\.|shutil\.|socket\.|ctypes\.|pty\.|webbrowser\.|urllib\.|ftplib\."
+)  # what Python reports of itself
+
+
+class Places:
+    """Which files macros may read, where packages are, and where in the files an expression stands."""
+
+    def __init__(self, file: str, packages: Iterable[str]) -> None:
+        real = Path(file).resolve()
+        self.folder = real.parent
+        self.packages = [Path(each) for each in packages]
+        own = _package_of(real)
+        self.roots = [*self.packages] if own is None else [own, *self.packages]
+        self.beside = [self.folder, Path(file).absolute().parent]
+        home = own or self.folder
+        users = Path.home()  # neither all that the user has nor the whole disk is a robot's
+        self.near = [folder for folder in (home, *list(home.parents)[:2]) if not users.is_relative_to(folder)]
+        self.read: list[str] = []
+
+    def find(self, name: str, usual: Callable[[str], Any]) -> str:
+        """The folder of a package, as ``$(find NAME)`` asks for it."""
+        from rrtik_ompl.description.package_path import package_folder
+
+        plain = re.fullmatch(r"\w[\w.-]*", name) is not None
+        found = package_folder(name, self.folder, self.packages) if plain else None
+        if found is None:
+            try:
+                found = Path(str(usual(name)))
+            except ImportError:
+                raise LookupError(f"package '{name}' is not found; give packages=[the folder that holds it]") from None
+            self.roots.append(found)
+        elif (found / "package.xml").is_file():
+            self.roots.append(found)
+        return str(found)
+
+    def check(self, path: str) -> None:
+        """Refuse a file outside the folders in play; one that does not exist is not the matter here."""
+        from rrtik_ompl.description.xacro_expression import Refused
+
+        if not os.path.exists(path) or self._in_play(path):
+            return
+        raise Refused(f"'{path}' is outside the folders of the robot; give packages=[its package], or {TRUST}")
+
+    def _in_play(self, path: str) -> bool:
+        real = Path(path).resolve()
+        if any(real.is_relative_to(root.resolve()) for root in self.roots):
+            return True
+        if any(_shows(real, folder) for folder in self.beside):
+            return True
+        if real.suffix.lower() in READABLE and any(_shows(real, folder) for folder in self.near):
+            return True
+        # installed packages of ROS may be links to their sources, which are packages as well
+        named = Path(os.path.abspath(path))
+        linked = any(named.is_relative_to(root.absolute()) for root in [*self.roots, *self.beside])
+        return linked and _package_of(real) is not None
+
+    def line_of(self, text: str, files: Iterable[str | None]) -> str:
+        """``FILE:LINE`` of a text in the first of the files that holds it; the first file if none does."""
+        pattern = re.compile(r"\s+".join(re.escape(word) for word in text.split()))
+        known = [file for file in dict.fromkeys([*files, *self.read]) if file]
+        for file in known:
+            try:
+                content = html.unescape(Path(file).read_text("utf-8", "replace"))
+            except OSError:
+                continue
+            if text.strip() and (found := pattern.search(content)):
+                return f"{file}:{content.count(chr(10), 0, found.start()) + 1}"
+        return known[0] if known else ""
+
+
+def _shows(file: Path, folder: Path) -> bool:
+    """Whether a file lies below a folder, and nothing on the way is hidden."""
+    if not file.is_relative_to(folder):
+        return False
+    return not any(part.startswith(".") for part in file.relative_to(folder).parts)
+
+
+def _package_of(file: Path) -> Path | None:
+    return next((folder for folder in file.parents if (folder / "package.xml").is_file()), None)
+
+
+def expand(job: Mapping[str, Any]) -> dict[str, Any]:
+    """Do the work: ``{"text": .., "files": [..]}``, or ``{"error": .., "where": ..}``."""
+    import xacro
+    from xacro import substitution_args
+
+    places = Places(job["file"], job["packages"])
+    usual = substitution_args._eval_find
+    substitution_args._eval_find = substitution_args._eval_dict["find"] = lambda name: places.find(name, usual)
+    if not job["trust"]:
+        _restrict(xacro, substitution_args, places)
+    _note_places(xacro, places)
+    try:
+        text = xacro.process_file(job["file"], mappings=dict(job["arguments"])).toxml()
+    except (Exception, SystemExit) as error:  # of anything that a macro may do
+        return _told(error, job)
+    if len(text) > job["longest"]:
+        return {"error": f"expands to more than {job['longest'] // 2**20} MiB"}
+    return {"text": text, "files": [job["file"], *xacro.all_includes]}
+
+
+def _restrict(xacro: Package, substitution_args: Package, places: Places) -> None:
+    """Let xacro evaluate by our list alone, and open only files in play."""
+    from rrtik_ompl.description.xacro_expression import FUNCTIONS, MATHEMATICS, Evaluator, Refused
+
+    symbols = xacro._global_symbols
+    for space, names in ((symbols, ("range", "sorted")), (symbols["python"], ("range", "type"))):
+        for name in names:
+            dict.__setitem__(space, name, FUNCTIONS[name])
+    own = [space[name] for space in (symbols, symbols["xacro"]) for name in MACRO_FUNCTIONS if name in space]
+
+    def argument(name: str) -> Value:
+        given = xacro.substitution_args_context["arg"]
+        return substitution_args.convert_value(substitution_args._eval_arg(name, given), "auto")
+
+    words = {name: substitution_args._eval_dict[name] for name in ("env", "optenv", "find", "true", "false")}
+    words |= {"arg": argument, **MATHEMATICS}
+    own += [word for word in words.values() if callable(word)]
+    evaluator = Evaluator(own, spaces=(xacro.NameSpace,), records=(xacro.YamlDictWrapper,))
+
+    def evaluated(expression: str, symbols: Value, local: object = None) -> Value:
+        return evaluator.value(expression, symbols.__getitem__)
+
+    def substituted(expression: str, context: Mapping[str, Any]) -> str:
+        def lookup(name: str) -> Value:
+            if name in words:
+                return words[name]
+            if name in context["arg"]:
+                return substitution_args.convert_value(context["arg"][name], "auto")
+            return FUNCTIONS[name]
+
+        return str(evaluator.value(expression, lookup))
+
+    def opened(path: str, *mode: str) -> Value:
+        places.check(path)
+        places.read.append(path)
+        return builtins.open(path)
+
+    def refused(*_: object, **__: object) -> Value:
+        raise Refused("this version of the package xacro evaluates by itself; pip install xacro==2.1.1")
+
+    xacro.safe_eval = evaluated
+    substitution_args._eval = substituted
+    for module in (xacro, substitution_args):
+        module.open = opened
+        module.eval = module.exec = module.compile = refused
+    sys.addaudithook(_forbid)
+
+
+def _forbid(event: str, arguments: tuple[Any, ...]) -> None:
+    """The last wall: should anything get through the list, it starts, sends and writes nothing."""
+    writes = event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)
+    if writes or FORBIDDEN.match(event):
+        raise PermissionError(f"macros may not do this: {event}")
+
+
+def _note_places(xacro: Package, places: Places) -> None:
+    """Let errors know where the expression stands that made them."""
+
+    def noting(function: Callable[..., Any], text_of: Callable[[Any], str]) -> Callable[..., Any]:
+        def noted(subject: Value, *others: Value) -> Value:
+            before = xacro.filestack[-1]
+            try:
+                return function(subject, *others)
+            except Exception as error:
+                if not hasattr(error, "place"):
+                    macros = [macro.history[-1][-1] for macro in reversed(xacro.macrostack)]
+                    place = places.line_of(text_of(subject), [before, *macros])
+                    error.place, error.expression = place, text_of(subject)  # type: ignore[attr-defined]
+                raise
+
+        return noted
+
+    xacro.safe_eval = noting(xacro.safe_eval, str)
+    xacro.eval_extension = noting(xacro.eval_extension, str)
+    xacro.process_include = noting(xacro.process_include, lambda element: element.getAttribute("filename"))
+
+
+def _told(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any]:
+    """What is said of an error: by the innermost one, and where that happened."""
+    from rrtik_ompl.description.xacro_expression import Refused, shown
+
+    chain = [error]
+    while (inner := getattr(chain[-1], "exc", None)) is not None and inner not in chain:
+        chain.append(inner)
+    placed = [each for each in chain if hasattr(each, "place")]
+    where = placed[-1].place if placed else ""
+    last = chain[-1]
+    if isinstance(last, MemoryError):
+        return {"where": where, "error": f"needs more than {job['bytes'] / 1e9:g} GB of memory; {job['more']}"}
+    if isinstance(last, RecursionError):
+        return {"where": where, "error": "macros or expressions are nested too deeply; does one call itself?"}
+    if isinstance(last, Refused):
+        said = str(last)
+        if "trust_xacro" not in said:
+            expression = placed[-1].expression  # type: ignore[attr-defined]
+            said = f"expression '{shown(expression)}': {said}; write it otherwise, or {TRUST}"
+        return {"where": where, "error": said}
+    said = " ".join(str(error).split()) or type(error).__name__
+    return {"where": where, "error": said.removeprefix("<class 'LookupError'>: ")}  # how xacro passes that on
+
+
+def _limit(seconds: float, memory: float) -> None:
+    """Let the system end this process when it takes too long or too much; Windows has no such limits."""
+    try:
+        import resource
+    except ImportError:
+        return
+    whole = int(seconds) + 1
+    for kind, most in ((resource.RLIMIT_CPU, whole), (resource.RLIMIT_AS, int(memory)), (resource.RLIMIT_CORE, 0)):
+        _, highest = resource.getrlimit(kind)
+        least = most if highest == resource.RLIM_INFINITY else min(most, highest)
+        try:
+            resource.setrlimit(kind, (least, highest))
+        except (OSError, ValueError):  # macOS takes none of memory
+            continue
+
+
+def main() -> None:
+    """Read the work, do it, and answer."""
+    job = json.load(sys.stdin)
+    sys.path[:] = job["path"]
+    _limit(job["seconds"], job["bytes"])
+    answer_to = os.fdopen(os.dup(1), "w")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for number in (1, 2):  # what macros print is not an answer
+        os.dup2(nowhere, number)
+    try:
+        answer = expand(job)
+    except MemoryError:
+        answer = {"error": f"needs more than {job['bytes'] / 1e9:g} GB of memory; {job['more']}"}
+    json.dump(answer, answer_to)
+    answer_to.close()
+
+
+if __name__ == "__main__":
+    main()
