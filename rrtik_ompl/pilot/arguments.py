@@ -26,7 +26,7 @@ def number(value: object, name: str) -> float:
     return float(plain)
 
 
-def fitting(command: Callable[..., str], name: str, arguments: Mapping[str, object]) -> dict[str, float | str]:
+def fitting(command: Callable[..., object], name: str, arguments: Mapping[str, object]) -> dict[str, float | str]:
     """The arguments, if they are those that a command takes.
 
     Raises:

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.messages import quoted
+from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.arguments import number
 from rrtik_ompl.pilot.devices.camera_feed import ENDED
 from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera
 from rrtik_ompl.pilot.devices.perception import Perception
-from rrtik_ompl.pilot.interlock import PROPOSED
+from rrtik_ompl.pilot.interlock import PROPOSED, Sight
 from rrtik_ompl.pilot.records.pictures import PictureRecord
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document
@@ -64,12 +65,13 @@ class Engine:
         self._advanced = 0.0
         self._drawn: tuple[Hashable, ...] = ()
 
-    def execute(self, command: dict[str, Any], time: float) -> None:
+    def execute(self, command: dict[str, Any], time: float, sight: Sight | None = None) -> None:
         """Execute a command of the pilot.
 
         Args:
             command: A ``name`` and its arguments; those of `VIEW_COMMANDS` concern the outside view alone.
             time: Now [s].
+            sight: What the pilot's page had shown; None without a page.
         """
         self._advance(time)
         arguments = dict(command)
@@ -77,13 +79,14 @@ class Engine:
         if "object" in arguments:  # which one, for "name" is that of the command
             arguments["name"] = arguments.pop("object")
         if name not in VIEW_COMMANDS:
+            self.session.sight = sight
             self.session.command(name, time, **arguments)
             self._return_to_now()
             return
         try:
             self._change_view(name, arguments)
         except InputError as error:
-            self.session.message = str(error)
+            self.session.say(refused(str(error)))
 
     def update(self, time: float) -> None:
         """Advance to a time [s] and process one picture."""
@@ -91,7 +94,12 @@ class Engine:
         self.perception.update(self.session, time)
         if self._pictures is not None:
             self._pictures.add(self.perception.picture, time)
-            self.session.message = self._pictures.news() or self.session.message
+            if ended := self._pictures.news():
+                self.session.say(alarm(ended))
+
+    def watch(self, time: float) -> None:
+        """Between two stages of a step: read the arm, and stop it where that is due."""
+        self._advance(time)
 
     def state(self) -> dict[str, Any]:
         """What the page shows beside the pictures."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.answers import Answer, alarm, news, refused
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED
@@ -84,7 +85,7 @@ class Guide:
         self._list: Route | None = None  # of single-joint moves: what `together` is made of, and goes back to
         self._aimed: SeenObject | None = None  # what the route leads to, as it was seen when it was planned
 
-    def plan(self) -> str:
+    def plan(self) -> Answer:
         """Propose a route from where the arm is."""
         session = self._session
         session.arm.stop()
@@ -97,11 +98,11 @@ class Guide:
             self.leave()
             otherwise = "choose another grasp" if session.choice else "drive the arm elsewhere, or choose an object"
             advice = escape_advice(session.world, session.q) or otherwise
-            return f"no route: {session.fault() or found}; {advice}"
+            return refused(f"no route: {session.fault() or found}; {advice}")
         aimed = session.surroundings.named(session.target) if session.target and session.choice else None
         return self.propose(found, aimed)
 
-    def propose(self, route: Route, aimed: SeenObject | None = None) -> str:
+    def propose(self, route: Route, aimed: SeenObject | None = None) -> Answer:
         """Propose a route that begins where the arm is.
 
         Args:
@@ -114,9 +115,9 @@ class Guide:
         self.withdrawn, self._aimed = "", aimed
         self._list = self._list if route.together else route
         session.mode, session.desired = PROPOSED, frozen(route.path.end)
-        return route.summary() + "; 'accept' or 'reject'"
+        return news(route.summary() + "; 'accept' or 'reject'")
 
-    def together(self) -> str:
+    def together(self) -> Answer:
         """Propose the same route with all joints at once, or the list of moves again."""
         session, list_of_moves = self._session, self._list
         route = self.route
@@ -126,9 +127,9 @@ class Guide:
             return self.propose(list_of_moves, self._aimed)
         world = session.surroundings.world_at(session.q, session.target)
         made = together(route, world, session.rates, session.seed)
-        return f"no route {made}" if isinstance(made, NoRoute) else self.propose(made, self._aimed)
+        return refused(f"no route {made}") if isinstance(made, NoRoute) else self.propose(made, self._aimed)
 
-    def accept(self) -> str:
+    def accept(self) -> Answer:
         """Follow the route that is proposed."""
         session, follower = self._session, self.follower
         if follower is None:
@@ -139,16 +140,16 @@ class Guide:
         self.refuse_if_blocked()
         session.mode, self.progress, self.withdrawn = FOLLOWING, progress, ""
         self.show_due(follower)
-        return "accepted; hold 'next' to make the next move"
+        return news("accepted; hold 'next' to make the next move")
 
-    def reject(self) -> str:
+    def reject(self) -> Answer:
         """Leave the route."""
         self._session.arm.stop()
         self.leave()
         self._session.desired = self._session.q
-        return "rejected"
+        return news("rejected")
 
-    def back(self) -> str:
+    def back(self) -> Answer:
         """Propose the way back: the moves that were made, reversed."""
         session = self._session
         if self.follower is None:
@@ -158,9 +159,10 @@ class Guide:
         kind = type(self.follower)
         self.follower, session.mode, self.progress, self.withdrawn = kind(back, session.rates), PROPOSED, None, ""
         moves = len(self.follower.moves)
-        return f"the way back: {f'{moves} moves' if moves else 'all joints at once'}; 'accept' or 'reject'"
+        how = f"{moves} moves" if moves else "all joints at once"
+        return news(f"the way back: {how}; 'accept' or 'reject'")
 
-    def settle(self) -> str:
+    def settle(self) -> Answer:
         """Take the current move for made where the arm does not come nearer to its end."""
         session, follower = self._session, self.follower
         if follower is None or follower.joint() is None:
@@ -168,7 +170,7 @@ class Guide:
         joint, left = follower.pass_on(session.q)
         self.progress = follower.update(session.q)
         self.show_due(follower)
-        return f"{joint} comes no nearer than {left} to its end; release, then hold 'next' again"
+        return refused(f"{joint} comes no nearer than {left} to its end; release, then hold 'next' again")
 
     def over(self, verb: str) -> str:
         """What there is to say to who wants to go on along a route that was made to its end; "" else."""
@@ -176,21 +178,21 @@ class Guide:
         ended = verb == "next" and self._session.mode in (MANOEUVRE, CHOOSING)
         return f"{MADE}; 'plan' proposes another route" if ended and progress and progress.advice == "done" else ""
 
-    def watch(self) -> str:
-        """Update the progress of an accepted route; what there is to say, "" if nothing."""
+    def watch(self) -> Answer | None:
+        """Update the progress of an accepted route; what there is to say, None if nothing."""
         session, follower = self._session, self.follower
         if follower is None or session.mode != FOLLOWING:
-            return ""
+            return None
         due, self.progress = follower.current, follower.update(session.q)
         if self.progress.advice == "lost":
             session.stand_still()
-            return f"off the route: {self.progress.fault}; 'replan' finds a new one from here"
+            return alarm(f"off the route: {self.progress.fault}; 'replan' finds a new one from here")
         if self.progress.advice == "done":
-            return "" if session.driving else self._ended(follower)
+            return None if session.driving else self._ended(follower)
         if follower.current != due:
             self.show_due(follower)
-            return f"move {follower.current} of {len(follower.moves)} is done; 'next' makes the next"
-        return ""
+            return news(f"move {follower.current} of {len(follower.moves)} is done; 'next' makes the next")
+        return None
 
     def show_due(self, follower: Follower | Track) -> None:
         """Select the joint of the current move; its end is the desired value."""
@@ -198,18 +200,18 @@ class Guide:
         if joint is not None:
             self._session.desired, self._session.selected = frozen(follower.target), joint
 
-    def check(self) -> str:
-        """After a change of the scene: withdraw a route that is not free any more, and say so; "" if all is well."""
+    def check(self) -> Answer | None:
+        """After a change of the scene: withdraw a route that is not free any more, and say so; None if all is well."""
         session = self._session
         if self.follower is None or session.mode not in (FOLLOWING, PROPOSED):
-            return ""
+            return None
         fault, before = self.fault_of_rest(), self.withdrawn
         if not fault:
             self.withdrawn = ""
-            return "the route is free again; 'accept' follows it" if before else ""
+            return news("the route is free again; 'accept' follows it") if before else None
         session.stand_still()
         self.withdrawn, session.mode = fault, PROPOSED
-        return WITHDRAWN.format(fault)
+        return alarm(WITHDRAWN.format(fault))
 
     def refuse_if_blocked(self) -> None:
         """Withdraw the route and raise InputError if the rest of it is not free any more."""
@@ -241,15 +243,15 @@ class Guide:
         far = f"{1e3 * away:.0f} mm and {np.rad2deg(turned):.1f} deg"
         return f"{aimed.object.name} has moved by {far} since the route was planned"
 
-    def _ended(self, follower: Follower | Track) -> str:
+    def _ended(self, follower: Follower | Track) -> Answer:
         """All moves are made: whether the tip is where the route ends."""
         session = self._session
         session.mode = MANOEUVRE
         away, turned = apart(session.robot.fk(follower.path.end), session.robot.fk(session.q))
         if away <= MAX_END_OFFSET and turned <= MAX_END_TURN:
-            return MADE
+            return news(MADE)
         far = f"{1e3 * away:.1f} mm and {np.rad2deg(turned):.2f} deg"
-        return f"all moves are made, but the tip is {far} away from the end of the route; 'replan' may go nearer"
+        return refused(f"all moves are made, but the tip is {far} away from the end of the route; 'replan' may go nearer")
 
     def leave(self) -> None:
         """Forget the route."""

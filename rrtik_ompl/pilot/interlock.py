@@ -12,7 +12,9 @@ from typing import Final
 MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
 MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
 STALE_SECONDS = 0.5  # a picture older than that does not show the present
+LATE_SECONDS = 0.3  # a pilot who sees what the arm does later than that does not drive it
 
+ACKNOWLEDGE: Final = "STOP acknowledges that"
 MOVING: Final = ("jog", "go", "next", "servo", "lead")  # held: the arm moves only as long as they are renewed
 # What needs the arm and a picture of now:
 PRESENT: Final = (*MOVING, "move", "plan", "replan", "accept", "back", "close", "open", "lift", "together")
@@ -36,6 +38,19 @@ _ONLY_IN: Final = {
 
 
 @dataclass(frozen=True, slots=True)
+class Sight:
+    """What a page had shown to the pilot who commands: by the stamps that the page sends back with the command.
+
+    Attributes:
+        state: Age of the last state [s]; inf if the page does not say.
+        picture: Age of the last picture of the camera [s]; inf if the page does not say.
+    """
+
+    state: float
+    picture: float
+
+
+@dataclass(frozen=True, slots=True)
 class Knowledge:
     """What is known at a moment.
 
@@ -45,6 +60,8 @@ class Knowledge:
         past: Pictures are photographs or a film, and the arm is a simulated one: no picture is of now, none is stale.
         arm_off: Why joints and pictures contradict each other; "" if they do not.
         unusable: Why the last photograph or picture of a film could not be used; "" if it could.
+        fault: What the arm has done that it was not told; "" if nothing, or the pilot has acknowledged it.
+        sight: What the pilot sees; None without a page.
     """
 
     arm_lost: str
@@ -52,15 +69,30 @@ class Knowledge:
     past: bool = False
     arm_off: str = ""
     unusable: str = ""
+    fault: str = ""
+    sight: Sight | None = None
 
     @property
     def trouble(self) -> str:
-        """Why the present is not known; "" if it is."""
-        if self.arm_lost or self.arm_off:
-            return self.arm_lost or self.arm_off
+        """Why the present is not known, or the arm cannot be trusted; "" if all is well."""
+        if self.arm_lost or self.fault or self.arm_off:
+            return self.arm_lost or self.fault or self.arm_off
         if self.past or self.picture_age <= STALE_SECONDS:
             return self.unusable if self.past else ""
         return "there is no picture yet" if self.picture_age == float("inf") else "the picture is stale"
+
+    @property
+    def blind(self) -> str:
+        """Why the pilot does not see the arm well enough to drive it; "" if he does."""
+        sight = self.sight
+        if sight is None or (sight.state <= LATE_SECONDS and (self.past or sight.picture <= STALE_SECONDS)):
+            return ""
+        if sight.state == float("inf"):
+            return "the page does not say what it has shown: reload it"
+        if sight.state > LATE_SECONDS:
+            return f"line too slow for driving: {sight.state:.2g} s"
+        age = "unknown" if sight.picture == float("inf") else f"{sight.picture:.2g} s"
+        return f"the picture on the page is stale: {age}"
 
 
 def refusal(verb: str, mode: str, known: Knowledge) -> str:
@@ -79,5 +111,5 @@ def refusal(verb: str, mode: str, known: Knowledge) -> str:
     if mode not in modes:
         return otherwise
     if verb in PRESENT and known.trouble:
-        return f"refused: {known.trouble}"
-    return ""
+        return f"refused: {known.trouble}" + (f"; {ACKNOWLEDGE}" if known.trouble == known.fault else "")
+    return f"refused: {known.blind}" if verb in MOVING and known.blind else ""

@@ -8,9 +8,12 @@ from collections.abc import Callable
 from typing import Any
 
 import cv2
+import numpy as np
 
 from rrtik_ompl.files.messages import quoted
+from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
+from rrtik_ompl.pilot.interlock import Sight
 from rrtik_ompl.pilot.web.handlers import MAX_PAGES
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.world.motion_queries import Stop, no_stop
@@ -62,13 +65,14 @@ class Loop:
         engine, server = self._engine, self._server
         self.reported = clock.monotonic()
         engine.update(self.time)
-        engine.session.message = self.fault() or engine.session.message
+        if fault := self.fault():
+            engine.session.say(alarm(fault))
         self._show_state()
         self._execute_all()
         audience, self._audience = self._audience, len(server.clients)
         if not self._audience:
             return
-        server.show_frame(CAMERA, self.time, engine.camera_picture())
+        server.show_frame(CAMERA, engine.session.picture_time, engine.camera_picture())
         self._execute_all()
         self._outside_too = not self._outside_too
         if not self._outside_too and self._audience == audience:
@@ -80,9 +84,11 @@ class Loop:
     def _show_state(self) -> None:
         if len(self._server.clients):
             state = self._engine.state() | {"paused": self._paused_at is not None, "replay": self._watch_only}
+            state |= {"stamp": self._engine.session.time, "heard": self._server.heard()}
             self._server.show_state(state, self._answered)
 
     def _execute_all(self) -> None:
+        self._engine.watch(self.time)
         while not self._server.commands.empty():
             self._execute_one(0.0)
 
@@ -93,26 +99,35 @@ class Loop:
         except queue.Empty:
             return
         sequence = command.pop("seq", None)
+        sight = Sight(self._age(command.pop("seen", None)), self._age(command.pop("picture", None)))
         try:
-            self._execute(command)
+            self._execute(command, sight)
         except Exception as error:  # nothing that a page sends ends the session
-            self._engine.session.arm.stop()
+            self._engine.session.stand_still()
             what = f"'{quoted(command.get('name'))}' broke: {quoted(error) or type(error).__name__}"
-            self._engine.session.message = f"{what}; the arm was stopped"
+            self._engine.session.say(alarm(f"{what}; the arm was stopped"))
         if isinstance(sequence, int) and sequence is not True and 0 <= sequence <= MAX_SEQUENCE:
             self._answered[client] = sequence
             while len(self._answered) > MAX_PAGES:  # of pages that have left
                 del self._answered[min(self._answered)]
         self._show_state()
 
-    def _execute(self, command: dict[str, Any]) -> None:
+    def _age(self, stamp: object) -> float:
+        """Age of what a page says that it has shown, by the server's own stamp [s]; inf if that is none."""
+        now = self.time
+        if isinstance(stamp, bool) or not isinstance(stamp, int | float) or not 0.0 <= stamp <= now:
+            return np.inf
+        return now - stamp
+
+    def _execute(self, command: dict[str, Any], sight: Sight) -> None:
         name = quoted(command.get("name"))
         if not self._watch_only or name in VIEW_COMMANDS:
-            self._engine.execute(command, self.time)
+            self._engine.execute(command, self.time, sight)
         elif name == "pause":
             self._pause()
         elif name != "halt":
-            self._engine.session.message = "this is a record: it can be watched, paused and viewed from all sides"
+            said = refused("this is a record: it can be watched, paused and viewed from all sides")
+            self._engine.session.say(said)
 
     def _pause(self) -> None:
         now = self.time

@@ -14,12 +14,23 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
+from rrtik_ompl.pilot.answers import Answer, Level, alarm, news, refused
 from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
 from rrtik_ompl.pilot.arm_check import ArmCheck
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.guide import Guide
-from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, MOVING, PROPOSED, Knowledge, refusal
+from rrtik_ompl.pilot.interlock import (
+    ACKNOWLEDGE,
+    CHOOSING,
+    FOLLOWING,
+    MANOEUVRE,
+    MOVING,
+    PROPOSED,
+    Knowledge,
+    Sight,
+    refusal,
+)
 from rrtik_ompl.pilot.lamps import Lamp
 from rrtik_ompl.pilot.motion.hand import Hand
 from rrtik_ompl.pilot.motion.held import Held
@@ -35,8 +46,16 @@ from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import World
 
 
+READ_SECONDS = 1.0  # a stop so soon after a fault is against the fault: it does not acknowledge it
+
+
 class Session:
-    """One pilot, one arm, one scene."""
+    """One pilot, one arm, one scene.
+
+    Attributes:
+        answer: What was said last, and its level.
+        sight: What the page of the pilot had shown when the command of now was given; None without a page.
+    """
 
     def __init__(
         self,
@@ -47,6 +66,7 @@ class Session:
         record: Record | None = None,
         seed: int = 0,
         past: bool = False,
+        recorded: bool = False,
         structure: Structure | None = None,
         master: Arm | None = None,
     ) -> None:
@@ -59,6 +79,7 @@ class Session:
             record: Where the session is recorded.
             seed: Of the random numbers: the same commands give the same routes.
             past: Pictures are not of now, and the arm is a simulated one. Else nothing moves without a picture of now.
+            recorded: The arm moves as a record says, whatever it is told: it is not compared with that.
             structure: To what the problem's obstacles are fixed; None if they move with the arm's base.
             master: An arm whose joints `lead` follows.
         """
@@ -68,7 +89,8 @@ class Session:
         self.mode, self.selected, self.speed = MANOEUVRE, 0, 1.0
         self.target: str | None = None
         self.choice: tuple[str, int] | None = None
-        self.message = ""
+        self.answer = news("")
+        self.sight: Sight | None = None
         self.q: Vector = frozen(arm.read())
         self.desired: Vector = self.q
         self.time = 0.0
@@ -78,9 +100,11 @@ class Session:
         self.held, self.hand = Held(self), Hand(self)
         self.leading = Leading(self, master)
         self._check = ArmCheck()
-        self._past, self._trouble, self._seen_at = past, "", dict[str, float]()
+        self.past, self._recorded = past, recorded
+        self._trouble, self._seen_at = "", dict[str, float]()
+        self._fault_at = -np.inf
         self._record = record or Record(None)
-        self._commands: dict[str, Callable[..., str]] = {
+        self._commands: dict[str, Callable[..., Answer]] = {
             "select": self._select, "jog": self.held.jog, "move": self.held.move, "go": self.held.go,
             "next": self.held.next, "release": self.held.release, "speed": self.held.set_speed, "stop": self._stop,
             "object": self._object, "grasp": self._grasp, "plan": self.guide.plan, "replan": self.guide.plan,
@@ -105,7 +129,7 @@ class Session:
 
     def see_arm(self, T_base_tip: pin.SE3, covariance: Matrix, time: float) -> None:
         """Where a picture shows the tip, with its covariance (6, 6); nothing moves where the joints say otherwise."""
-        if not self._past:
+        if not self.past:
             self._check.see(T_base_tip, covariance, self.robot.fk(self.q), time)
 
     def tick(self, time: float) -> None:
@@ -116,9 +140,18 @@ class Session:
             self._record.write("joints", time, q=self.q.tolist())
             self.surroundings.settle(self.q)
         self._check.read(self.q, time)
-        self.held.expire(time)
+        expired = self.held.expire()
+        if not self._recorded:
+            self.say(expired)
+            self.say(self.held.watch())
         self._watch()
-        self.message = self.guide.watch() or self._record.news() or self.message
+        self.say(self.guide.watch())
+        if ended := self._record.news():
+            self.say(alarm(ended))
+
+    def say(self, answer: Answer | None) -> None:
+        """Show an answer to the pilot; None leaves the last one."""
+        self.answer = answer or self.answer
 
     def command(self, verb: str, time: float, /, **arguments: object) -> str:
         """Execute a command of the pilot; returns a line for a person, which is `message` from then on.
@@ -137,17 +170,17 @@ class Session:
             given = fitting(act, verb, arguments)
             if verb not in (*MOVING, "release"):
                 self.held.end()
-            refused = self.guide.over(verb) or refusal(verb, self.mode, self.known) or self.hand.refusal(verb)
-            if refused:
-                raise InputError(refused)
+            why = self.guide.over(verb) or refusal(verb, self.mode, self.known) or self.hand.refusal(verb)
+            if why:
+                raise InputError(why)
             if not goes_on:
                 self._record.write("command", time, name=verb, arguments=given)
-            self.message = act(**given)
+            self.say(act(**given))
         except RrtikError as error:
             self.held.refuse(verb, arguments.get("press"))
-            self.message = str(error)
+            self.say(refused(str(error)))
         if not goes_on:
-            self._record.write("answer", time, text=self.message, mode=self.mode)
+            self._record.write("answer", time, text=self.message, level=self.answer.level.value, mode=self.mode)
         return self.message
 
     # --- output -------------------------------------------------------------------------------------------
@@ -155,7 +188,18 @@ class Session:
     @property
     def known(self) -> Knowledge:
         """What is known now of the arm and of the picture."""
-        return Knowledge(self.arm.lost, self.time - self.picture_time, self._past, self._check.off, self.unusable)
+        age, fault = self.time - self.picture_time, self.held.drive.supervisor.fault
+        return Knowledge(self.arm.lost, age, self.past, self._check.off, self.unusable, fault, self.sight)
+
+    @property
+    def message(self) -> str:
+        """The line that was said last."""
+        return self.answer.text
+
+    @property
+    def level(self) -> Level:
+        """Of that line."""
+        return self.answer.level
 
     @property
     def driving(self) -> bool:
@@ -205,18 +249,27 @@ class Session:
 
     # --- commands ------------------------------------------------------------------------------------------------
 
-    def _select(self, joint: int) -> str:
+    def _select(self, joint: int) -> Answer:
         if not 0 <= int(joint) < self.robot.dof:
             raise InputError(f"joint must be 1 to {self.robot.dof}, got {int(joint) + 1}")
         self.selected = int(joint)
-        return f"{self.robot.joint_names[self.selected]} selected"
+        return news(f"{self.robot.joint_names[self.selected]} selected")
 
     def stand_still(self) -> None:
         """Stop the arm, and end what is held."""
         self.held.end()
         self.arm.stop()
 
-    def _stop(self) -> str:
+    def _stop(self) -> Answer:
+        """Stop the arm; a fault that the pilot has had time to read is acknowledged."""
+        supervisor, said = self.held.drive.supervisor, self._end_motion()
+        if supervisor.fault and self.time - self._fault_at <= READ_SECONDS:
+            return alarm(f"stopped; {supervisor.fault}; {ACKNOWLEDGE}")
+        supervisor.acknowledge()
+        return news(said)
+
+    def _end_motion(self) -> str:
+        """Stop the arm, and take back that a route is followed; what there is to say."""
         self.stand_still()
         self.desired = self.q
         if self.mode == FOLLOWING:
@@ -224,21 +277,22 @@ class Session:
             return "stopped; 'accept' goes on with the route, 'reject' leaves it"
         return "stopped"
 
-    def _halt(self) -> str:
+    def _halt(self) -> Answer:
         """Stop the arm, for no page has the pilot any more."""
-        self._stop()
-        return "the pilot has left; the arm stands still"
+        self._end_motion()
+        return alarm("the pilot has left; the arm stands still")
 
-    def _object(self, name: str) -> str:
+    def _object(self, name: str) -> Answer:
         if self.surroundings.named(name) is None:
             raise UnknownNameError("object in view", name, [o.object.name for o in self.surroundings.seen])
         self.target, self.choice, self.mode = name, None, CHOOSING
-        return f"{name} chosen; now a grasp"
+        return news(f"{name} chosen; now a grasp")
 
-    def _grasp(self, type: str, level: int) -> str:
+    def _grasp(self, type: str, level: int) -> Answer:
         self.surroundings.check_grasp(self.target, type, int(level))
         self.choice, self.mode = (type, int(level)), CHOOSING
-        return f"{type} at level {int(level) + 1}: {self.fault() or 'can be reached'}"
+        fault, place = self.fault(), f"{type} at level {int(level) + 1}"
+        return refused(f"{place}: {fault}") if fault else news(f"{place}: can be reached")
 
     # --- what ends a motion ---------------------------------------------------------------------------------------
 
@@ -248,17 +302,22 @@ class Session:
         self._trouble = trouble
         if trouble == before:
             return
+        fault = self.held.drive.supervisor.fault
+        how = f"; {ACKNOWLEDGE}" if fault == trouble else ""
+        if fault == trouble:
+            self._fault_at = self.time
         if not trouble:
-            self.message = "picture and arm are known again; the arm stands still" if before else self.message
+            self.say(news("picture and arm are known again; the arm stands still"))
         elif self.mode == FOLLOWING or self.held.drive.active:
             self._record.write("command", self.time, name="stop", arguments={})
-            self.message = f"{trouble}: {self._stop()}"
+            self.say(alarm(f"{trouble}: {self._end_motion()}{how}"))
         else:
-            self.message = trouble
+            self.arm.stop()
+            self.say(alarm(trouble + how))
 
     def _check_motion(self) -> None:
         """After a change of the scene: stop if what is driven, followed or proposed is not free any more."""
         if self.mode != FOLLOWING and not self.held.still_free():
             self.held.end()
-            self.message = "stopped: something has come into the way"
-        self.message = self.guide.check() or self.message
+            self.say(alarm("stopped: something has come into the way"))
+        self.say(self.guide.check())

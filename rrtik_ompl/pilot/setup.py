@@ -230,5 +230,5 @@ def _replay(options: SessionOptions, problem: Problem, file: Path) -> OpenSessio
     structure = _structure(vehicle)
     pictures = RecordedPictures(beside(file)) if beside(file).exists() else None
     perception = RecordedPerception(entries, arm, _simulated(vehicle, problem), structure, pictures)
-    session = Session(problem, arm, seed=seed, past=True, structure=structure)
+    session = Session(problem, arm, seed=seed, past=True, recorded=True, structure=structure)
     return OpenSession(Engine(session, perception), (perception.close,))

@@ -22,6 +22,8 @@ def state_document(session: Session) -> dict[str, Any]:
     return {
         "mode": session.mode,
         "message": session.message,
+        "level": session.level.value,
+        "fault_of_arm": session.known.fault,
         "picture_age": None if not np.isfinite(age) else round(age, 3),
         "stale": bool(age > STALE_SECONDS),
         "selected": session.selected,

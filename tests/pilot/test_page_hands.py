@@ -133,6 +133,19 @@ def keep_pushed(page, button, script, end=None):
     )
 
 
+def keep_stick(page, script, end):
+    """Press the shoulder button with the stick at rest, and push the stick until something is so."""
+
+    def press():
+        page.ask("pad.axes[0] = 0; push(4, false)")
+        page.wait("!padBefore[4]")
+        page.ask("push(4, true)")
+        page.wait("padArmed")
+        page.ask("pad.axes[0] = 1; 0")
+
+    page.keep(press, lambda: page.ask(end) if page.ask(script) else None, script)
+
+
 def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is_pulled_out(page, running):
     page.ask(PAD)
     page.wait("!document.getElementById('pad').hidden")
@@ -141,11 +154,22 @@ def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is
     before = azimuth(running)
     page.ask("pad.axes[0] = 1; 0")
     assert settled(running, 0.3) == before  # not without the shoulder button
-    keep_pushed(page, 4, f"state.joints[0].value > {before} + 3", "window.pad = null; 0")
+    page.ask("push(4, true)")
+    assert settled(running, 0.3) == before  # nor with the stick pushed before it
+    assert "let the stick go" in page.text("message")
+    keep_stick(page, f"state.joints[0].value > {before} + 3", "window.pad = null; 0")
     page.wait("!state.driving && document.getElementById('pad').hidden")
     there = settled(running, 0.2)
     assert settled(running, 0.3) == there
-    page.ask(PAD)
+    page.ask(PAD + "push(4, true); pad.axes[0] = 1; 0")  # plugged in again with stick and button as they were
+    page.wait("!document.getElementById('pad').hidden")
+    assert settled(running, 0.5) == there
+    page.ask("push(4, false)")
+    page.wait("!padBefore[4]")
+    page.ask("push(4, true)")
+    assert settled(running, 0.3) == there  # pressed anew, but the stick was not let go
+    page.ask("push(4, false); pad.axes[0] = 0; 0")
+    page.wait("!padBefore[4]")
     for button, wanted in ((13, "state.selected === 1"), (12, "state.selected === 0"), (14, "state.speed === 0.5"),
                            (15, "state.speed === 1")):  # fmt: skip
         page.ask(f"push({button}, true)")
@@ -153,6 +177,15 @@ def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is
         page.ask(f"push({button}, false)")
         time.sleep(0.1)
     page.ask("delete navigator.getGamepads; 0")
+
+
+def enable(page):
+    """Press the shoulder button anew if something has disarmed the gamepad."""
+    if not page.ask("padArmed"):
+        page.ask("push(4, false)")
+        page.wait("!padBefore[4]")
+        page.ask("push(4, true)")
+        page.wait("padArmed")
 
 
 @pytest.mark.slow
@@ -174,10 +207,10 @@ def test_a_whole_route_by_a_gamepad_alone(page, running):
         tap(7, "state.choice.level === 1")
     tap(2, "state.mode === 'proposed'")
     tap(3, "state.mode === 'following'")
-    page.ask("push(4, true)")
     for _ in range(40):
         if page.ask("state.mode") != "following":
             break
+        enable(page)
         now = page.ask("state.route.moves.findIndex(m => m.status === 'current')")
         keep_pushed(
             page, 0, f"state.mode !== 'following' || (state.route.moves[{now}].status === 'done' && !state.driving)"

@@ -262,7 +262,7 @@ def test_one_address_is_no_spelling_of_all(host):
 
 def test_a_command_that_breaks_stops_the_arm_and_says_so(monkeypatch):
     opened = open_session(SessionOptions("titan4_sdu"))
-    monkeypatch.setattr(opened.engine, "execute", lambda command, time: 1 / 0)
+    monkeypatch.setattr(opened.engine, "execute", lambda *given: 1 / 0)
     arm = opened.engine.session.arm
     arm.move(0, 0.5)
     with PilotServer() as server:

@@ -10,6 +10,8 @@ import numpy as np
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.pilot.devices.arm import Arm
+from rrtik_ompl.pilot.motion.supervisor import Supervisor
+from rrtik_ompl.robot import Robot
 
 LEASH_SECONDS = 0.1  # how far a set point may be ahead of the arm, at the speed of the moment
 HOLD_SECONDS = 0.25  # without a renewal for as long the drive is over
@@ -23,18 +25,21 @@ class Drive:
         joint: Number of the joint that is driven; None if none is.
         goal: Where the drive ends [rad or m].
         leading: Whether all joints are led to set points.
+        supervisor: Compares what the arm does with what it was told.
     """
 
-    def __init__(self, arm: Arm, rates: Vector) -> None:
+    def __init__(self, robot: Robot, arm: Arm, rates: Vector) -> None:
         """Begin at rest.
 
         Args:
+            robot: What the arm is.
             arm: The arm that is moved.
             rates: Of its joints at full speed, shape (dof,) [rad/s or m/s].
         """
         self.joint: int | None = None
         self.goal = 0.0
         self.leading = False
+        self.supervisor = Supervisor(robot, rates)
         self._arm, self._rates = arm, rates
         self._point, self._renewed = 0.0, -np.inf
 
@@ -56,7 +61,7 @@ class Drive:
         here, rate = float(q[joint]), speed * float(self._rates[joint])
         turned = self.active and (goal - self._point) * (self.goal - self._point) < 0.0
         if joint != self.joint or turned or self.leading:
-            self.end()
+            self.end(time)
             self._point, self._renewed = here, time - FIRST_SECONDS
         self.joint, self.goal = joint, goal
         seconds = float(np.clip(time - self._renewed, 0.0, LEASH_SECONDS))
@@ -64,25 +69,37 @@ class Drive:
         step = np.clip(goal - self._point, -rate * seconds, rate * seconds)
         leash = rate * LEASH_SECONDS
         self._point = float(np.clip(self._point + step, here - leash, here + leash))
+        aim, ahead = q.copy(), np.zeros(len(q))
+        aim[joint], ahead[joint] = self._point, leash
+        self.supervisor.told(aim, ahead, q, time)
         self._arm.move(joint, self._point)
         return self._point
 
-    def lead(self, point: Vector, time: float) -> None:
-        """Send all joints to a set point, shape (dof,), which is ahead of the arm by `LEASH_SECONDS` at most."""
+    def lead(self, point: Vector, speed: float, q: Vector, time: float) -> None:
+        """Send all joints to a set point that is ahead of the arm by `LEASH_SECONDS` at most.
+
+        Args:
+            point: Shape (dof,) [rad or m].
+            speed: Share of the joints' rates, above 0 and up to 1.
+            q: Where the arm is, shape (dof,).
+            time: Now [s].
+        """
         if self.joint is not None:
-            self.end()
+            self.end(time)
         self.leading, self._renewed = True, max(time, self._renewed)
+        self.supervisor.told(point, speed * self._rates * LEASH_SECONDS, q, time)
         self._arm.follow(point)
 
     def expire(self, time: float) -> bool:
         """End the drive if it was not renewed in time; whether that was so."""
         over = self.active and time - self._renewed > HOLD_SECONDS
         if over:
-            self.end()
+            self.end(time)
         return over
 
-    def end(self) -> None:
-        """Stop the arm, if it is driven."""
+    def end(self, time: float) -> None:
+        """Stop the arm at a time [s], if it is driven."""
         if self.active:
             self.joint, self.leading = None, False
+            self.supervisor.stopped(time)
             self._arm.stop()

@@ -14,6 +14,7 @@ from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.pilot.answers import Answer, news, refused
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.guide import Guide
 from rrtik_ompl.pilot.interlock import MANOEUVRE, MOVING
@@ -69,47 +70,48 @@ class Hand:
             return f"refused: the gripper is closed on '{self.fixed}', which is fixed; open it first"
         return ""
 
-    def close(self) -> str:
+    def close(self) -> Answer:
         """Close the gripper; an object at one of whose grasps it is, is held from now on."""
         session = self._session
         if self.closed:
-            return "the gripper is closed already"
+            return refused("the gripper is closed already")
         self._grip(True)
         tip = session.robot.fk(session.q)
         near = sorted(
             ((apart(tip, pose), seen, lift) for seen, lift, pose in self._grasps()), key=lambda each: each[0][0]
         )
         if not near:
-            return NOTHING
+            return refused(NOTHING)
         there = next((each for each in near if _within(each[0])), None)
         if there is None:
             away, turned = near[0][0]
-            return f"{NOTHING}; the nearest grasp is {1e3 * away:.0f} mm and {np.rad2deg(turned):.0f} deg away"
+            far = f"{1e3 * away:.0f} mm and {np.rad2deg(turned):.0f} deg away"
+            return refused(f"{NOTHING}; the nearest grasp is {far}")
         _, seen, self._lift = there
         name = seen.object.name
         if not seen.object.loose:
             self.fixed = name
-            return f"closed on {name}"
+            return news(f"closed on {name}")
         session.guide.leave()
         session.target, session.choice, session.mode = None, None, MANOEUVRE
         session.surroundings.hold(seen, tip.actInv(seen.T_base_object), session.q)
-        return f"closed: {name} is held; 'lift' takes it up, or choose where it goes"
+        return news(f"closed: {name} is held; 'lift' takes it up, or choose where it goes")
 
-    def open(self) -> str:
+    def open(self) -> Answer:
         """Open the gripper; what was held stays where it is."""
         session = self._session
         if not self.closed:
-            return "the gripper is open already"
+            return refused("the gripper is open already")
         self._grip(False)
         name, self.fixed = self.holds, ""
         if not name:
-            return "open"
+            return news("open")
         session.guide.leave()
         session.surroundings.release(session.robot.fk(session.q))
         session.target, session.choice, session.mode = name, None, MANOEUVRE
-        return f"open: {name} is put down"
+        return news(f"open: {name} is put down")
 
-    def lift(self) -> str:
+    def lift(self) -> Answer:
         """Propose a route straight up from where something was taken."""
         session = self._session
         if not self.holds:
@@ -119,9 +121,10 @@ class Hand:
         world = session.surroundings.world_at(session.q, None)
         found = solve_ik(session.robot, PoseGoal(goal), near=session.q, world=world, seconds=LIFT_SECONDS)
         if not found.found:
-            return f"no lift: {found.detail or found.reason}; choose where {self.holds} goes, or drive the arm"
+            why = found.detail or found.reason
+            return refused(f"no lift: {why}; choose where {self.holds} goes, or drive the arm")
         made = route_to(world, session.q, found.solutions[0], session.rates, session.seed)
-        return f"no lift: {made}" if isinstance(made, NoRoute) else session.guide.propose(made)
+        return refused(f"no lift: {made}") if isinstance(made, NoRoute) else session.guide.propose(made)
 
     def _grasps(self) -> list[tuple[SeenObject, float, pin.SE3]]:
         """All grasps of what is in view: the object, how far it is lifted, and ``T_base_tip``."""

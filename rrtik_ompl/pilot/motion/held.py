@@ -8,10 +8,12 @@ import numpy as np
 
 from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.pilot.answers import Answer, alarm, news, refused
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.guide import Guide
-from rrtik_ompl.pilot.interlock import FOLLOWING, MOVING
-from rrtik_ompl.pilot.motion.drive import LEASH_SECONDS, Drive
+from rrtik_ompl.pilot.interlock import FOLLOWING, MOVING, Sight
+from rrtik_ompl.pilot.motion.drive import HOLD_SECONDS, LEASH_SECONDS, Drive
+from rrtik_ompl.pilot.motion.supervisor import slack_of
 from rrtik_ompl.pilot.routes.follower import MADE, Follower
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange, check_move, move_refusal, way_out
 from rrtik_ompl.pilot.routes.track import Track
@@ -34,8 +36,9 @@ class Driven(Protocol):
     time: float
     selected: int
     mode: str
-    message: str
     guide: Guide
+    answer: Answer
+    sight: Sight | None
 
     @property
     def world(self) -> World:
@@ -59,8 +62,8 @@ class Held:
 
     def __init__(self, session: Driven) -> None:
         """Begin with nothing pressed."""
-        self.drive, self.speed = Drive(session.arm, session.rates), 1.0
-        self._session = session
+        self.drive, self.speed = Drive(session.robot, session.arm, session.rates), 1.0
+        self._session, self._slack = session, slack_of(session.robot)
         self._press: tuple[str, float] = ("", -1.0)  # command and number of the press that drives, or drove last
         self.over = False
         self._due = 0, 0.0  # joint and end of the move that it makes
@@ -73,7 +76,7 @@ class Held:
 
     def end(self) -> None:
         """Stop what is driven; the press that drove it has no effect any more."""
-        self.drive.end()
+        self.drive.end(self._session.time)
         self.over = True
 
     def refuse(self, verb: str, press: object) -> None:
@@ -82,51 +85,80 @@ class Held:
         if verb in MOVING and isinstance(press, int | float):
             self._press = (verb, press)
 
-    def expire(self, time: float) -> None:
-        """End a press that was not renewed in time."""
-        if self.drive.expire(time):
-            self.end()
+    def expire(self) -> Answer | None:
+        """End a press that was not renewed in time; what there is to say, None if nothing."""
+        if not self.drive.expire(self._session.time):
+            return None
+        self.end()
+        return alarm(f"no command for {HOLD_SECONDS:g} s: stopped, press again")
 
-    def set_speed(self, share: float) -> str:
+    def watch(self) -> Answer | None:
+        """After a reading of the arm: end a press that does not move it; what there is to say, None if nothing."""
+        session, drive = self._session, self.drive
+        drive.supervisor.read(session.q, session.time)
+        standing = drive.supervisor.standing(session.time)
+        if standing is None:
+            return None
+        joint, moved, seconds = standing
+        name, amount = session.robot.joint_names[joint], drive.supervisor.amount
+        left = abs(drive.goal - float(session.q[joint]))
+        near = joint == drive.joint and left <= self._slack[joint]
+        if near and self._press[0] == "next":
+            return None  # `next` itself takes the move for made
+        self.end()
+        if near:
+            return refused(f"{name} comes no nearer than {amount(joint, left)}: stopped")
+        return alarm(f"{name} does not move ({amount(joint, moved)} in {seconds:.1f} s): stopped")
+
+    @property
+    def pace(self) -> float:
+        """Share of the joints' rates at which none moves farther than a degree in the time that the pilot sees late."""
+        sight = self._session.sight
+        if sight is None or sight.state <= 0.0:
+            return self.speed
+        return min(self.speed, float((self._slack / (sight.state * self._session.rates)).min()))
+
+    def set_speed(self, share: float) -> Answer:
         """At which share of their rates joints are driven."""
         self.speed = float(np.clip(share, MIN_SPEED, 1.0))
-        return f"speed {100 * self.speed:.0f} %"
+        return news(f"speed {100 * self.speed:.0f} %")
 
-    def release(self) -> str:
+    def release(self) -> Answer:
         """Nothing is pressed any more."""
         session, driven = self._session, self.drive.active
         self.end()
         if not driven or session.mode != FOLLOWING:
-            return "released" if driven else session.message
+            return news("released") if driven else session.answer
         if session.guide.follower is None or session.guide.follower.joint() is None:
-            return "released: hold 'next' to go on"
+            return news("released: hold 'next' to go on")
         joint, end = self._due
         left, unit = reading(abs(end - float(session.q[joint])), joint_unit(session.robot.prismatic[joint]))
-        return f"{session.robot.joint_names[joint]}: {left:.3g} {unit} are left of the move; hold 'next' to go on"
+        name = session.robot.joint_names[joint]
+        return refused(f"{name}: {left:.3g} {unit} are left of the move; hold 'next' to go on")
 
-    def jog(self, direction: float, press: float) -> str:
+    def jog(self, direction: float, press: float) -> Answer:
         """Drive the selected joint, at a share of the speed from -1 to 1."""
         session, sign = self._session, float(np.sign(direction))
         self.begins("jog", press)
         if sign == 0.0:
-            self.drive.end()
-            return "released"
+            self.drive.end(session.time)
+            return news("released")
         joint, room = session.selected, session.joint_range()
         goal, end = (room.high, room.above) if sign > 0.0 else (room.low, room.below)
         if room.low == room.high:
             goal, end = way_out(session.world, session.q, joint, sign), "out of contact"
-        return self._run(joint, goal, min(abs(direction), 1.0), f"end of the range: {end}")
+        return self._run(joint, goal, min(abs(direction), 1.0), refused(f"end of the range: {end}"))
 
-    def move(self, target: float) -> str:
+    def move(self, target: float) -> Answer:
         """Say where the selected joint is to go; `go`, held, drives it there."""
         session, joint = self._session, self._session.selected
         check = check_move(session.world, session.q, joint, float(target))
         if not check.allowed:
             raise InputError(move_refusal(session.world, session.q, joint, float(target), check))
         session.desired = self._with(joint, float(target))
-        return "; ".join((f"{self._place(joint, float(target))}: hold Enter to drive there", *check.warnings))
+        return news("; ".join((f"{self._place(joint, float(target))}: hold Enter to drive there", *check.warnings)))
 
-    def go(self, press: float) -> str:
+    def go(self, press: float) -> Answer:
         """Drive the selected joint to where it is to go."""
         session, joint = self._session, self._session.selected
         target = float(session.desired[joint])
@@ -134,9 +166,9 @@ class Held:
             check = check_move(session.world, session.q, joint, target)
             if not check.allowed:
                 raise InputError(move_refusal(session.world, session.q, joint, target, check))
-        return self._run(joint, target, 1.0, self._place(joint, target))
+        return self._run(joint, target, 1.0, news(self._place(joint, target)))
 
-    def next(self, press: float) -> str:
+    def next(self, press: float) -> Answer:
         """Make the current move of the route; each press makes one move at most, but for a route of all joints."""
         session, follower = self._session, self._session.guide.follower
         if follower is None:
@@ -147,12 +179,12 @@ class Held:
             self._due, self._nearest = self._due_move(follower), (np.inf, session.time)
         joint, end = self._due
         if self._stuck(abs(end - float(session.q[joint])), float(follower.slack[joint])):
-            return session.command("settle", session.time)
-        return self._run(
-            joint, end, 1.0, f"{session.robot.joint_names[joint]} is there: release, then hold 'next' again"
-        )
+            session.command("settle", session.time)
+            return session.answer
+        name = session.robot.joint_names[joint]
+        return self._run(joint, end, 1.0, news(f"{name} is there: release, then hold 'next' again"))
 
-    def _along(self, track: Track, press: float) -> str:
+    def _along(self, track: Track, press: float) -> Answer:
         """Go on along a route of all joints."""
         session = self._session
         if self.begins("next", press):
@@ -160,9 +192,10 @@ class Held:
             session.guide.refuse_if_blocked()
         if track.done:
             self.end()
-            return "all joints are there"
-        self.drive.lead(track.ahead(self.speed * LEASH_SECONDS), session.time)
-        return "driving all joints"
+            return news("all joints are there")
+        point = track.ahead(self.pace * LEASH_SECONDS)
+        self.drive.lead(point, self.pace, session.q, session.time)
+        return news("driving all joints")
 
     def _stuck(self, away: float, slack: float) -> bool:
         """Whether the arm has stopped coming nearer to the end of its move, within the tolerance of the route."""
@@ -176,7 +209,7 @@ class Held:
         """Whether a press is a new one."""
         if (verb, press) == self._press:
             return False
-        self.drive.end()
+        self.drive.end(self._session.time)
         self._press, self.over, self._near = (verb, press), False, MADE
         return True
 
@@ -198,15 +231,16 @@ class Held:
         session, joint = self._session, self.drive.joint
         return joint is None or session.world.motion_valid(session.q, self._with(joint, self.drive.goal))
 
-    def _run(self, joint: int, goal: float, share: float, at_goal: str) -> str:
+    def _run(self, joint: int, goal: float, share: float, at_goal: Answer) -> Answer:
         session = self._session
         if abs(goal - session.q[joint]) <= self._near:
             self.end()
             return at_goal
-        point = self.drive.renew(joint, goal, max(self.speed * share, 1e-3), session.q, session.time)
+        speed = max(min(self.speed * share, self.pace), 1e-3)
+        point = self.drive.renew(joint, goal, speed, session.q, session.time)
         if self._press[0] == "jog":
             session.desired = self._with(joint, point)
-        return f"driving {session.robot.joint_names[joint]}"
+        return news(f"driving {session.robot.joint_names[joint]}")
 
     def _with(self, joint: int, value: float) -> Vector:
         desired = self._session.q.copy()

@@ -13,6 +13,7 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.following.servo import Servo
 from rrtik_ompl.following.visual_servo import VisualServo
+from rrtik_ompl.pilot.answers import Answer, news
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.motion.drive import LEASH_SECONDS
 from rrtik_ompl.pilot.motion.held import Held
@@ -65,7 +66,7 @@ class Leading:
         self._world: World | None = None
         self._before = 0.0
 
-    def servo(self, press: float) -> str:
+    def servo(self, press: float) -> Answer:
         """Go to the grasp that is chosen by what the camera sees of it; only the last centimetres."""
         session = self._session
         if session.target is None or session.choice is None:
@@ -94,13 +95,13 @@ class Leading:
         if step.state != "moving":
             session.held.end()
             if step.state == "done":
-                return f"at the grasp, to {1e3 * step.away:.2f} mm and {np.rad2deg(step.turned):.2f} deg"
+                return news(f"at the grasp, to {1e3 * step.away:.2f} mm and {np.rad2deg(step.turned):.2f} deg")
             raise InputError(f"stopped {left} before the grasp: {WHY[step.state].format(session.target)}")
-        fast = float((np.abs(step.rates) / session.rates).max()) / session.held.speed
+        fast = float((np.abs(step.rates) / session.rates).max()) / session.held.pace
         self._lead(session.q + step.rates * (LEASH_SECONDS / max(fast, 1.0)))
-        return f"servoing: {left} to the grasp"
+        return news(f"servoing: {left} to the grasp")
 
-    def lead(self, press: float) -> str:
+    def lead(self, press: float) -> Answer:
         """Follow the joints of the master arm."""
         session, master = self._session, self.master
         if master is None:
@@ -112,7 +113,7 @@ class Leading:
         away = wanted - session.q
         if session.held.begins("lead", press):
             self._check_aligned(away)
-        most = session.rates * session.held.speed * LEASH_SECONDS
+        most = session.rates * session.held.pace * LEASH_SECONDS
         point = session.q + np.clip(away, -most, most)
         world = session.world
         if not world.motion_valid(session.q, point):
@@ -121,12 +122,12 @@ class Leading:
             pair = f"'{touched[0].first}' and '{touched[0].second}' would touch" if touched else "not free"
             raise InputError(f"stopped: {pair}; lead the master another way, then hold again")
         self._lead(point)
-        return "led by the master arm"
+        return news("led by the master arm")
 
     def _lead(self, point: Vector) -> None:
         session = self._session
-        session.held.drive.lead(session.robot.clamp(point), session.time)
         session.desired = session.robot.clamp(point)
+        session.held.drive.lead(session.desired, session.held.pace, session.q, session.time)
 
     def _check_aligned(self, away: Vector) -> None:
         robot = self._session.robot

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-FRAMES, STATES = 2, 2  # unacknowledged messages to a client at a time
+FRAMES, STATES = 2, 8  # unacknowledged messages to a client at a time; states are small, and their age counts
 PILOT, WATCHING = "pilot", "watching"
 Message = bytes | str
 
@@ -58,6 +58,7 @@ class Client:
         """
         self.number, self.name, self.send = number, name, send
         self.frames, self.states = Lane(send, FRAMES), Lane(send, STATES)
+        self.heard: float | None = None  # stamp of the last state that it says to have shown
 
     def send_json(self, **words: object) -> None:
         """Send a short message at once."""
@@ -114,6 +115,10 @@ class Clients:
             self.pilot, self._handed_over = None, True
             self._on_left()
             self._send_roles()
+
+    def heard(self) -> dict[int, float]:
+        """By the number of each page, the stamp of the last state that it says to have shown."""
+        return {client.number: client.heard for client in tuple(self._all) if client.heard is not None}
 
     def show_state(self, text: str) -> None:
         """Send a state to all."""

@@ -6,6 +6,11 @@ that come from its own page (Host and Origin), and where a token is set only tho
 A WebSocket carries to the page: pictures as binary messages (a letter for the kind, the time as 8 bytes little-endian
 float [s], a JPEG) and JSON texts of the kinds "state", "role" and "refused"; from the page: JSON texts, either
 ``{"shown": "frame" | "state"}`` for everything that was shown, or a command ``{"name": .., "seq": .., arguments}``.
+
+No clock but the session's is needed to know how old is what a pilot sees. A state has the time at which it was made,
+``stamp``, and a picture of the camera that at which it was taken. The page sends both back with each command, as
+``seen`` and ``picture``, and the first with each ``shown``, as ``stamp``; ``heard`` in a state says by the page's
+number which stamp has come back last.
 """
 
 from __future__ import annotations
@@ -39,6 +44,7 @@ from rrtik_ompl.pilot.web.handlers import FILES, PageHandler, SocketHandler
 LOOPBACK = "127.0.0.1"
 MAX_MESSAGE_BYTES = 16 * 1024  # from a page
 MAX_QUEUED_COMMANDS = 200
+MAX_STAMP = 1e12  # [s]
 MIN_TOKEN_LENGTH = 16
 GOING_AWAY, FAREWELL_SECONDS = 1001, 0.1  # code of a WebSocket that is closed, and time for it to arrive
 PING_SECONDS, PONG_SECONDS = 5.0, 5.0
@@ -107,6 +113,10 @@ class PilotServer:
         self._loop.call_soon_threadsafe(self._end)
         self._thread.join(timeout=10.0)
 
+    def heard(self) -> dict[int, float]:
+        """By the number of each page, the stamp of the last state that it says to have shown."""
+        return self.clients.heard()
+
     def show_state(self, state: dict[str, Any], executed: dict[int, int]) -> None:
         """Send a state to all pages, with the number of the last command of each page that was executed before it."""
         text = json.dumps({"kind": "state", "answered": executed, **state}, allow_nan=False)
@@ -134,6 +144,9 @@ class PilotServer:
             return
         if "shown" in said:
             (client.frames if said["shown"] == "frame" else client.states).arrived()
+            stamp = said.get("stamp")
+            if isinstance(stamp, int | float) and not isinstance(stamp, bool) and 0.0 <= stamp <= MAX_STAMP:
+                client.heard = float(stamp)
         elif said.get("name") == "ping":
             client.send_json(kind="pong")
         elif said.get("name") == "take":

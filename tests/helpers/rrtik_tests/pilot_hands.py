@@ -39,7 +39,14 @@ class Gamepad:
         self.browser = browser
         browser.ask(PAD)
         browser.wait("!document.getElementById('pad').hidden")
-        browser.ask(f"push({ENABLE}, true)")
+        self._enable()
+
+    def _enable(self):
+        """Press the shoulder button, anew if something has disarmed the gamepad."""
+        if not self.browser.ask("padArmed"):
+            self._let_go(ENABLE)
+            self.browser.ask(f"push({ENABLE}, true)")
+            self.browser.wait("padArmed")
 
     def tap(self, what, until):
         number = BUTTONS[what]
@@ -48,7 +55,12 @@ class Gamepad:
         self._let_go(number)
 
     def next(self, until):
-        self.browser.keep(lambda: self.browser.ask(f"push({NEXT}, true)"), lambda: self._let_go(NEXT), until)
+
+        def push():
+            self._enable()
+            self.browser.ask(f"push({NEXT}, true)")
+
+        self.browser.keep(push, lambda: self._let_go(NEXT), until)
 
     def away(self):
         self.browser.ask("delete navigator.getGamepads; 0")

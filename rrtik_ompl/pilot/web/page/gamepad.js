@@ -15,22 +15,25 @@ const PAD_WORDS = "gamepad: LB held enables · left stick drives the joint · A 
   + "RT without LB: level · left stick pressed: gripper · right stick pressed: lift";
 let padBefore = [], padWasThere = false;
 
+const NEUTRAL_WORDS = "gamepad: let the stick go, then press LB anew";
+
 const firstPad = () => [...(navigator.getGamepads?.() ?? [])].find((pad) => pad && pad.connected && pad.mapping === "standard");
 const isDown = (pad, number) => Boolean(pad && pad.buttons[number]?.pressed);
 
 function stick() {
-  const pad = firstPad(), pushed = pad && isDown(pad, ENABLE) ? pad.axes[0] : 0, size = Math.abs(pushed);
+  const pad = firstPad(), pushed = pad && padArmed && isDown(pad, ENABLE) ? pad.axes[0] : 0, size = Math.abs(pushed);
   return size < DEAD_ZONE ? null : ["jog", { direction: Math.sign(pushed) * Math.min((size - DEAD_ZONE) / (1 - DEAD_ZONE), 1) }];
 }
 
 function readPad() {
   const pad = firstPad();
   if (padWasThere !== Boolean(pad)) showPad(Boolean(pad));
-  if (!pad) { letGo("stick"); for (const number of PAD_HELD.keys()) letGo(`pad ${number}`); padBefore = []; return; }
+  if (!pad) { if (padBefore.length) letAllGo(); padBefore = []; return; }
   const now = pad.buttons.map((button) => button.pressed), tapped = (number) => now[number] && !padBefore[number];
-  if (tapped(STOP_BUTTON)) { letGo(); send("stop"); }
+  if (tapped(STOP_BUTTON)) stopNow();
+  arm(pad, now);
   for (const [number, make] of PAD_HELD) {
-    if (tapped(number) && now[ENABLE]) hold(`pad ${number}`, () => isDown(firstPad(), ENABLE) && isDown(firstPad(), number) ? make() : null);
+    if (tapped(number) && now[ENABLE] && padArmed) hold(`pad ${number}`, () => padArmed && isDown(firstPad(), ENABLE) && isDown(firstPad(), number) ? make() : null);
     if (!now[number]) letGo(`pad ${number}`);
   }
   for (const [number, act] of PAD_TAPPED) if (tapped(number) && state && !(now[ENABLE] && PAD_HELD.has(number))) { letGo(); act(); }
@@ -39,10 +42,19 @@ function readPad() {
   padBefore = now;
 }
 
+// As of every enabling device: it has to be pressed anew, and with the stick at rest, before it enables anything.
+function arm(pad, now) {
+  if (!now[ENABLE]) padArmed = false;
+  else if (padBefore.length && !padBefore[ENABLE]) {
+    padArmed = Math.abs(pad.axes[0]) < DEAD_ZONE;
+    if (!padArmed) say(NEUTRAL_WORDS, "refusal");
+  }
+}
+
 function showPad(there) {
   padWasThere = there;
   byId("pad").hidden = !there;
   byId("pad").title = PAD_WORDS;
-  if (!there) say("the gamepad is gone: the arm stands still", true);
+  if (!there) say("the gamepad is gone: nothing is driven by it", "alarm");
 }
 setInterval(readPad, PAD_PERIOD_MS);

@@ -3,7 +3,7 @@
 "use strict";
 
 const KEYS = [
-  ["Space", [" "], "stop at once (every page may)", () => stopNow()],
+  ["Space", [], "stop at once (every page may)", null],
   ["1 … 9", [..."123456789"], "select a joint", (key) => selectJoint(Number(key) - 1)],
   ["↑ ↓", ["ArrowUp", "ArrowDown"], "previous, next joint", (key) => neighbourJoint(key === "ArrowUp" ? -1 : 1)],
   ["← →", ["ArrowLeft", "ArrowRight"], "hold: drive the joint", null, (key) => ["jog", { direction: key === "ArrowLeft" ? -1 : 1 }]],
@@ -34,16 +34,38 @@ const KEYS = [
   ["T", ["t"], "take over, when no pilot is there", () => send("take")],
   ["H", ["h"], "hand over to a page that watches", () => send("hand_over")],
   ["Z", ["z"], "pause a record", () => send("pause")],
-  ["?", ["?"], "these keys", () => openHelp()],
+  ["?", ["?"], "these keys", () => toggleHelp()],
 ];
 const ACTIONS = new Map(KEYS.flatMap(([, keys, , act]) => (act ? keys : []).map((key) => [key, act])));
 const HELD = new Map(KEYS.filter((entry) => entry[4]).flatMap(([, keys, , , make]) => keys.map((key) => [key, make])));
-const LOOKING = new Set(["v", "+", "=", "-", "x", "[", "]", "PageUp", "PageDown", "0", "?"]);  // while a key is held
+const LOOKING = new Set(["v", "+", "=", "-", "x", "[", "]", "PageUp", "PageDown", "0"]);  // while a key is held
 const TURNS = { ArrowLeft: [-0.12, 0], ArrowRight: [0.12, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08] };
 const SCRUBBING = new Set(["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"]);
 const REPEATED = new Set(["[", "]", "+", "=", "-"]);
 
-function openHelp() { document.getElementById("help").showModal(); }
+const help = document.getElementById("help");
+
+// The list is no modal dialog, under which STOP would be dead: instead everything but the list and STOP is.
+function toggleHelp() {
+  letAllGo();
+  if (help.open) help.close(); else help.show();
+  document.body.classList.toggle("listing", help.open);
+}
+for (const kind of ["pointerdown", "click", "wheel"]) addEventListener(kind, (event) => {
+  if (!help.open || event.target.closest("#help, #stop")) return;
+  event.preventDefault();
+  event.stopImmediatePropagation();
+}, { capture: true, passive: false });
+
+// Space stops, whatever is open or focused, and with any modifier; its button hears nothing of it.
+function onSpace(event) {
+  if (event.key !== " " && event.code !== "Space") return;
+  event.preventDefault();
+  event.stopImmediatePropagation();
+  if (event.type === "keydown" && !event.repeat) stopNow();
+}
+addEventListener("keydown", onSpace, { capture: true });
+addEventListener("keyup", onSpace, { capture: true });
 
 // What is focused keeps the keys that it cannot do without; all others command, wherever the mouse has been.
 function needsKey(element, key) {
@@ -51,11 +73,15 @@ function needsKey(element, key) {
 }
 
 function onKey(event) {
-  if (event.ctrlKey || event.altKey || event.metaKey || document.getElementById("help").open) return;
-  if (event.key !== " " && needsKey(event.target, event.key)) return;
+  if (help.open) { onKeyInHelp(event); return; }
+  if (event.ctrlKey || event.altKey || event.metaKey || needsKey(event.target, event.key)) return;
+  if (event.key === "Enter" && event.target.matches("button")) {
+    if (event.repeat) event.preventDefault();  // a key that is held down clicks once
+    return;
+  }
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   const turn = event.shiftKey && TURNS[key];
-  if (!turn && HELD.has(key) && !event.target.matches("button")) {
+  if (!turn && HELD.has(key)) {
     event.preventDefault();
     if (!event.repeat) hold(key, () => HELD.get(key)(key));
     return;
@@ -67,18 +93,20 @@ function onKey(event) {
   act(key);
 }
 
-function stopNow() { letGo(); send("stop"); }
+function onKeyInHelp(event) {
+  if (event.key === "Escape" || event.key === "?") toggleHelp();
+  else if (event.key === "Tab" || (event.key === "Enter" && event.repeat)) event.preventDefault();  // stay on "Close"
+}
+
+function stopNow() { letAllGo(); send("stop"); }
 
 addEventListener("keydown", onKey);
-addEventListener("keyup", (event) => {
-  if (event.key === " ") event.preventDefault();
-  letGo(event.key.length === 1 ? event.key.toLowerCase() : event.key);
-});
+addEventListener("keyup", (event) => letGo(event.key.length === 1 ? event.key.toLowerCase() : event.key));
 document.getElementById("key_list").replaceChildren(...KEYS.map(([shown, , what]) => {
   const line = document.createElement("div"), key = document.createElement("kbd");
   key.textContent = shown;
   line.append(what, key);
   return line;
 }));
-document.getElementById("help_open").onclick = openHelp;
-document.getElementById("help_close").onclick = () => document.getElementById("help").close();
+document.getElementById("help_open").onclick = toggleHelp;
+document.getElementById("help_close").onclick = toggleHelp;

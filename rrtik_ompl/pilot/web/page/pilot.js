@@ -4,9 +4,8 @@
 const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1];  // shares of the joints' rates
 const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
 const NEAR_LIMIT = 0.04, MARK = 0.006, UNSEEN_S = 1, HOLD_MS = 3000, SLOW_LINK_MS = 250;
-const WORRYING = /refused|no route|must|cannot|not where|off the route|blocked|lost|takes|first|there is no|narrow|no lift|nothing is|withdrawn|stopped:|but the tip|no nearer|left;|outside|collision|away from the goal/;
 const FIRST_WORDS = "Choose a grasp with G and L, then plan with P. Or choose a joint with 1 … 9 and hold ← or → to drive it.";
-let state = null, role = { role: "watching", free: false, pages: 1 }, preset = 0, receivedAt = 0, playing = null;
+let state = null, role = { role: "watching", free: false, pages: 1 }, preset = 0, playing = null;
 let previousAlert = "", heldUntil = 0;
 
 const byId = (id) => document.getElementById(id);
@@ -49,7 +48,7 @@ function nextPreset() { preset = (preset + 1) % state.views.length; send("preset
 function showNow() { pausePlay(); send("play", { share: null }); }
 function scrub(by) { preview((state.playing ?? 0) + by); }
 function preview(share) {
-  if (!state.route) { say("no route to preview; P plans one", true); return; }
+  if (!state.route) { say("no route to preview; P plans one", "refusal"); return; }
   pausePlay();
   send("play", { share: Math.min(Math.max(share, 0), 1) });
 }
@@ -86,7 +85,7 @@ function showRole(said) {
 }
 
 function onDisconnected() {
-  letGo();
+  letAllGo();
   const chip = byId("role");
   chip.className = "chip bad";
   set(chip, "Not connected · trying again");
@@ -94,21 +93,21 @@ function onDisconnected() {
 
 function showState(said) {
   const newRoute = Boolean(said.route) && said.mode === "proposed" && (!state || state.mode !== "proposed");
-  const newMessage = !state || state.message !== said.message;
+  const newMessage = !state || state.message !== said.message || state.level !== said.level;
   state = said;
-  receivedAt = performance.now();
   for (const item of byId("modes").children)
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
-  if (newMessage || performance.now() > heldUntil) say(inWords(said.message) || FIRST_WORDS, WORRYING.test(said.message), 0);
+  if (newMessage || performance.now() > heldUntil) say(inWords(said.message) || FIRST_WORDS, said.level, 0);
   showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showGripper(); showViews(); showPreview(); showAge();
   if (said.mode !== "proposed" && playing) pausePlay();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
 
-function say(text, bad = false, hold = HOLD_MS) {
+// `level`: "news", "refusal" of a command, or "alarm", which nobody has commanded.
+function say(text, level = "news", hold = HOLD_MS) {
   heldUntil = performance.now() + hold;
   set(byId("message"), text);
-  byId("message").className = bad ? "bad" : "";
+  byId("message").className = level;
 }
 
 function alertOnce(text) {
@@ -118,22 +117,25 @@ function alertOnce(text) {
 
 function showAge() {
   if (!state) return;
-  const chip = byId("age"), waited = (performance.now() - receivedAt) / 1000;
-  const age = state.picture_age === null ? null : state.picture_age + waited;
+  const chip = byId("age"), age = pictureAge(), silent = (performance.now() - seenAt) / 1000;
   const past = state.replay || state.pictures_ended;  // photographs and films end: no reason for alarm
   const stale = !past && (age === null || age > STALE_S);
   document.body.classList.toggle("stale", stale);
-  document.body.classList.toggle("untrue", stale || Boolean(state.trouble));
+  document.body.classList.toggle("untrue", stale || Boolean(state.trouble && state.trouble !== state.fault_of_arm));
   chip.classList.toggle("bad", stale);
   set(chip, state.replay ? state.camera_lost || (state.paused ? "record, paused" : "record")
-    : state.pictures_ended ? "the last picture" : age === null ? "no picture yet" : stale ? `STALE picture: ${fixed(age)} s old` : `picture ${Math.round(1000 * age)} ms old`);
+    : state.pictures_ended ? "the last picture" : age === null ? "no picture yet" : stale ? `STALE picture: up to ${fixed(age)} s old` : `picture at most ${Math.round(1000 * age)} ms old`);
+  chip.title = "from the camera to this screen, and until the arm can hear what you do";
   const reasons = [];
   if (state.camera_lost && !past) reasons.push(`Camera lost: ${state.camera_lost}. What is shown is the last known state.`);
   if (state.arm_lost) reasons.push(`${state.arm_lost}`);
-  if (!reasons.length && stale && age !== null) reasons.push("The picture is stale: nothing moves.");
+  if (!reasons.length && silent > STALE_S && !past) reasons.push(`No news from the server for ${fixed(silent)} s: this page drives nothing, and the arm stops where it hears no page.`);
+  else if (!reasons.length && stale && age !== null) reasons.push(state.stale ? "The picture is stale: nothing moves." : "The picture comes too late: nothing is driven from this page.");
   byId("camera_banner").hidden = !reasons.length;
   set(byId("camera_banner"), reasons.join(" "));
-  alertOnce(reasons.join(" "));
+  alertOnce(reasons.join(" ").replace(/\d+\.\d+ s/, "some time"));  // said once, not each tenth of a second
+  showLink();
+  if (held && isLate()) letAllGo();
 }
 setInterval(showAge, 100);
 
@@ -331,8 +333,9 @@ function showViews() {
   set(byId("outside_tag"), state.view ? `Camera: ${state.view}` : "From outside");
 }
 
-function showLink(ms) {
-  byId("link").hidden = false;
+function showLink() {
+  const ms = window.measured.link = lineTime();
+  byId("link").hidden = ms === null;
   byId("link").classList.toggle("bad", ms > SLOW_LINK_MS);
   set(byId("link"), `link ${Math.round(ms)} ms`);
 }
@@ -362,7 +365,7 @@ byId("value").onkeydown = (event) => {
   if (event.key !== "Enter" && event.key !== "Escape") return;
   event.stopPropagation();  // it is another press of Enter that drives
   if (event.key === "Enter" && Number.isFinite(typed)) send("move", { target: inRadians(typed, state.joints[state.selected].unit) });
-  else if (event.key === "Enter") say("type a number for the joint, for example -20", true);
+  else if (event.key === "Enter") say("type a number for the joint, for example -20", "refusal");
   event.target.value = "";
   event.target.blur();
 };
