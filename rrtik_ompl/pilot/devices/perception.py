@@ -14,12 +14,14 @@ from rrtik_ompl.pilot.devices.base_motion import BaseMotion
 from rrtik_ompl.pilot.devices.camera_feed import ENDED, Feed, PictureSource
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
+from rrtik_ompl.pilot.interlock import STALE_SECONDS
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.frames import base_from_camera, tip_seen
 from rrtik_ompl.sensing.sensor import Sensor, View
 
+REPEATS = "the camera repeats its last picture"
 FINGERS = 0.02  # [m]; a gripper that closes this near to a grasp takes the object
 EXPLANATION_SECONDS = 5.0  # between two searches for unknown markers
 
@@ -66,6 +68,7 @@ class LivePerception:
         self.others: tuple[NDArray[np.uint8], ...] = ()
         self.lost = self.hint = ""
         self._explain_again = -np.inf
+        self._last: Picture | None = None
         self._sensor, self.source = sensor, source
 
     def update(self, session: Session, time: float) -> None:
@@ -73,6 +76,9 @@ class LivePerception:
         try:
             taken = self.source.latest()
             if taken is None:
+                return
+            if self._frozen(taken) and not session.past:
+                self.lost = REPEATS if session.time - session.picture_time > STALE_SECONDS else self.lost
                 return
             others = [Picture(each.pixels, each.name, time) for each in taken.others]
             view = self._sensor.view(Picture(taken.pixels, taken.name, time), *others)
@@ -89,6 +95,14 @@ class LivePerception:
         self.hint = self._why_nothing(view, time, known=bool(session.surroundings.seen))
         if not view.why_not_placed:
             self.T_base_camera, _ = base_from_camera(self._sensor.marker_map, view.seen)
+
+    def _frozen(self, taken: Picture) -> bool:
+        """Whether a picture, or that of another camera of the rig, is the last one again: it shows no present."""
+        before, self._last = self._last, taken
+        if before is None or len(before.others) != len(taken.others):
+            return False
+        now, then = (taken, *taken.others), (before, *before.others)
+        return any(each.repeats(last) for each, last in zip(now, then, strict=True))
 
     def close(self) -> None:
         """Release the camera."""

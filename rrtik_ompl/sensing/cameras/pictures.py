@@ -27,13 +27,21 @@ MAX_FILE_BYTES = 512 * 1024 * 1024
 class Picture:
     """One picture: blue, green, red, shape (height, width, 3), where it comes from, and its time [s].
 
-    ``others`` are those that the other cameras of a rig took at the same time.
+    ``others`` are those that the other cameras of a rig took at the same time. ``noisy`` is False for one that was
+    computed: two of a scene that stands still are equal then, and only their times tell them apart.
     """
 
     pixels: NDArray[np.uint8]
     name: str
     time: float
     others: tuple[Picture, ...] = ()
+    noisy: bool = True
+
+    def repeats(self, before: Picture) -> bool:
+        """Whether a camera that lives cannot have taken it after another one: noise makes any two pictures differ."""
+        if not self.noisy and self.time != before.time:
+            return False
+        return np.array_equal(self.pixels, before.pixels)
 
 
 def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:

@@ -12,10 +12,11 @@ import tornado.websocket
 class Page:
     """What a page's script does, without a browser."""
 
-    def __init__(self, server, name="one", **headers):
-        self.heard, self.closed = [], False
+    def __init__(self, server, name="one", port=None, **headers):
+        self.heard, self.closed, self._reading = [], False, None
         self._loop = asyncio.new_event_loop()
-        url = f"ws://127.0.0.1:{server.port}/ws?page={name}&token={server.token}"
+        url = f"ws://127.0.0.1:{port or server.port}/ws?page={name}&token={server.token}"
+        headers = {"Host": f"127.0.0.1:{server.port}"} | headers if port else headers
         request = tornado.httpclient.HTTPRequest(url, headers=headers, request_timeout=100)
         self._socket = self._do(partial(tornado.websocket.websocket_connect, request))
 
@@ -37,6 +38,25 @@ class Page:
             self.closed = True
             raise ConnectionError("closed")
         return json.loads(message) if isinstance(message, str) else message
+
+    def hear_within(self, seconds):
+        """The next message, None if none comes in time."""
+        if self._reading is None:
+            self._reading = self._do(self._begin_reading)
+        if not self._loop.run_until_complete(self._wait(seconds)):
+            return None
+        message, self._reading = self._reading.result(), None
+        if message is None:
+            raise ConnectionError("closed")
+        return json.loads(message) if isinstance(message, str) else message
+
+    async def _begin_reading(self):
+        return asyncio.ensure_future(self._socket.read_message())
+
+    async def _wait(self, seconds):
+        """Whether there is a message in time."""
+        done, _ = await asyncio.wait([self._reading], timeout=seconds)
+        return bool(done)
 
     def hear_until(self, good):
         """The first message that is good; frames and states before it are acknowledged."""

@@ -1,0 +1,184 @@
+"""An arm that does another thing than it is told, and a pilot who holds a joint's key at it through a whole server."""
+
+import socket
+import threading
+import time
+from contextlib import ExitStack, closing
+
+import numpy as np
+
+from rrtik_ompl.overlay.virtual_camera import pinhole_camera
+from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
+from rrtik_ompl.pilot.engine import Engine
+from rrtik_ompl.pilot.run import Loop
+from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.pilot.web.server import PilotServer
+from rrtik_tests.page_by_hand import Page
+from rrtik_tests.pilot_session import PLACE, PROBLEM, ROBOT, seen_at
+
+OTHER = 1  # the joint that moves in place of the one that is told
+
+
+class HostileArm(SimulatedArm):
+    """A simulated arm with a fault that can be set while it moves.
+
+    Attributes:
+        fault: "other" (another joint moves), "reverse", "jump" (its reading jumps by 34 degrees), "dead", "runaway" (it
+            does not stop); "" for none.
+    """
+
+    def __init__(self, robot=ROBOT, start=PROBLEM.start, fault=""):
+        super().__init__(robot, start)
+        self.fault = fault
+        self._told = None
+
+    def read(self):
+        q = super().read()
+        q[0] += 0.6 * (self.fault == "jump" and self._goal is not None)
+        return q
+
+    def stop(self):
+        if self.fault != "runaway":
+            super().stop()
+
+    def advance(self, seconds):
+        if self.fault in ("", "jump") or self._goal is None:
+            super().advance(seconds)
+            return
+        joint, target = self._goal
+        way = np.sign(target - self._q[joint])
+        if self.fault == "runaway":
+            self._told = self._told or way
+            self._q[joint] += self._told * self._rates[joint] * seconds
+        elif self.fault != "dead":
+            moved, way = (OTHER, way) if self.fault == "other" else (joint, -way)
+            self._q[moved] += way * self._rates[moved] * seconds
+
+
+class Undrawn(Engine):
+    """An engine whose pictures are not drawn."""
+
+    def camera_picture(self):
+        return b"\xff\xd8\xff\xd9"
+
+    def outside_picture(self, anew=False):
+        return None
+
+
+class Seeing:
+    """A camera that always sees the same."""
+
+    camera, T_base_camera = pinhole_camera(64, 48), None
+    arm_in_picture, lost, hint = True, "", ""
+    picture = np.zeros((4, 4, 3), dtype=np.uint8)
+
+    def update(self, session, time):
+        session.see([seen_at(PLACE)], time)
+
+    def close(self):
+        pass
+
+
+class Proxy:
+    """A line with a constant delay each way [s]."""
+
+    def __init__(self, target, delay):
+        self._delay, self._target = delay, target
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listening.getsockname()[1]
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self):
+        while True:
+            try:
+                near, _ = self._listening.accept()
+            except OSError:
+                return
+            far = socket.create_connection(("127.0.0.1", self._target))
+            for one, other in ((near, far), (far, near)):
+                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                threading.Thread(target=self._pump, args=(one, other), daemon=True).start()
+
+    def _pump(self, one, other):
+        waiting = []
+        one.settimeout(0.002)
+        while True:
+            try:
+                data = one.recv(65536)
+                waiting.append((time.monotonic() + self._delay, data))
+                if not data:
+                    return
+            except TimeoutError:
+                pass
+            except OSError:
+                return
+            while waiting and waiting[0][0] <= time.monotonic():
+                try:
+                    other.sendall(waiting.pop(0)[1])
+                except OSError:
+                    return
+
+    def close(self):
+        self._listening.close()
+
+
+class Pilot:
+    """A whole session behind its server, an arm behind its line, and a page without a browser that holds keys."""
+
+    def __init__(self, arm=None, delay=0.0):
+        self.arm, self._stack = arm or HostileArm(), ExitStack()
+        line = self._stack.enter_context(LineServer(self.arm))
+        joints = self._stack.enter_context(closing(LineArm(ROBOT, "127.0.0.1", line.port)))
+        self.session = Session(PROBLEM, joints, seed=1)
+        self.server = self._stack.enter_context(PilotServer())
+        proxy = self._stack.enter_context(closing(Proxy(self.server.port, delay)))
+        self._ended = threading.Event()
+        loop = Loop(Undrawn(self.session, Seeing()), self.server)
+        self._thread = threading.Thread(target=loop.run, args=(self._ended.is_set,), daemon=True)
+        self._thread.start()
+        self.page = Page(self.server, port=proxy.port)
+        self._state, self._seen, self._picture, self._press = {}, None, None, 0
+        while self._picture is None or not self._state or self._state["trouble"]:
+            self.look(0.1)
+        self.look(0.5)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._ended.set()
+        self._thread.join(10)
+        self._stack.close()
+
+    def look(self, seconds):
+        """Show what comes for a while; returns the last state."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            said = self.page.hear_within(left)
+            if isinstance(said, bytes):
+                self._picture = float(np.frombuffer(said[1:9], dtype="<f8")[0])
+                self.page.say(shown="frame")
+            elif said and said["kind"] == "state":
+                self._state, self._seen = said, said["stamp"]
+                self.page.say(shown="state", stamp=self._seen)
+        return self._state
+
+    def say(self, name, **values):
+        self.page.say(name=name, seen=self._seen, picture=self._picture, **values)
+
+    def hold(self, seconds, until=lambda state: False):
+        """Press the key that drives the selected joint; the last state."""
+        self._press += 1
+        return self.go_on(seconds, until)
+
+    def go_on(self, seconds, until=lambda state: False):
+        """Hold it on."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and not until(self._state):
+            self.say("jog", direction=1.0, press=self._press)
+            self.look(0.04)
+        return self._state
+
+    def release(self):
+        self.say("release")

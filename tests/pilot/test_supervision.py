@@ -1,0 +1,174 @@
+"""An arm that does another thing than it is told stops within a degree and is named, by hand too; so over slow lines."""
+
+import re
+import time
+
+import numpy as np
+import pytest
+
+from rrtik_ompl.pilot.interlock import LATE_SECONDS, Sight
+from rrtik_ompl.pilot.motion.supervisor import Supervisor
+from rrtik_ompl.pilot.session import READ_SECONDS
+from rrtik_tests.hostile_arm import HostileArm, Pilot
+from rrtik_tests.pilot_session import PROBLEM, ROBOT, session
+
+RATES = np.full(ROBOT.dof, np.radians(10.0))
+STEP = 1.0 / 30.0
+
+
+def degrees(arm, before):
+    return np.degrees(arm._q - before)
+
+
+FAULTS = {
+    "other": r"shoulder_pitch moved by 0\.\d deg while azimuth was driven: stopped",
+    "reverse": r"azimuth goes the wrong way, by 0\.\d deg: stopped",
+    "jump": r"azimuth jumped by 3\d\.\d deg between two readings: stopped",
+    "dead": r"azimuth does not move \(0\.0 deg in 0\.[345] s\): stopped",
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_an_arm_with_a_fault_is_stopped_within_a_degree_and_named(fault):
+    with Pilot() as pilot:
+        pilot.hold(0.5)
+        before, begin = pilot.arm._q.copy(), time.monotonic()
+        pilot.arm.fault = fault
+        state = pilot.go_on(1.5, until=lambda state: state["level"] == "alarm")
+        assert time.monotonic() - begin < 1.0
+        pilot.look(0.3)
+        assert re.search(FAULTS[fault], state["message"]), state["message"]
+        assert np.abs(degrees(pilot.arm, before)).max() <= 1.0
+        if fault == "dead":
+            return
+        pilot.arm.fault = ""
+        there = pilot.arm._q.copy()
+        assert "STOP acknowledges" in pilot.hold(0.2)["message"]
+        assert (pilot.arm._q == there).all()
+        pilot.look(READ_SECONDS)
+        pilot.say("stop")
+        assert pilot.look(0.3)["fault_of_arm"] == ""
+        pilot.hold(0.4)
+        assert pilot.arm._q[0] > there[0]
+
+
+def test_an_arm_that_does_not_stop_is_named():
+    with Pilot() as pilot:
+        pilot.hold(0.4)
+        pilot.arm.fault = "runaway"
+        pilot.go_on(0.1)
+        pilot.release()
+        state = pilot.look(1.2)
+        assert re.search(r"azimuth moved on by \d\.\d deg after the stop", state["message"])
+        assert "azimuth" in pilot.hold(0.1)["message"]
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.1, 0.3])
+def test_after_the_release_an_arm_moves_a_degree_at_most_over_any_line(delay):
+    with Pilot(delay=delay) as pilot:
+        begin = pilot.arm._q.copy()
+        state = pilot.hold(0.8 + 2.0 * delay)
+        released = pilot.arm._q.copy()
+        pilot.release()
+        pilot.look(0.6 + 2.0 * delay)
+        assert np.abs(degrees(pilot.arm, released)).max() <= 1.0
+        slow = 2.0 * delay > LATE_SECONDS
+        assert (pilot.arm._q == begin).all() == slow
+        if slow:
+            assert re.fullmatch(r"refused: line too slow for driving: 0\.\d+ s", state["message"])
+
+
+def test_the_rate_falls_as_the_line_gets_slower():
+    reached = {}
+    for age in (0.05, 0.2, 0.29):
+        made, arm = session()
+        made.sight, time_ = Sight(age, age), 0.0
+        for _ in range(30):
+            made.see([], time_)
+            made.command("jog", time_, direction=1.0, press=age)
+            arm.advance(STEP)
+            time_ += STEP
+            made.tick(time_)
+        made.command("release", time_)
+        reached[age] = np.degrees(arm.read()[0] - PROBLEM.start[0])
+        assert reached[age] * age <= 1.05
+    assert reached[0.05] > 9.0
+    assert 4.0 < reached[0.2] < 5.2
+    made.sight = Sight(0.31, 0.0)
+    assert made.command("jog", made.time, direction=1.0, press=9) == "refused: line too slow for driving: 0.31 s"
+
+
+def test_a_hold_that_lapses_is_said_and_needs_a_new_press():
+    with Pilot() as pilot:
+        pilot.hold(0.4)
+        state = pilot.look(0.5)
+        assert state["message"] == "no command for 0.25 s: stopped, press again"
+        assert state["level"] == "alarm"
+        there = pilot.arm._q.copy()
+        pilot.go_on(0.3)
+        assert (pilot.arm._q == there).all()
+
+
+def test_a_page_that_does_not_say_what_it_shows_or_shows_old_pictures_drives_nothing():
+    with Pilot() as pilot:
+        before = pilot.arm._q.copy()
+        pilot.page.say(name="jog", direction=1.0, press=90)
+        assert "reload it" in pilot.look(0.2)["message"]
+        for number, stamp in enumerate((-1.0, 1e300, float("nan"), "now", True, None)):
+            pilot.page.say(name="jog", direction=1.0, press=100 + number, seen=stamp, picture=stamp)
+            assert pilot.look(0.1)["level"] == "refusal"
+        old = pilot._state["stamp"] - 0.7
+        pilot.page.say(name="jog", direction=1.0, press=91, seen=pilot._seen, picture=old)
+        assert "the picture on the page is stale: 0.7" in pilot.look(0.2)["message"]
+        assert (pilot.arm._q == before).all()
+
+
+# --- the supervisor alone ------------------------------------------------------------------------------------------
+
+
+def driven(motion, seconds=2.0):
+    """What a supervisor says of an arm told to turn its joint 0; ``motion(time)`` is how far each joint has gone."""
+    watching, q = Supervisor(ROBOT, RATES), PROBLEM.start.copy()
+    for k in range(round(seconds / STEP)):
+        time_ = k * STEP
+        q = PROBLEM.start + motion(time_)
+        watching.read(q, time_)
+        aim, ahead = q.copy(), np.zeros(ROBOT.dof)
+        ahead[0] = 0.1 * RATES[0]
+        aim[0] += ahead[0]
+        watching.told(aim, ahead, q, time_)
+        if watching.fault or watching.standing(time_):
+            break
+    return watching, time_
+
+
+def along(first, second=0.0):
+    return np.radians([first, second, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_an_arm_that_does_what_it_is_told_has_no_fault_however_its_readings_tremble():
+    rng = np.random.default_rng(1)
+    for speed in (1.0, 5.0, 10.0, 12.0):
+        watching, _ = driven(lambda time_, v=speed: along(v * time_) + rng.normal(0.0, 4e-4, 6))
+        assert watching.fault == ""
+        assert watching.standing(2.0) is None
+
+
+def test_a_joint_that_sags_slowly_by_half_a_degree_is_let_be_and_a_fast_one_is_not():
+    assert driven(lambda time_: along(10.0 * time_, min(0.3 * time_, 0.5)))[0].fault == ""
+    watching, when = driven(lambda time_: along(10.0 * time_, 10.0 * max(time_ - 1.0, 0.0)))
+    assert "shoulder_pitch moved by" in watching.fault
+    assert when <= 1.0 + 2.1 * STEP
+
+
+def test_a_joint_that_is_faster_than_its_rate_allows_is_named():
+    watching, when = driven(lambda time_: along(10.0 * min(time_, 1.0) + 40.0 * max(time_ - 1.0, 0.0)))
+    assert "azimuth moves faster than 15.0 deg/s" in watching.fault
+    assert when <= 1.2
+
+
+def test_the_hostile_arm_of_these_tests_is_an_honest_one_without_a_fault():
+    arm = HostileArm()
+    arm.move(0, float(PROBLEM.start[0]) + 0.1)
+    arm.advance(10.0)
+    assert np.degrees(arm.read()[0] - PROBLEM.start[0]) == pytest.approx(np.degrees(0.1))
