@@ -251,7 +251,9 @@ class Guide:
         if away <= MAX_END_OFFSET and turned <= MAX_END_TURN:
             return news(MADE)
         far = f"{1e3 * away:.1f} mm and {np.rad2deg(turned):.2f} deg"
-        return refused(f"all moves are made, but the tip is {far} away from the end of the route; 'replan' may go nearer")
+        return refused(
+            f"all moves are made, but the tip is {far} away from the end of the route; 'replan' may go nearer"
+        )
 
     def leave(self) -> None:
         """Forget the route."""

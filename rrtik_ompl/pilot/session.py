@@ -45,7 +45,6 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import World
 
-
 READ_SECONDS = 1.0  # a stop so soon after a fault is against the fault: it does not acknowledge it
 
 

@@ -18,7 +18,16 @@ from rrtik_tests.pilot_session import session
 
 FOLDER = Path(rrtik_ompl.pilot.__file__).parent
 MAKERS = {"news": Level.NEWS, "refused": Level.REFUSAL, "alarm": Level.ALARM}
-WORDS = {"target": 0.3, "joint": 1, "share": 0.5, "press": 3, "direction": 1.0, "level": 0, "type": "front", "name": "valve"}
+WORDS = {
+    "target": 0.3,
+    "joint": 1,
+    "share": 0.5,
+    "press": 3,
+    "direction": 1.0,
+    "level": 0,
+    "type": "front",
+    "name": "valve",
+}
 
 
 def arguments(act):

@@ -1,4 +1,4 @@
-"""The keys that stop and hold on the page in a browser: whatever is open, focused or late; and the ages that it shows."""
+"""Keys that stop and hold on the page in a browser, whatever is open, focused or late; and the ages that it shows."""
 
 import time
 
@@ -42,12 +42,16 @@ def driving(page, running):
     page.press("1")
     page.wait("state.selected === 0")
     key = "ArrowLeft" if azimuth(running) > 20.0 else "ArrowRight"
-    page.keep(lambda: page.key_down(key), lambda: None if page.ask("state.driving") else page.key_up(key), "state.driving")
+    page.keep(
+        lambda: page.key_down(key), lambda: None if page.ask("state.driving") else page.key_up(key), "state.driving"
+    )
     return key
 
 
 def click(page, name):
-    x, y = page.ask(f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])(byId('{name}').getBoundingClientRect())")
+    x, y = page.ask(
+        f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])(byId('{name}').getBoundingClientRect())"
+    )
     page.drag([x, y], [x, y], steps=1)
 
 
@@ -90,7 +94,9 @@ def test_the_key_list_lets_go_and_under_it_space_and_the_stop_button_stop(page, 
 @pytest.mark.parametrize("button", ["stop", "help_open", "grip"])
 def test_after_a_click_the_hold_keys_work_and_enter_does_not_click_again(page, running, button):
     click(page, button)
-    page.wait("state.gripper.closed" if button == "grip" else "document.activeElement === document.body || byId('help').open")
+    page.wait(
+        "state.gripper.closed" if button == "grip" else "document.activeElement === document.body || byId('help').open"
+    )
     if button == "help_open":
         page.wait("byId('help').open")
         click(page, "help_close")

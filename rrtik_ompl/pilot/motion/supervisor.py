@@ -14,7 +14,7 @@ from rrtik_ompl.units import joint_unit, reading
 
 FASTEST = 1.5  # times its rate, which a joint may move
 REACTION_SECONDS = 0.08  # from a reading until an arm that is told to stop then stands
-HUNTING_SECONDS = 0.05  # the same for a joint that goes back where it came from, which is free: valves hunt a little
+HUNTING_SECONDS = 0.065  # the same for a joint that goes back where it came from, which is free: valves hunt a little
 READING_SECONDS = 0.03  # between two readings, at least: shorter times give no speed
 LONGEST_GAP = 0.3  # [s] between two readings that is allowed for; a joint may move so long unseen
 COAST_SECONDS = 0.4  # a joint that is stopped or reversed may take as long to do it

@@ -47,7 +47,7 @@ MAX_QUEUED_COMMANDS = 200
 MAX_STAMP = 1e12  # [s]
 MIN_TOKEN_LENGTH = 16
 GOING_AWAY, FAREWELL_SECONDS = 1001, 0.1  # code of a WebSocket that is closed, and time for it to arrive
-PING_SECONDS, PONG_SECONDS = 5.0, 5.0
+PING_SECONDS, PONG_SECONDS = 10.0, 10.0  # a page over a line of some seconds sees, although it drives nothing
 REPORT_SECONDS = 0.25
 REQUEST_SECONDS = 20.0  # for a whole request, and between two on one connection
 

@@ -14,18 +14,17 @@ from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.web.server import PilotServer
+from rrtik_tests.browser import PatientLoop
 from rrtik_tests.page_by_hand import Page
 from rrtik_tests.pilot_session import PLACE, PROBLEM, ROBOT, seen_at
-
-OTHER = 1  # the joint that moves in place of the one that is told
 
 
 class HostileArm(SimulatedArm):
     """A simulated arm with a fault that can be set while it moves.
 
     Attributes:
-        fault: "other" (another joint moves), "reverse", "jump" (its reading jumps by 34 degrees), "dead", "runaway" (it
-            does not stop); "" for none.
+        fault: "other" (the next joint moves in place of the one that is told), "reverse", "jump" (the reading of the
+            joint that moves jumps by 34 degrees), "dead", "runaway" (it does not stop); "" for none.
     """
 
     def __init__(self, robot=ROBOT, start=PROBLEM.start, fault=""):
@@ -35,7 +34,9 @@ class HostileArm(SimulatedArm):
 
     def read(self):
         q = super().read()
-        q[0] += 0.6 * (self.fault == "jump" and self._goal is not None)
+        if self.fault == "jump" and self._goal is not None:
+            joint = self._goal[0]
+            q[joint] += 0.6 if q[joint] < 0.0 else -0.6  # to where the joint can be
         return q
 
     def stop(self):
@@ -52,7 +53,7 @@ class HostileArm(SimulatedArm):
             self._told = self._told or way
             self._q[joint] += self._told * self._rates[joint] * seconds
         elif self.fault != "dead":
-            moved, way = (OTHER, way) if self.fault == "other" else (joint, -way)
+            moved, way = ((joint + 1) % self.robot.dof, way) if self.fault == "other" else (joint, -way)
             self._q[moved] += way * self._rates[moved] * seconds
 
 
@@ -124,21 +125,28 @@ class Proxy:
 
 
 class Pilot:
-    """A whole session behind its server, an arm behind its line, and a page without a browser that holds keys."""
+    """A whole session behind its server, and a page without a browser that holds keys.
 
-    def __init__(self, arm=None, delay=0.0):
-        self.arm, self._stack = arm or HostileArm(), ExitStack()
-        line = self._stack.enter_context(LineServer(self.arm))
-        joints = self._stack.enter_context(closing(LineArm(ROBOT, "127.0.0.1", line.port)))
+    With ``line`` the arm is on the other side of a line of its own and moves by the clock on the wall; without, its
+    time is the session's, which waits for a machine that pauses.
+    """
+
+    def __init__(self, delay=0.0, line=False):
+        self.arm, self._stack = HostileArm(), ExitStack()
+        joints, kind, simulated = self.arm, PatientLoop, (self.arm,)
+        if line:
+            port = self._stack.enter_context(LineServer(self.arm)).port
+            joints, kind, simulated = self._stack.enter_context(closing(LineArm(ROBOT, "127.0.0.1", port))), Loop, ()
         self.session = Session(PROBLEM, joints, seed=1)
         self.server = self._stack.enter_context(PilotServer())
         proxy = self._stack.enter_context(closing(Proxy(self.server.port, delay)))
         self._ended = threading.Event()
-        loop = Loop(Undrawn(self.session, Seeing()), self.server)
+        loop = kind(Undrawn(self.session, Seeing(), simulated=simulated), self.server)
         self._thread = threading.Thread(target=loop.run, args=(self._ended.is_set,), daemon=True)
         self._thread.start()
         self.page = Page(self.server, port=proxy.port)
-        self._state, self._seen, self._picture, self._press = {}, None, None, 0
+        self._state, self._seen, self._picture = {}, None, None
+        self._press, self._direction = 0, 1.0
         while self._picture is None or not self._state or self._state["trouble"]:
             self.look(0.1)
         self.look(0.5)
@@ -167,16 +175,16 @@ class Pilot:
     def say(self, name, **values):
         self.page.say(name=name, seen=self._seen, picture=self._picture, **values)
 
-    def hold(self, seconds, until=lambda state: False):
-        """Press the key that drives the selected joint; the last state."""
-        self._press += 1
+    def hold(self, seconds, until=lambda state: False, direction=1.0):
+        """Press a key that drives the selected joint; the last state."""
+        self._press, self._direction = self._press + 1, direction
         return self.go_on(seconds, until)
 
     def go_on(self, seconds, until=lambda state: False):
         """Hold it on."""
         end = time.monotonic() + seconds
         while time.monotonic() < end and not until(self._state):
-            self.say("jog", direction=1.0, press=self._press)
+            self.say("jog", direction=self._direction, press=self._press)
             self.look(0.04)
         return self._state
 
