@@ -138,12 +138,12 @@ def test_the_ages_that_are_shown_are_true_over_a_slow_line(browser, running, mon
     time.sleep(1.5)
     assert 1300.0 <= browser.ask("lineTime()") <= 6000.0
     assert browser.ask("pictureAge()") >= 0.7
-    assert browser.ask("isLate()")
-    browser.wait("byId('camera_banner').textContent.includes('nothing is driven from this page')")
+    browser.wait("byId('camera_banner').textContent.includes('The picture comes late')")
     before = azimuth(running)
     browser.key_down("ArrowRight")
     time.sleep(0.5)
     browser.key_up("ArrowRight")
+    browser.wait("state.message.includes('line too slow for driving')")
     stands(running)
     assert azimuth(running) == before
     proxy.close()

@@ -8,14 +8,14 @@ let padArmed = false;  // the gamepad has passed neutral since it was plugged in
 
 // `make` gives the command: its name and values, or null to let go.
 function hold(source, make) {
-  if (held || isLate()) return;
+  if (held) return;
   press += 1;
   held = { source, make, press };
   held.timer = setInterval(renew, HOLD_PERIOD_MS);
   renew();
 }
 function renew() {
-  const made = isLate() ? null : held.make();
+  const made = held.make();
   if (made) send(made[0], { ...made[1], press: held.press }); else letGo();
 }
 function letGo(source) {

@@ -59,9 +59,6 @@ const lineTime = () => roundTrip === null ? null : Math.max(roundTrip, performan
 // How old the picture is at most [s]. The server's clock was not yet at `seen` when the echo left that it had heard then.
 const pictureAge = () => picture === null || heardAt === null ? null : seen - picture + (performance.now() - heardAt) / 1000;
 
-// What is shown is too old to act upon: nothing is sent that would drive the arm.
-const isLate = () => Boolean(state) && !state.replay && !state.pictures_ended && !(pictureAge() <= STALE_S);
-
 function onText(said) {
   if (said.kind === "state") {
     noteState(said);

@@ -129,13 +129,12 @@ function showAge() {
   const reasons = [];
   if (state.camera_lost && !past) reasons.push(`Camera lost: ${state.camera_lost}. What is shown is the last known state.`);
   if (state.arm_lost) reasons.push(`${state.arm_lost}`);
-  if (!reasons.length && silent > STALE_S && !past) reasons.push(`No news from the server for ${fixed(silent)} s: this page drives nothing, and the arm stops where it hears no page.`);
-  else if (!reasons.length && stale && age !== null) reasons.push(state.stale ? "The picture is stale: nothing moves." : "The picture comes too late: nothing is driven from this page.");
+  if (!reasons.length && silent > STALE_S && !past) reasons.push(`No news from the server for ${fixed(silent)} s. The arm stops where it hears nothing from this page.`);
+  else if (!reasons.length && stale && age !== null) reasons.push(state.stale ? "The picture is stale: nothing moves." : `The picture comes late: it is up to ${fixed(age)} s old.`);
   byId("camera_banner").hidden = !reasons.length;
   set(byId("camera_banner"), reasons.join(" "));
   alertOnce(reasons.join(" ").replace(/\d+\.\d+ s/, "some time"));  // said once, not each tenth of a second
   showLink();
-  if (held && isLate()) letAllGo();
 }
 setInterval(showAge, 100);
 
