@@ -130,12 +130,14 @@ def test_enter_on_a_focused_button_clicks_once_and_all_other_keys_hold(page, run
     page.wait("!state.gripper.closed")
 
 
-def test_the_ages_that_are_shown_are_true_over_a_slow_line(browser, running, monkeypatch):
+def test_the_ages_that_are_shown_are_true_over_a_slow_line(page, browser, running, monkeypatch):
+    page.ask("socket.onclose = null; socket.close(); 0")  # another page is the pilot's next
     proxy = Proxy(running.server.port, 0.7)
     monkeypatch.setattr(running.server, "may", lambda request: True)  # the page comes by the proxy's port
     browser.open(f"http://127.0.0.1:{proxy.port}/")
     browser.wait("state && roundTrip !== null && pictureAge() !== null")
-    time.sleep(1.5)
+    browser.ask("send('take')")
+    browser.wait("role.role === 'pilot'")
     assert 1300.0 <= browser.ask("lineTime()") <= 6000.0
     assert browser.ask("pictureAge()") >= 0.7
     browser.wait("byId('camera_banner').textContent.includes('The picture comes late')")
