@@ -8,11 +8,13 @@ import struct
 import threading
 import time
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 
 from bench.robustness.messages import HUGE_BYTES, Witness, comes_true, drain, leave, mutated, silence
 from rrtik_ompl.pilot.engine import Engine
+from rrtik_ompl.pilot.interlock import Sight
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
@@ -52,7 +54,14 @@ STILL_SECONDS = 1.0  # after the last command of a pilot; twice the time that a 
 
 
 class UndrawnEngine(Engine):
-    """The engine of a session whose pictures are not drawn: they cost most of the time, and no message changes that."""
+    """The engine of a session whose pictures are not drawn: they cost most of the time, and no message changes that.
+
+    It drives for pages that do not say what they show, too: else none of these would move the arm.
+    """
+
+    def execute(self, command: dict[str, Any], time: float, sight: Sight | None = None) -> None:
+        """Execute a command as if it came from no page."""
+        super().execute(command, time)
 
     def camera_picture(self) -> bytes:
         """In place of the camera's picture."""
