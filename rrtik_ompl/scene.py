@@ -140,7 +140,9 @@ class Obstacle:
 class AttachedObject:
     """A solid held by a link. ``pose`` is T_link_object; ``allow`` names further links that it may touch.
 
-    ``padding`` [m] is what it keeps from all that it may not touch, on top of margins, as that of a link does.
+    Both lengths are what it keeps from all that it may not touch, on top of the margins of others: ``margin`` [m] is
+    its own, as that of an obstacle is, and becomes it again when it is set down; ``padding`` [m] is that of the grasp,
+    and that of the holding link (:func:`rrtik_ompl.padded`) if None.
     """
 
     name: str
@@ -148,11 +150,14 @@ class AttachedObject:
     shape: Shape
     pose: pin.SE3 = field(default_factory=pin.SE3.Identity)
     allow: tuple[str, ...] = ()
-    padding: float = 0.0
+    padding: float | None = None
+    margin: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", _checked_solid(self.name, self.shape, self.pose))
-        object.__setattr__(self, "padding", _room(self.padding, f"padding of '{self.name}'"))
+        if self.padding is not None:
+            object.__setattr__(self, "padding", _room(self.padding, f"padding of '{self.name}'"))
+        object.__setattr__(self, "margin", _room(self.margin, f"margin of '{self.name}'"))
         name_of(self.link, f"the link of '{self.name}'")
         object.__setattr__(self, "allow", listed(self.allow, f"allow of '{self.name}'"))
         for name in self.allow:
@@ -240,23 +245,26 @@ class Scene:
         allow: Iterable[str] = (),
         *,
         pose: ArrayLike | pin.SE3 | None = None,
-        padding: float = 0.0,
+        padding: float | None = None,
     ) -> Scene:
         """The scene in which an obstacle has become an attached object; pairs that may touch still may.
+
+        It keeps its margin; a motion that it had ends.
 
         Args:
             name: Of the obstacle.
             link: That holds it from now on.
             allow: Links and obstacles that it may touch beside that link.
             pose: T_link_object, in any form that :func:`rrtik_ompl.poses.rigid` takes; the link's own frame if None.
-            padding: What it keeps from all that it may not touch [m].
+            padding: What it keeps from all that it may not touch, beside its margin [m]; that of the link if None.
 
         Raises:
             UnknownNameError: If there is no obstacle of that name.
             InputError: If it has no end, or the pose is none.
         """
         taken, rest = self.obstacle(name), self.without(name)
-        held = AttachedObject(name, link, taken.shape, pin.SE3.Identity() if pose is None else pose, padding=padding)
+        place = pin.SE3.Identity() if pose is None else pose
+        held = AttachedObject(name, link, taken.shape, place, padding=padding, margin=taken.margin)
         beside = set(rest.names)
         names = listed(allow, f"allow of '{name}'")
         for other in names:
@@ -268,6 +276,8 @@ class Scene:
     def detaching(self, name: str, pose: ArrayLike | pin.SE3) -> Scene:
         """The scene in which an attached object is an obstacle at T_world_object; pairs that may touch still may.
 
+        Its margin is the obstacle's; its padding ends with the grasp.
+
         Raises:
             UnknownNameError: If there is no attached object of that name.
             InputError: If the pose is none.
@@ -276,7 +286,8 @@ class Scene:
         held = {a.name: a for a in self.attached}
         if name not in held:
             raise UnknownNameError("attached object", name, held)
-        free = Obstacle(name, held.pop(name).shape, pose)
+        item = held.pop(name)
+        free = Obstacle(name, item.shape, pose, margin=item.margin)
         return Scene((*self.obstacles, free), tuple(held.values()), self.allowed_collisions)
 
     def at(self, time: float) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import chain, compress
 from operator import not_
@@ -38,7 +38,9 @@ class Body:
         kind: "link", "attached" or "obstacle".
         margin: Of an obstacle how far what moves must stay from it, of a link or attached object how far other ones
             must [m].
-        padding: How much thicker a link or attached object is than its geometry [m].
+        padding: How much thicker a link or attached object is than its geometry [m]; of the latter with its own margin.
+        within: Of an obstacle or attached object of several pieces: where this one is in the frame of the whole
+            (``pinocchio.SE3``). Whoever puts an obstacle elsewhere puts this piece at ``pose * within``.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Body:
     kind: str
     margin: float = 0.0
     padding: float = 0.0
+    within: Any = field(default_factory=pin.SE3.Identity)
 
 
 @lru_cache(maxsize=16)
@@ -74,17 +77,35 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
             raise InputError(f"scene: '{name}' is also the name of a link of robot '{robot.name}'; rename the obstacle")
     found = []
     for obstacle in scene.obstacles:
-        poses = ((obstacle.pose * piece.placement, piece.geometry) for piece in _pieces(obstacle))
-        found += [Body(obstacle.name, 0, *pose, "obstacle", obstacle.margin) for pose in poses]
+        found += [
+            Body(
+                obstacle.name,
+                0,
+                obstacle.pose * piece.placement,
+                piece.geometry,
+                "obstacle",
+                obstacle.margin,
+                within=piece.placement,
+            )
+            for piece in _pieces(obstacle)
+        ]
     for item in scene.attached:
         for link in (item.link, *item.allow):
             if link not in links:
                 raise UnknownNameError(f"link of robot '{robot.name}'", link, links, where=f"attached '{item.name}'")
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         mount = frame.placement * item.pose
+        thickness = item.margin + (robot.padding.get(item.link, 0.0) if item.padding is None else item.padding)
         found += [
             Body(
-                item.name, frame.parentJoint, mount * piece.placement, piece.geometry, "attached", margin, item.padding
+                item.name,
+                frame.parentJoint,
+                mount * piece.placement,
+                piece.geometry,
+                "attached",
+                margin,
+                thickness,
+                piece.placement,
             )
             for piece in _pieces(item)
         ]

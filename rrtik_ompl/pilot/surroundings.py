@@ -176,13 +176,20 @@ class Surroundings:
         return () if self.held is None else self.held.rests
 
     def _attached(self) -> list[AttachedObject]:
-        """What is held, as part of the arm; the uncertainty of its place is its padding."""
+        """What is held, as part of the arm; how far its place is uncertain adds to its margin."""
         held, robot = self.held, self._given.robot
         if held is None:
             return []
         near, thing = gripper_links(robot), held.seen.object
         return [
-            AttachedObject(name, robot.tip, solid.shape, held.T_tip_object * solid.pose, near, held.seen.margin(solid))
+            AttachedObject(
+                name,
+                robot.tip,
+                solid.shape,
+                held.T_tip_object * solid.pose,
+                near,
+                margin=solid.margin + held.seen.margin(solid),
+            )
             for name, solid in zip(thing.solid_names, thing.solids, strict=True)
         ]
 

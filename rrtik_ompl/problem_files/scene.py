@@ -112,12 +112,17 @@ class AttachedEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
 
     link: Name
     allow: list[Name] = Field(default=[], description="further links that it may touch")
-    padding: NotNegative = Field(default=0.0, description="[m] kept from all that it may not touch")
+    padding: NotNegative | None = Field(
+        None, description="[m] kept from all that it may not touch; that of the link if absent"
+    )
+    margin: NotNegative = Field(
+        0.0, description="[m] that it keeps beside that, and as an obstacle when it is set down"
+    )
 
     def build(self, folder: Path) -> AttachedObject:
         """The attached object."""
         shape, pose = self.build_shape(folder), self.build_pose()
-        return AttachedObject(self.name, self.link, shape, pose, tuple(self.allow), self.padding)
+        return AttachedObject(self.name, self.link, shape, pose, tuple(self.allow), self.padding, self.margin)
 
 
 class SceneEntry(Section):
@@ -225,4 +230,5 @@ def _attached_data(held: AttachedObject, folder: Path) -> dict[str, Any]:
     data = {"name": held.name, "link": held.link, **shape_data(held.name, held.shape, folder)}
     data["pose"] = pose_data(held.pose)
     data |= {"allow": list(held.allow)} if held.allow else {}
-    return data | ({"padding": held.padding} if held.padding else {})
+    data |= {} if held.padding is None else {"padding": held.padding}
+    return data | ({"margin": held.margin} if held.margin else {})

@@ -109,7 +109,8 @@ class Attach:
         object: Name of the obstacle.
         link: That holds it.
         allow: Links and obstacles that it may touch while it is held, beside that link.
-        padding: What it keeps while it is held from all that it may not touch [m].
+        padding: What it keeps while it is held from all that it may not touch, beside its margin [m]; what the link
+            keeps (:func:`rrtik_ompl.padded`) if None.
 
     Example:
         >>> rrtik.Attach("box", "panda_hand", allow=["table"], padding=0.005).allow
@@ -119,13 +120,14 @@ class Attach:
     object: str
     link: str
     allow: tuple[str, ...] = ()
-    padding: float = 0.0
+    padding: float | None = None
 
     def __post_init__(self) -> None:
         require(self.object, str, "object of Attach")
         require(self.link, str, "link of Attach")
         object.__setattr__(self, "allow", _names(self.allow, "allow of Attach"))
-        object.__setattr__(self, "padding", not_negative(self.padding, "padding of Attach"))
+        if self.padding is not None:
+            object.__setattr__(self, "padding", not_negative(self.padding, "padding of Attach"))
 
     def __str__(self) -> str:
         return f"Attach '{self.object}'"

@@ -98,7 +98,10 @@ class HoldEntry(Section):
     object: Name
     link: Name
     allow: list[Name] = Field(default=[], description="links and obstacles that it may touch while it is held")
-    padding: NotNegative = Field(0.0, description="what it keeps while it is held from all that it may not touch [m]")
+    padding: NotNegative | None = Field(
+        None,
+        description="what it keeps while it is held from all that it may not touch [m]; that of the link if absent",
+    )
 
 
 class AttachEntry(Section):
@@ -294,7 +297,7 @@ def stage_data(stage: Stage) -> dict[str, Any]:
             raise InputError("Straight: a task file cannot say to=[x, y, z]; give a pose, or by=[dx, dy, dz]")
         return {"straight": {"to": pose_data(stage.to)}}
     if isinstance(stage, Attach):
-        thick = {"padding": stage.padding} if stage.padding else {}
+        thick = {} if stage.padding is None else {"padding": stage.padding}
         return {"attach": {"object": stage.object, "link": stage.link, "allow": list(stage.allow), **thick}}
     if isinstance(stage, Detach):
         return {"detach": stage.object}

@@ -117,9 +117,10 @@ class MovingWorld:
             if body.kind == "obstacle":
                 now = places[min(self._copy[k], len(places) - 1)][body.name]
                 solid = cloud_solid(now.shape) if isinstance(now.shape, PointCloud) else body.geometry
-                here = solid is body.geometry and np.array_equal(now.pose.homogeneous, body.placement.homogeneous)
+                place = now.pose * body.within
+                here = solid is body.geometry and np.array_equal(place.homogeneous, body.placement.homogeneous)
                 if not here or now.margin != body.margin:
-                    self._bodies[k] = replace(body, placement=now.pose.copy(), margin=now.margin, geometry=solid)
+                    self._bodies[k] = replace(body, placement=place, margin=now.margin, geometry=solid)
                 if inflation is not None and body.name in inflation:
                     self._inflation[k] = float(inflation[body.name])
         self.scene = scenes[0]

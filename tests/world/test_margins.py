@@ -172,7 +172,7 @@ def test_files_state_margins_for_one_obstacle_or_for_all(tmp_path):
         ("scene", "wide", "scene.margin"),
         ("obstacle", "-1", "margin"),
         ("obstacle", ".inf", "margin"),
-        ("attached", "0.1", "margin"),
+        ("attached", "-0.1", "margin"),
     ],
 )
 def test_a_file_with_a_margin_that_makes_no_sense_is_refused_in_one_line(tmp_path, where, text, line):

@@ -29,7 +29,7 @@ THICK = {
     "ur5": {"base_link": 0.02, "forearm_link": 0.03, "wrist_3_link": 0.05},
 }
 SOLIDS = (Box([0.3, 0.2, 0.1]), Sphere(0.12), Cylinder(0.08, 0.3), Capsule(0.05, 0.3))
-HELD = AttachedObject("rod", "panda_hand", Capsule(0.02, 0.3), [0.1, 0.0, 0.2], ("panda_link7",))
+HELD = AttachedObject("rod", "panda_hand", Capsule(0.02, 0.3), [0.1, 0.0, 0.2], ("panda_link7",), padding=0.0)
 
 
 def arm_of(name):
@@ -144,6 +144,36 @@ def test_a_file_keeps_the_padding_of_what_is_held(tmp_path):
     for value, said in ((-1.0, "0 metres or more"), (float("nan"), "padding of 'cup'"), ("wide", "padding of 'cup'")):
         with pytest.raises(InputError, match=said):
             AttachedObject("cup", "panda_hand", Sphere(0.03), padding=value)
+
+
+def test_what_a_padded_link_holds_is_as_thick_as_the_link_unless_told_otherwise():
+    robot, scene = load_robot("panda"), crowd("panda")
+    thick = padded(robot, {"panda_hand": 0.06})
+    Q = np.random.default_rng(3).uniform(robot.lower, robot.upper, (400, 7))
+    wide, bare = (World(robot, replace(scene, attached=(replace(HELD, padding=own),))) for own in (0.06, 0.0))
+    valid, free = wide.valid_batch(Q), bare.valid_batch(Q)
+    assert (valid < free).any()
+    hand = World(thick, scene).valid_batch(Q)
+    held = World(thick, replace(scene, attached=(replace(HELD, padding=None),))).valid_batch(Q)
+    assert (held == (hand & valid)).all()
+    told = World(thick, replace(scene, attached=(HELD,))).valid_batch(Q)
+    assert (told == (hand & free)).all()
+    assert (told > held).any()
+
+
+def test_what_is_carried_keeps_its_margin_and_comes_back_with_it(tmp_path):
+    robot = load_robot("panda")
+    cup = Obstacle("cup", Sphere(0.03), margin=0.05)
+    scene = Scene([cup, Obstacle("post", Sphere(0.02), [0.4, 0.5, 0.5])])
+    held = scene.attaching("cup", "panda_hand", pose=[0.0, 0.0, 0.2])
+    assert held.detaching("cup", [0.3, 0.0, 0.5]).obstacle("cup").margin == 0.05
+    Q = np.random.default_rng(5).uniform(robot.lower, robot.upper, (2000, 7))
+    as_padding = replace(held, attached=(replace(held.attached[0], margin=0.0, padding=0.05),))
+    valid = World(robot, held).valid_batch(Q)
+    assert (valid == World(robot, as_padding).valid_batch(Q)).all()
+    assert (valid < World(robot, scene.without("cup")).valid_batch(Q)).any()
+    save_problem(Problem(World(robot, held), "ready", "ready"), tmp_path / "p.yaml")
+    assert load_problem(tmp_path / "p.yaml").world.scene.attached[0].margin == 0.05
 
 
 def test_paths_and_certificates_keep_it():

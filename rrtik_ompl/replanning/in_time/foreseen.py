@@ -87,7 +87,7 @@ class ForeseenWorlds:
     def _touch(self, part: Body, solid: Body, obstacle: Obstacle, begin: float, end: float) -> float | None:
         """When an obstacle first touches a body at rest, None if it is proven apart from it from begin to end [s]."""
         middle, way = 0.5 * (begin + end), travel(obstacle, begin, end, self._radii[obstacle.name])
-        pose = _placed(obstacle, middle)
+        pose = _placed(obstacle, middle) * solid.within
         if distance(part.geometry, part.placement.homogeneous, solid.geometry, pose.homogeneous, way) is not None:
             return None
         if way <= FINEST:
