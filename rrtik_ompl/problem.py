@@ -15,14 +15,13 @@ from rrtik_ompl.constraints.contradiction import contradiction
 from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.copies import as_value, in_notebook, shallow_copy
-from rrtik_ompl.errors import InputError, ProblemError, Renamed, require
+from rrtik_ompl.errors import InputError, ProblemError, Renamed, listed, require
 from rrtik_ompl.goal import Goal, JointGoal, MultiGoal, PoseGoal, parts_of
 from rrtik_ompl.poses import rigid
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.shapes import PointCloud
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world import World
-from rrtik_ompl.world.holding_world import HoldingWorld
 from rrtik_ompl.world.route_check import verification_resolution
 
 
@@ -39,8 +38,7 @@ class Problem:
         name: For messages and files.
         planner: Name of the planner that :func:`rrtik_ompl.plan` uses where none is named, or None.
         constraints: Regions that a frame must not leave on the whole path, those ``from_start`` placed in the world.
-            The world is then a :class:`~rrtik_ompl.world.holding_world.HoldingWorld`, where only motions that keep
-            them are free.
+            In the world only motions that keep them are free then. Those that the given world has are among them.
 
     Args:
         world: Robot and scene.
@@ -82,10 +80,12 @@ class Problem:
         joints = {"goal": wanted.q} if isinstance(wanted, JointGoal) else {}
         ends = usable_configurations(world, {"start": start, **joints})
         self.start: Vector = frozen(ends["start"])
-        held = held_regions(world.robot, world.scene, constraints, self.start)
+        known = world.settings.constraints
+        fresh = [each for each in listed(constraints, "path constraints") if each not in known]
+        held = held_regions(world.robot, world.scene, (*known, *fresh), self.start)
         self.constraints = tuple(each.region for each in held.regions)
         if held.regions:
-            self.world = world = HoldingWorld(world, held)
+            self.world = world = world.with_settings(constraints=self.constraints)
             _keep(world.robot, held, self.start, "start")
         if isinstance(wanted, JointGoal):
             _keep(world.robot, held, ends["goal"], "goal")
@@ -159,7 +159,7 @@ def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[s
             raise ProblemError(f"{what}: {fault}", part=what)
         found[what] = robot.onto_limits(q)
     rows = np.array(list(found.values()))
-    world = world.unheld if isinstance(world, HoldingWorld) else world
+    world = world.unheld
     # both opinions must agree, for the path through them will be certified by the second one
     for opinion in (world.valid_batch, world.certify):
         for (what, q), free in zip(found.items(), opinion(rows).tolist(), strict=True):
@@ -171,6 +171,8 @@ def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[s
 def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
     """Says what a start or a goal touches, or is too near to."""
     touching = world.contacts(q)
+    if not touching:
+        return _not_touching(world, q, what)
     pairs = [(c.first, c.second) for c in touching]
     still = {body.name for body in world.bodies if body.joint == 0}
     fixed = [c for c in touching if {c.first, c.second} <= still]
@@ -185,6 +187,18 @@ def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
     clouds = {each.name for each in world.scene.obstacles if isinstance(each.shape, PointCloud)}
     own = ", take the arm's own points out by without_robot()," if any(clouds & set(pair) for pair in pairs) else ""
     return ProblemError(f"{what} is in collision: {world.explain(q)}; move it{own} or allow the pair", pairs, part=what)
+
+
+def _not_touching(world: World, q: Vector, what: str) -> ProblemError:
+    """Says why a start or a goal is not free where nothing touches."""
+    pairs = [(c.first, c.second) for c in world.too_near(q)]
+    if pairs:
+        remedy = "move it, lower the clearance or allow the pair"
+        return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
+    nearest = world.closest(q, known_free=True)
+    pairs = [] if nearest is None else [(nearest.first, nearest.second)]
+    remedy = 'move it, or use accuracy="exact"' if world.accuracy == "conservative" else "move it"
+    return ProblemError(f"{what} is not proven free: {world.explain(q)}; {remedy}", pairs, part=what)
 
 
 def _keep(robot: Robot, held: HeldRegions, q: Vector, what: str) -> None:

@@ -16,7 +16,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.shortening import shorten
-from rrtik_ompl.world import World
+from rrtik_ompl.world import FINEST_RESOLUTION, World
 
 SOLVED, NOT_FOUND, INVALID, ERROR = "solved", "not found", "invalid", "error"
 OUT_OF_MEMORY, CRASH, HANG = "out of memory", "crash", "hang"
@@ -85,7 +85,7 @@ def _shortened(path: JointPath, problem: Problem, method: SuiteShortening, seed:
 
 
 def _sizes(path: JointPath, world: World) -> dict[str, float | bool | None]:
-    strict = world.with_resolution(world.motion_resolution / STRICT)
+    strict = world.with_resolution(max(world.motion_resolution / STRICT, FINEST_RESOLUTION))
     return {
         "length": path.length,
         "transitions": path.transitions,

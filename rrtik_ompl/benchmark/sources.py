@@ -16,7 +16,6 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.generated_problems import generated_problem
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.world import World
 
 CACHED_PROBLEMS = 4  # problems that a process remembers; runs of one problem follow each other
 
@@ -125,9 +124,7 @@ def _generated(robot: str, family: str, seed: int) -> Problem:
 
 def _resolved(name: str, resolution: float) -> Problem:
     problem = load_problem(name)
-    world = problem.world
-    finer = World(world.robot, world.scene, motion_resolution=resolution, self_margin=world.self_margin)
-    return Problem(finer, problem.start, problem.goal, name=problem.name)
+    return Problem(problem.world.with_resolution(resolution), problem.start, problem.goal, name=problem.name)
 
 
 def _crowded(robot: str, seed: int, count: int) -> Problem:

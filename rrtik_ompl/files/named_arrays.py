@@ -41,6 +41,9 @@ class NamedArrays:
         except _NOT_WHOLE:
             raise InputError(f"{path}: not a whole .npz file of numbers; save it again") from None
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._arrays
+
     def __getitem__(self, name: str) -> NDArray[Any]:
         """An array.
 

@@ -34,7 +34,6 @@ from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
-from rrtik_ompl.world.holding_world import HoldingWorld
 
 STARTS = 48  # of inverse kinematics in one round
 PARTS = 6  # of a grasp set, among which the starts of a round are shared out, or to which it is said how near it came
@@ -122,7 +121,7 @@ class GoalSearch:
             self.rows, self._found, self.exhausted = _first_rounds[self._problem]
             return len(self.rows) > 0
         if isinstance(goal, MultiGoal):
-            kept = world.constraints.regions if isinstance(world, HoldingWorld) else ()
+            kept = () if world.constraints is None else world.constraints.regions
             start, scene = self._problem.start, world.scene
             found = at_all_tips(world.robot, goal, start, self._rng, scene=scene, kept=kept)
         else:
@@ -160,12 +159,11 @@ class GoalSearch:
 
     def _least_breach(self) -> str:
         """Which path constraint the configuration at the goal breaks that breaks them least, and by how much."""
-        world = self._problem.world
-        if not isinstance(world, HoldingWorld) or len(self._unheld) == 0:
+        constraints = self._problem.world.constraints
+        if constraints is None or len(self._unheld) == 0:
             return ""
-        regions = world.constraints.regions
-        amounts = [sum(sum(region.outside(q)) for region in regions) for q in self._unheld]
-        return world.constraints.explain(self._unheld[int(np.argmin(amounts))])
+        amounts = [sum(sum(region.outside(q)) for region in constraints.regions) for q in self._unheld]
+        return constraints.explain(self._unheld[int(np.argmin(amounts))])
 
     def _draw(self, goal: TipGoal) -> tuple[list[Target], int]:
         """The random numbers of a round: targets and a seed."""

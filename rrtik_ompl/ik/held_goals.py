@@ -11,7 +11,6 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import GoalPart, TipGoal, as_task_region, parts_of
 from rrtik_ompl.ik.held_tables import projected_onto
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.world.holding_world import HoldingWorld
 
 STARTS = 48  # random ones beside what inverse kinematics found
 PARTS = 6  # of a grasp set, to which rows are moved at a time
@@ -30,16 +29,16 @@ def held_at_goal(problem: Problem, goal: TipGoal, found: Matrix, rng: np.random.
     Returns:
         Shape (k, dof).
     """
-    world = problem.world
-    if not isinstance(world, HoldingWorld):
+    constraints = problem.world.constraints
+    if constraints is None:
         return found
-    held = world.constraints.held(found)
+    held = constraints.held(found)
     starts = np.vstack([found[~held], rng.uniform(*problem.robot.finite_range(), (STARTS, problem.robot.dof))])
     rows = [found[held]]
     if not held.all() or len(found) == 0:
         parts = parts_of(goal)
         chosen = rng.permutation(len(parts))[:PARTS]
-        rows += [_moved(problem, world.constraints, parts[k], starts) for k in chosen]
+        rows += [_moved(problem, constraints, parts[k], starts) for k in chosen]
     joined: Matrix = np.vstack(rows)
     return joined[goal.satisfied(problem.robot, joined)] if len(joined) else joined
 

@@ -6,7 +6,7 @@ from functools import cached_property
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.world import World
-from rrtik_ompl.world.kept_clearance import CLEARANCE, Room, room_between
+from rrtik_ompl.world.kept_clearance import CLEARANCE, Room, keeping, room_between
 
 PREFERRED_CLEARANCE = 0.01  # [m] of single-joint moves, which a person may follow by hand
 
@@ -30,12 +30,12 @@ class Level:
     @cached_property
     def searched(self) -> World:
         """A form whose searches in kernels keep more than the clearance in steps."""
-        return self._world.with_clearance(self._searched)
+        return keeping(self._world, self._searched)
 
     @cached_property
     def proving(self) -> World:
         """The same, where motions have to be proven."""
-        return self.searched if self._kept is None else self.searched.proving(self._kept)
+        return self.searched if self._kept is None else keeping(self._world, self._searched, proven=self._kept)
 
 
 def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> list[Level]:
@@ -54,5 +54,6 @@ def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> lis
 
 
 def roomiest(world: World, ends: Matrix, clearance: float | None) -> Room | None:
-    """As :func:`room_between`, with a centimetre where nothing is said."""
-    return room_between(world, ends, PREFERRED_CLEARANCE if clearance is None else clearance)
+    """As :func:`room_between`, with a centimetre, or what the world keeps, where nothing is said."""
+    wanted = max(PREFERRED_CLEARANCE, world.settings.clearance) if clearance is None else clearance
+    return room_between(world, ends, wanted)

@@ -19,8 +19,8 @@ from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import SAME, merge_moves
-from rrtik_ompl.world import World
-from rrtik_ompl.world.kept_clearance import check_route_clearance, provable_clearances
+from rrtik_ompl.world import FINEST_RESOLUTION, World
+from rrtik_ompl.world.kept_clearance import check_route_clearance, keeping, provable_clearances
 from rrtik_ompl.world.motion_queries import MotionsFree
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
 
@@ -75,10 +75,10 @@ def one_joint_moves(
     check_route_clearance(world, clearance, path.waypoints)
     for kept in provable_clearances(world, path.waypoints, clearance):
         with suppress(InputError):  # no staircase keeps so much; one that keeps less may
-            converted = path.with_waypoints(_converted(path.waypoints, world.proving(kept), least))
+            converted = path.with_waypoints(_converted(path.waypoints, keeping(world, 0.0, proven=kept), least))
             return converted.proved(world, clearance=kept)
     for density in DENSITIES:
-        finer = world.with_resolution(world.motion_resolution / density)
+        finer = world.with_resolution(max(world.motion_resolution / density, FINEST_RESOLUTION))
         converted = path.with_waypoints(_converted(path.waypoints, finer, least))
         if not converted.violations(world):
             return converted.proved(world)

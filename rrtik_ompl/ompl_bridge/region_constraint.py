@@ -11,7 +11,6 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge.setup import bounded_space
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
-from rrtik_ompl.world.holding_world import HoldingWorld
 
 STEP = 0.2  # [rad; m] between two projections; each of them asks Python some ten times
 DETOUR = 2.0  # a motion that gets this much longer by projection is none, as in OMPL
@@ -33,9 +32,9 @@ class RegionConstraint(ob.Constraint):  # type: ignore[misc]  # OMPL has no type
     """
 
     def __init__(self, problem: Problem) -> None:
-        if not isinstance(problem.world, HoldingWorld):
-            raise InputError("problem: it has no path constraints")
         held = problem.world.constraints
+        if held is None:
+            raise InputError("problem: it has no path constraints")
         super().__init__(problem.robot.dof, equation_count(held), 1.0)
         self._robot, self._held = problem.robot, held
 
@@ -56,7 +55,7 @@ class ProjectedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no
 
     def __init__(self, si: ob.SpaceInformation, problem: Problem, constraint: RegionConstraint) -> None:
         super().__init__(si)
-        self._held, self._free = problem.world, problem.world.unheld  # type: ignore[attr-defined]
+        self._held, self._free = problem.world, problem.world.unheld
         self._constraint, self._states = constraint, StateIO(si)
 
     def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:

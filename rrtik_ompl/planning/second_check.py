@@ -13,7 +13,7 @@ from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
 from rrtik_ompl.path import JointPath, proved_as_clear
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
+from rrtik_ompl.world.kept_clearance import Room, keeping, leaving_room, room_between
 
 TOUCHING = 1e-6  # [m]; bodies that are nearer to their margin than this count as touching
 
@@ -94,7 +94,7 @@ class SecondCheck:
         room = self._room(self._problem.start[None]) or Room(0.0, 0.0)
         strict = densely_checked(self._problem)
         if proving:
-            return strict.with_world(strict.world.with_clearance(room.searched).proving(room.kept))
+            return strict.with_world(keeping(strict.world, room.searched, proven=room.kept))
         return strict.with_world(leaving_room(strict.world, room))
 
     def accepted(self, outcome: Attempt, seed: int) -> JointPath | None:

@@ -17,7 +17,7 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import find_problem, list_planners, load_robot, robot_from_entry, task_files
 from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError, require
-from rrtik_ompl.files.sections import NotNegative, Positive, Section, Version, parse, without_null
+from rrtik_ompl.files.sections import Version, parse, without_null
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.goal import Goal
@@ -27,8 +27,9 @@ from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_c
 from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
 from rrtik_ompl.problem_files.run import RunSection
 from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
+from rrtik_ompl.problem_files.world import WorldKeys, world_data
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
+from rrtik_ompl.world import World
 
 FilePath = str | os.PathLike[str]
 
@@ -39,7 +40,7 @@ OF_TASKS = {"task": NO_GOAL, "goals": "it has several goals, to be reached in or
 OF_PATHS = ("waypoints", "points")  # keys of files of paths and of trajectories
 
 
-class ProblemFile(Section):
+class ProblemFile(WorldKeys):
     """A motion planning problem. Lengths in metres; angles in radians, in degrees where a key ends in _deg."""
 
     version: Version
@@ -47,15 +48,7 @@ class ProblemFile(Section):
     scene: SceneEntry = Field(default=SceneEntry())
     start: StartSection
     goal: GoalSection
-    motion_resolution: Positive = Field(
-        MOTION_RESOLUTION,
-        ge=FINEST_RESOLUTION,
-        description="largest step of any point of the arm between two checked configurations [m]",
-    )
     planner: str | None = Field(None, description="planner that is used where none is named (rrtik list planners)")
-    self_margin: NotNegative = Field(
-        0.0, description="[m] that links, and what they hold, keep from each other wherever they must not touch"
-    )
     path_constraints: list[ConstraintSection] = Field(
         default=[], description="regions that a frame of the arm must not leave on the whole path"
     )
@@ -169,8 +162,7 @@ def problem_data(problem: Problem, folder: Path) -> dict[str, Any]:
     scene = scene_data(world.scene, folder)
     data |= {"scene": scene} if scene else {}
     data |= {"start": {"joints": problem.start.tolist()}, "goal": goal_data(problem.goal)}
-    data |= {"motion_resolution": float(world.motion_resolution)}
-    data |= {"self_margin": world.self_margin} if world.self_margin else {}
+    data |= world_data(world.settings)
     held = [constraint_data(region) for region in problem.constraints]
     data |= {"path_constraints": held} if held else {}
     return data if problem.planner is None else data | {"planner": problem.planner}
@@ -222,4 +214,4 @@ def _world(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath |
         robot = load_robot(robot)
     scene = entry.scene.build(document)
     with document.at(("scene",)):
-        return World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
+        return entry.world(robot, scene)

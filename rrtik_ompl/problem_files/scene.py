@@ -115,9 +115,7 @@ class AttachedEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
     padding: NotNegative | None = Field(
         None, description="[m] kept from all that it may not touch; that of the link if absent"
     )
-    margin: NotNegative = Field(
-        0.0, description="[m] that it keeps beside that, and as an obstacle when it is set down"
-    )
+    margin: NotNegative = Field(0.0, description="[m] that it keeps beside that, also when it is set down")
 
     def build(self, folder: Path) -> AttachedObject:
         """The attached object."""
@@ -163,6 +161,9 @@ class SceneFile(Section):
     goal: Any = None
     motion_resolution: Any = None
     self_margin: Any = None
+    accuracy: Any = None
+    clearance: Any = None
+    proving: Any = None
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:

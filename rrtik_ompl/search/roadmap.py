@@ -29,6 +29,7 @@ VERTICES, NEAR = 2000, 10
 SECONDS = 60.0  # that making one takes at most, where next to nothing is free
 MOST_VERTICES = 1_000_000
 FORMAT = 1
+NOT_PROVING = -1.0  # in a file, in the place of a clearance [m]
 
 
 class Graph(Protocol):
@@ -232,7 +233,7 @@ class Roadmap:
         numbers = {"format": FORMAT, "seed": self.seed, "near": self.near, "resolution": world.motion_resolution}
         names = {"robot": world.robot.name, "digest": world_digest(world.robot, world.bodies, world.pairs)}
         graph = {"rows": self.graph.rows, "edges": self.graph.edges, "states": self.graph.states.astype(np.int8)}
-        everything: dict[str, Any] = {**numbers, **names, **graph}
+        everything: dict[str, Any] = {**numbers, "kept": _kept(world), **names, **graph}
         np.savez_compressed(data, **everything)
         write_bytes(path, data.getvalue())
 
@@ -268,16 +269,23 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
         ends = len(edges) and not 0 <= edges.min() <= edges.max() < len(rows)
         if wrong or ends or (len(states) and not 0 <= states.min() <= states.max() <= BLOCKED):
             raise InputError("its edges make no sense")
-        same_step = positive(data["resolution"], "resolution") == world.motion_resolution
+        kept = finite_array(data["kept"], (2,), "kept").tolist() if "kept" in data else [0.0, NOT_PROVING]
+        same_checks = positive(data["resolution"], "resolution") == world.motion_resolution and kept == _kept(world)
     except InputError as error:
         raise InputError(f"{path}: is no roadmap of robot '{world.robot.name}': {error}") from error
     known = edges.astype(np.int32), states.astype(np.int32)
     found = world_digest(world.robot, world.bodies, world.pairs)
-    if digest == found and same_step:
+    if digest == found and same_checks:
         return _restored(world, rows, *known, seed=seed, near=near)
     if moved is not True and digest != found:
         raise InputError(f"{path}: is the roadmap of another world; load it with moved=True, or make a new one")
     return _restored(world, rows, *known, seed=seed, near=near).moved_to(world)
+
+
+def _kept(world: World) -> list[float]:
+    """What free motions of a world keep: its clearance, and that of its proofs [m]."""
+    proving = world.settings.proving
+    return [world.settings.clearance, NOT_PROVING if proving is None else proving]
 
 
 def _restored(

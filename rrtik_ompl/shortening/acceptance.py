@@ -11,7 +11,7 @@ from rrtik_ompl.path import JointPath, proved_as_clear
 from rrtik_ompl.problem import Problem, densely_checked
 from rrtik_ompl.world import World
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import room_between
+from rrtik_ompl.world.kept_clearance import keeping, room_between
 from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.proven_motions import proven_motions
 
@@ -80,8 +80,9 @@ class Acceptance:
         found = []
         wider = 0.0 if self._room is None else min(self._room.searched, self._room.kept + SPARE)
         if self._room is not None and self._samples:
-            roomy = dense.world.with_clearance(wider)
-            found = [self._sampled(dense, roomy, 0.7), self._sampled(dense, roomy.proving(self._room.kept), self._last)]
+            roomy = keeping(dense.world, wider)
+            proving = keeping(dense.world, wider, proven=self._room.kept)
+            found = [self._sampled(dense, roomy, 0.7), self._sampled(dense, proving, self._last)]
         elif self._room is not None:
             found = [Form(dense, proven_motions(dense.world, wider, self.input.waypoints), self._last)]
         if not self._input_keeps:

@@ -14,12 +14,13 @@ from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.catalog import robot_from_entry
 from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.files.sections import Name, NotNegative, Numbers, Positive, Section, Version, parse
+from rrtik_ompl.files.sections import Name, Numbers, Positive, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name, known_ending, write_text
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
 from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
+from rrtik_ompl.problem_files.world import WorldKeys, world_data
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.task_file import StageEntry, stage_data
 from rrtik_ompl.world import FINEST_RESOLUTION, World
@@ -41,7 +42,7 @@ class MotionEntry(WorldEntry):
     waypoints: Annotated[list[Numbers], Field(min_length=1)]
 
 
-class TaskPlanFile(Section):
+class TaskPlanFile(WorldKeys):
     """The plan of a task."""
 
     version: Version
@@ -49,7 +50,6 @@ class TaskPlanFile(Section):
     joint_names: list[Name]
     chosen: list[int] = Field(default=[])
     motion_resolution: Positive = Field(ge=FINEST_RESOLUTION)
-    self_margin: NotNegative = 0.0
     motions: Annotated[list[MotionEntry], Field(min_length=1)]
     end: WorldEntry | None = Field(None, description="after the last stage; the last motion's if left out")
     notes: list[str] = Field(default=[])
@@ -72,6 +72,10 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
     require(plan, TaskPlan, "plan of a task", "use Task(stages).plan(world, start)")
     if not plan.paths:
         raise InputError("task plan: it has no motion to save" + (f": {plan.reason}" if plan.reason else ""))
+    if plan.worlds[0].constraints is not None:
+        raise InputError(
+            "task plan: its world has path constraints, which the file has no key for; give MoveTo them"
+        )
     folder = file_name(file).parent
     motions = [
         {
@@ -87,8 +91,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
         "kind": KIND,
         "joint_names": list(first.robot.joint_names),
         "chosen": list(plan.chosen),
-        "motion_resolution": first.motion_resolution,
-        "self_margin": first.self_margin,
+        **world_data(first.settings),
         "motions": motions,
         "end": _world_data(plan.worlds[-1] if plan.end is None else plan.end, folder),
         "notes": list(plan.notes),
@@ -151,7 +154,7 @@ def _world(document: YamlDocument, entry: TaskPlanFile, part: WorldEntry, place:
             raise InputError(f"robot '{robot.name}' has other joints than the plan's: {', '.join(entry.joint_names)}")
     scene = part.scene.build(document, (*place, "scene"))
     with document.at((*place, "scene")):
-        return World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
+        return entry.world(robot, scene)
 
 
 def _world_data(world: World, folder: Path) -> dict[str, Any]:

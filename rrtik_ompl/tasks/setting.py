@@ -36,12 +36,8 @@ class Setting:
 
     @cached_property
     def world(self) -> World:
-        """The robot in the scene, with the lengths of the first world of the task."""
-        like = self._like
-        if self.robot is like.robot:
-            return like.with_scene(self.scene)
-        lengths = {"motion_resolution": like.motion_resolution, "self_margin": like.self_margin}
-        return World(self.robot, self.scene, accuracy=like.accuracy, **lengths)
+        """The robot in the scene, with the other settings of the first world of the task."""
+        return self._like.with_settings(robot=self.robot, scene=self.scene)
 
     def after(self, stage: Attach | Detach | Gripper, q: Vector) -> Setting:
         """The setting after a stage that the arm does at a configuration, shape (dof,).

@@ -19,7 +19,6 @@ from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
-    Positive,
     Section,
     Vector3,
     Version,
@@ -36,13 +35,14 @@ from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, bu
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.robot import RobotEntry
 from rrtik_ompl.problem_files.scene import PoseEntry, SceneEntry, pose_data
+from rrtik_ompl.problem_files.world import WorldKeys
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight
 from rrtik_ompl.tasks.through import placed_constraints
-from rrtik_ompl.world import FINEST_RESOLUTION, MOTION_RESOLUTION, World
+from rrtik_ompl.world import World
 
 NO_STAGES = "it has a goal and no stages"
 NUMBER = re.compile(r"stage (\d+)")
@@ -100,7 +100,7 @@ class HoldEntry(Section):
     allow: list[Name] = Field(default=[], description="links and obstacles that it may touch while it is held")
     padding: NotNegative | None = Field(
         None,
-        description="what it keeps while it is held from all that it may not touch [m]; that of the link if absent",
+        description="what it keeps while it is held from all else [m]; that of the link if absent",
     )
 
 
@@ -160,7 +160,7 @@ StageEntry: TypeAlias = Annotated[
 AlternativesEntry.model_rebuild()
 
 
-class TaskFile(Section):
+class TaskFile(WorldKeys):
     """A task. Lengths in metres; angles in radians, in degrees where a key ends in _deg."""
 
     version: Version
@@ -174,8 +174,6 @@ class TaskFile(Section):
     path_constraints: list[ConstraintSection] = Field(
         default=[], description="regions that a frame must not leave on the way through all goals"
     )
-    motion_resolution: Positive = Field(MOTION_RESOLUTION, ge=FINEST_RESOLUTION, description="[m]")
-    self_margin: NotNegative = Field(0.0, description="[m]")
 
     @model_validator(mode="after")
     def _one_kind(self) -> TaskFile:
@@ -244,7 +242,7 @@ def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
         robot = robot_from_entry(document.data["robot"], document.path.parent)
     scene = entry.scene.build(document)
     with document.at(("scene",)):
-        world = World(robot, scene, motion_resolution=entry.motion_resolution, self_margin=entry.self_margin)
+        world = entry.world(robot, scene)
     with document.at(("start",)):
         start = usable_configuration(world, entry.start.configuration(robot), "start")
     task = Task(_stages(document, entry, world, start))

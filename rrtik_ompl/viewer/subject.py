@@ -22,7 +22,6 @@ from rrtik_ompl.viewer.fingers import Fingers
 from rrtik_ompl.viewer.path_contacts import PathContact, contacts_along
 from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import ClearanceCurve, clearance_along
-from rrtik_ompl.world.holding_world import HoldingWorld
 
 
 class HasWorld(Protocol):
@@ -193,7 +192,7 @@ def subject_of(
 
 def _held(world: object) -> tuple[HeldRegion, ...]:
     """The regions of path constraints that a world holds."""
-    return world.constraints.regions if isinstance(world, HoldingWorld) else ()
+    return () if not isinstance(world, World) or world.constraints is None else world.constraints.regions
 
 
 def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:

@@ -4,36 +4,41 @@ from __future__ import annotations
 
 import copy
 import warnings
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import fields, replace
 from functools import partial
-from typing import get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import MOST_NUMBERS, Mask, Matrix, finite_array, in_blocks, not_negative, positive
-from rrtik_ompl.choices import Accuracy, one_of
-from rrtik_ompl.collision.bodies import by_motion, colliding_pairs, link_bodies, scene_bodies
+from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.collision.bodies import Body, by_motion, colliding_pairs, link_bodies, scene_bodies
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights
+from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.copies import Items, KeptHere, Once, in_notebook, shallow_copy
-from rrtik_ompl.errors import InputError, MeshWarning, Renamed, require
+from rrtik_ompl.errors import InputError, MeshWarning, Renamed, UnknownNameError
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
-from rrtik_ompl.poses import few_joints
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
+from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.world.exact_checks import ExactChecker, one_way
+from rrtik_ompl.world.holding_prover import HoldingProver
 from rrtik_ompl.world.proof import Gap as Gap
 from rrtik_ompl.world.proof import Proof as Proof
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.rebuild import Rebuilt, hollow_solids
+from rrtik_ompl.world.settings import FINEST_RESOLUTION as FINEST_RESOLUTION
+from rrtik_ompl.world.settings import MOTION_RESOLUTION, WorldSettings
 
-MOTION_RESOLUTION = 0.01  # [m]
-ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
-FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
+SETTINGS = tuple(each.name for each in fields(WorldSettings))
+# What of a world is made anew when one of these changes is said in World._in; any other change makes all of it anew.
+SHARING = {"accuracy", "motion_resolution", "clearance", "proving", "constraints"}
 
 
 class World(Rebuilt):
@@ -49,11 +54,16 @@ class World(Rebuilt):
     What moves of the arm has to stay farther from an obstacle than its margin, and from the arm's other bodies than
     ``self_margin``; the base, which no posture moves, must only not touch an obstacle.
 
+    All of it is made from :attr:`settings`. The other forms of a world (``with_...``, :meth:`proving`, :meth:`moved`,
+    copies) have the same settings but for what they are asked to change.
+
     Attributes:
-        robot, scene, motion_resolution, accuracy, self_margin: As given.
+        settings: The arguments, checked; ``robot``, ``scene``, ``motion_resolution``, ``accuracy`` and ``self_margin``
+            are also attributes of the world.
         bodies: The solids of the robot and the scene.
         pairs: Numbers of the bodies that must not touch.
-        prover: Proves motions free.
+        prover: Proves motions free; where there are path constraints, free and held.
+        constraints: What is held (:class:`~rrtik_ompl.constraints.held_regions.HeldRegions`); None if nothing is.
         weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
 
     Args:
@@ -62,9 +72,13 @@ class World(Rebuilt):
         motion_resolution: Largest step of any point of the arm between two checked configurations [m].
         accuracy: "exact" or "conservative".
         self_margin: How far links, and what they hold, must stay from each other where they must not touch [m].
+        clearance: What checks keep from obstacles on top of their margins [m]; see :meth:`with_clearance`.
+        proving: Motions must be proven too, with this clearance [m]; None if they need not be. See :meth:`proving`.
+        constraints: Regions, placed in the world, that a frame must not leave. Only what keeps them is then free; a
+            :class:`rrtik_ompl.Problem` says where those begin that are ``from_start``.
 
     Raises:
-        InputError: If the scene names links that do not exist, or a length makes no sense.
+        InputError: If the scene names links that do not exist, a length makes no sense, or a region cannot be held.
         UnknownNameError: If there is no such accuracy.
     """
 
@@ -76,40 +90,48 @@ class World(Rebuilt):
         motion_resolution: float = MOTION_RESOLUTION,
         accuracy: Accuracy = "exact",
         self_margin: float = 0.0,
+        clearance: float = 0.0,
+        proving: float | None = None,
+        constraints: Iterable[TaskRegion] = (),
     ) -> None:
-        self.robot, self._scene = robot, Scene() if scene is None else scene
-        require(robot, Robot, "robot of a world", "use load_robot(name or file)")
-        few_joints(robot.model)
-        require(self._scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
-        self._obstacles = Items(self._scene.obstacles)
-        self.motion_resolution = float(finite_array(motion_resolution, (), "motion_resolution"))
-        if self.motion_resolution < FINEST_RESOLUTION:
-            raise InputError(f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {motion_resolution}")
-        for doubt in hollow_solids(robot, self.scene):
+        settings = WorldSettings(
+            robot,
+            Scene() if scene is None else scene,
+            accuracy=accuracy,
+            motion_resolution=motion_resolution,
+            self_margin=self_margin,
+            clearance=clearance,
+            proving=proving,
+            constraints=constraints,  # type: ignore[arg-type]  # made a tuple there
+        )
+        self._settings = settings
+        self._obstacles = Items(settings.scene.obstacles)
+        for doubt in hollow_solids(robot, settings.scene):
             warnings.warn(doubt, MeshWarning, stacklevel=2)
-        self.self_margin = own = not_negative(self_margin, "self_margin")
-        self._bodies = Items(link_bodies(robot, own) + scene_bodies(robot, self.scene.at(0.0), own))
+        own = settings.self_margin
+        self._bodies = Items(link_bodies(robot, own) + scene_bodies(robot, settings.scene.at(0.0), own))
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
-        self.pairs = pairs = colliding_pairs(robot, self.scene, self.bodies)
+        self.pairs = pairs = colliding_pairs(robot, settings.scene, self.bodies)
         moving, standing = by_motion(self.bodies, pairs)
-        self.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
         self._certificate = Once(Certificate, robot, self.bodies, pairs)
         self._motions = KeptHere()
-        self._proven_clearance: float | None = None
-        self._room = 0.0  # kept on top of the margins of obstacles
-        self._checks = ExactChecker(robot, self._bodies, moving, conservative=accuracy == "conservative")
+        conservative = settings.accuracy == "conservative"
+        self._checks = ExactChecker(robot, self._with_room(settings.clearance), moving, conservative=conservative)
         self._always_colliding = always = fixed_contact(robot, self.bodies, standing) is not None
         self.prover = Prover(robot, self._bodies, moving, self_margin=own, always_colliding=always)
+        self.constraints: HeldRegions | None = None
+        self._hold(settings.constraints)
 
     resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
 
     def __repr__(self) -> str:
-        return f"World({self.robot.name}, {self.scene}, motion_resolution={self.motion_resolution:g} m)"
+        return f"World({', '.join([self.robot.name, str(self.scene), *self._settings.unusual()])})"
 
     @property
     def fast(self) -> FastWorld | None:
         """The world's tables, for planners that run in kernels; None without kernels or where these do not suffice."""
-        tables, enough = self._checks.fast, not self._always_colliding and self._proven_clearance is None
+        tables = self._checks.fast
+        enough = self._settings.proving is None and self.constraints is None and not self._always_colliding
         return tables if tables.address and enough else None
 
     @property
@@ -117,10 +139,63 @@ class World(Rebuilt):
         """How motions are checked, for searches in kernels: one table for all of them. None where ``fast`` is."""
         return motions_of(self, self._motions)
 
+    @property
+    def free_motions(self) -> FastMotions | None:
+        """How kernels check motions for collisions alone, whatever else they must be; None where they cannot."""
+        return motions_of(self.with_settings(proving=None, constraints=()), self._motions)
+
+    @property
+    def unheld(self) -> World:
+        """The same world without path constraints."""
+        return self.with_settings(constraints=())
+
+    def with_settings(self, **changes: Any) -> World:
+        """The same world but for some of its settings; it shares what does not depend on them.
+
+        Args:
+            **changes: Values by the names of :class:`~rrtik_ompl.world.settings.WorldSettings`.
+
+        Raises:
+            InputError: If a value makes no sense.
+            UnknownNameError: If there is no setting of a name.
+
+        Example:
+            >>> world = rrtik.World(rrtik.load_robot("planar3")).with_settings(clearance=0.05, self_margin=0.01)
+            >>> world
+            World(planar3, Scene(empty), self_margin=0.01 m, clearance=0.05 m)
+        """
+        for name in changes:
+            if name not in SETTINGS:
+                raise UnknownNameError("setting of a world", name, SETTINGS)
+        settings = replace(self._settings, **changes)
+        if "scene" in changes:
+            return World.of(settings)
+        changed = {name for name in changes if getattr(settings, name) != getattr(self._settings, name)}
+        if changed <= SHARING:
+            return self._in(settings, changed) if changed else self
+        return World.of(replace(settings, scene=self.scene))
+
+    def _in(self, settings: WorldSettings, changed: set[str]) -> World:
+        """The same robot and scene with other settings."""
+        other = copy.copy(self)
+        other._settings = settings
+        if "clearance" in changed:
+            other._checks = self._checks.with_bodies(self._with_room(settings.clearance))
+        if "accuracy" in changed:
+            other._checks = other._checks.as_conservative(settings.accuracy == "conservative")
+        if changed & {"clearance", "motion_resolution"}:
+            other._motions = KeptHere()
+        if "constraints" in changed:
+            other._hold(settings.constraints)
+        return other
+
     def with_scene(self, scene: Scene) -> World:
-        """A world of the same robot in another scene, made anew with the same settings."""
-        lengths = {"motion_resolution": self.motion_resolution, "self_margin": self.self_margin}
-        return World(self.robot, scene, accuracy=self.accuracy, **lengths)
+        """A world of the same robot in another scene, made anew with the same settings.
+
+        Raises:
+            InputError: If it is no scene, or does not fit the robot or the path constraints.
+        """
+        return self.with_settings(scene=scene)
 
     def with_accuracy(self, accuracy: Accuracy) -> World:
         """The same world, "exact" or "conservative"; shares everything else.
@@ -128,20 +203,15 @@ class World(Rebuilt):
         Raises:
             UnknownNameError: If there is no such accuracy.
         """
-        other = copy.copy(self)
-        other.accuracy = one_of(ACCURACIES, accuracy, "accuracy")
-        other._checks = self._checks.as_conservative(accuracy == "conservative")
-        return other
+        return self.with_settings(accuracy=accuracy)
 
     def with_resolution(self, motion_resolution: float) -> World:
         """The same world, its motions checked in steps of another size [m]; shares everything else.
 
         Raises:
-            InputError: If the size is no number greater than 0.
+            InputError: If the size is none, or less than 0.01 mm.
         """
-        other = copy.copy(self)
-        other.motion_resolution, other._motions = positive(motion_resolution, "motion_resolution"), KeptHere()
-        return other
+        return self.with_settings(motion_resolution=motion_resolution)
 
     refined = Renamed("with_resolution")
     __copy__, _repr_html_ = shallow_copy, in_notebook
@@ -149,27 +219,39 @@ class World(Rebuilt):
     def with_clearance(self, clearance: float) -> World:
         """The same world for searches that leave room: its checks keep a distance [m] on top of obstacles' margins.
 
-        :meth:`contacts`, :meth:`certify` and proofs stay as they are.
+        It takes the place of an earlier one; 0 takes it away. :meth:`contacts`, :meth:`certify` and proofs stay as they
+        are.
 
         Raises:
             InputError: If the clearance is negative or infinite.
         """
-        if (wider := not_negative(clearance, "clearance")) == 0.0:
-            return self
-        other = copy.copy(self)
-        wide = tuple(replace(b, margin=b.margin + wider) if b.kind == "obstacle" else b for b in self.bodies)
-        other._checks, other._motions, other._room = self._checks.with_bodies(wide), KeptHere(), wider
-        return other
+        return self.with_settings(clearance=clearance)
 
-    def proving(self, clearance: float = 0.0) -> World:
+    def proving(self, clearance: float | None = 0.0) -> World:
         """The same world, where motions have to be proven too, with a clearance [m]; searches in kernels cannot.
 
+        It takes the place of an earlier one; None takes it away.
+
         Raises:
             InputError: If the clearance is negative or infinite.
         """
-        other = copy.copy(self)
-        other._proven_clearance = not_negative(clearance, "clearance")
-        return other
+        return self.with_settings(proving=clearance)
+
+    def _with_room(self, clearance: float) -> Items[Body]:
+        """The bodies, obstacles with a clearance [m] on top of their margins."""
+        if clearance == 0.0:
+            return self._bodies
+        return Items(tuple(replace(b, margin=b.margin + clearance) if b.kind == "obstacle" else b for b in self.bodies))
+
+    def _hold(self, regions: tuple[TaskRegion, ...]) -> None:
+        """Keep path constraints, and no others."""
+        prover = self.prover
+        free = prover.free if isinstance(prover, HoldingProver) else prover
+        if not regions:
+            self.constraints, self.prover = None, free
+            return
+        self.constraints = held_regions(self.robot, self._settings.scene, regions, None)
+        self.prover = HoldingProver(free, self.constraints)
 
     def valid(self, q: ArrayLike) -> bool:
         """Whether q, shape (dof,), is inside the limits and free of collision.
@@ -253,20 +335,46 @@ class World(Rebuilt):
         nearest = self.closest(q)
         return float("inf") if nearest is None else nearest.clearance
 
+    def too_near(self, q: ArrayLike) -> tuple[Contact, ...]:
+        """Every pair that keeps its margin at q, and not the clearance on top of it, nearest first; see ``settings``.
+
+        The ``margin`` of such a contact is that of the obstacle and the clearance together.
+        """
+        if self._settings.clearance == 0.0:
+            return ()
+        frames = self.robot.joint_frames(self._rows(q, 1))[0]
+        near = measured(self._checks.bodies, self.pairs, frames, near_only=True)
+        kept = (c for c in near if c.clearance + self._settings.clearance > 0.0)
+        return tuple(sorted(kept, key=lambda c: c.clearance))
+
     def explain(self, q: ArrayLike) -> str:
-        """A line that says why q is not valid: the joint outside its limit, or the pair in collision; "" if it is."""
-        if fault := self.robot.limit_fault(row := self._rows(q, 1)[0]):
+        """A line that says why q is not valid; "" if it is.
+
+        It names the joint outside its limit, the pair in collision, nearer than its margin or than the clearance, or
+        the path constraint that q does not keep.
+        """
+        row = self._rows(q, 1)[0]
+        if fault := self.robot.limit_fault(row):
             return fault
-        if not (touching := self.contacts(row)):
+        if touching := self.contacts(row):
+            return f"{touching[0]}{_and_more(touching)}"
+        if near := self.too_near(row):
+            wanted = f"nearer than the clearance of {1e3 * self._settings.clearance:.4g} mm asked for"
+            apart = f"'{near[0].first}' and '{near[0].second}' are {1e3 * near[0].distance:.4g} mm apart"
+            return f"{apart}, {wanted}{_and_more(near)}"
+        if self.constraints is not None and (breach := self.constraints.explain(row)):
+            return breach
+        if self.valid(row):
             return ""
-        return f"{touching[0]}" + (f" (and {more} more pair{'s' * (more > 1)})" if (more := len(touching) - 1) else "")
+        nearest = self.closest(row, known_free=True)
+        return "it is not proven free" if nearest is None else f"{nearest}, too near to be told free"
 
     def certify(self, Q: ArrayLike) -> Mask:
         """A second opinion on rows of Q, (m, dof) -> (m,), not by the checks of planners: proofs first, then coal."""
         mask = self.robot.within_limits(rows := self._rows(Q, 2))
         open_ = mask & ~self.prover.still_proven(rows)
         mask[open_] = self._certificate().free(rows[open_])
-        return mask
+        return mask if self.constraints is None else mask & self.constraints.held(rows)
 
     def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:
         starts, ends = self._rows(A, 2), self._rows(B, 2)
@@ -285,16 +393,26 @@ class World(Rebuilt):
     def _free(self, rows: Matrix) -> Mask:
         mask = self.robot.within_limits(rows) & (not self._always_colliding)
         if mask.all():
-            return self._checks.free(rows)
-        mask[mask] = self._checks.free(rows[mask])
+            mask = self._checks.free(rows)
+        else:
+            mask[mask] = self._checks.free(rows[mask])
+        if self.constraints is not None:
+            mask[mask] = self.constraints.held(rows[mask])
         return mask
 
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
         mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
-        starts, ends = one_way(starts[mask], ends[mask])
-        counts = step_counts(starts, ends, self.weights, self.motion_resolution)
-        proving = self._proven_clearance is not None
-        mask[mask] = free = self._checks.motions_free(starts, ends, counts, to_be_proven=proving)
-        if self._proven_clearance is not None:
-            mask[mask] = self.prover.proven(starts[free], ends[free], clearance=self._proven_clearance)
+        A, B = one_way(starts[mask], ends[mask])
+        counts = step_counts(A, B, self.weights, self.motion_resolution)
+        clearance = self._settings.proving
+        mask[mask] = free = self._checks.motions_free(A, B, counts, to_be_proven=clearance is not None)
+        if clearance is not None:
+            mask[mask] = self.prover.proven(A[free], B[free], clearance=clearance)
+        elif self.constraints is not None:  # a prover says that too
+            mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
         return mask
+
+
+def _and_more(contacts: tuple[Contact, ...]) -> str:
+    more = len(contacts) - 1
+    return f" (and {more} more pair{'s' * (more > 1)})" if more else ""

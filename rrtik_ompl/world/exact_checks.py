@@ -96,10 +96,10 @@ class ExactChecker:
         other._containment = Once(_containment_of, other.bodies, self._pairs, self._covers)
         return other
 
-    def with_bodies(self, bodies: tuple[Body, ...]) -> ExactChecker:
+    def with_bodies(self, bodies: Items[Body]) -> ExactChecker:
         """The same checker of the same bodies with other margins."""
         other = copy.copy(self)
-        other.bodies = Items(bodies)
+        other.bodies = bodies
         other._tables = TakenTables(other._packed())
         return other
 

@@ -37,9 +37,9 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
     Args:
         world: The world.
         ends: Where a path begins and ends.
-        clearance: Wanted [m]; None for a millimetre, or less if the ends have less.
+        clearance: Wanted [m]; None for a millimetre or that of the world, or less if the ends have less.
     """
-    for room in _rooms(clearance):
+    for room in _rooms(world, clearance):
         if world.motions_proven(ends, ends, clearance=room.searched).all():
             return room
     return None
@@ -49,7 +49,7 @@ def rooms_between(world: World, ends: NDArray[np.float64], clearance: float | No
     """:func:`room_between` for several pairs of configurations, shape (m, 2, dof), in a few calls."""
     found: list[Room | None] = [None] * len(ends)
     open_ = np.arange(len(ends))
-    for room in _rooms(clearance):
+    for room in _rooms(world, clearance):
         if len(open_) == 0:
             break
         rows = ends[open_].reshape(-1, ends.shape[2])
@@ -60,9 +60,9 @@ def rooms_between(world: World, ends: NDArray[np.float64], clearance: float | No
     return found
 
 
-def _rooms(clearance: float | None) -> Iterator[Room]:
+def _rooms(world: World, clearance: float | None) -> Iterator[Room]:
     """What may be kept, the most first."""
-    wanted = CLEARANCE if clearance is None else clearance
+    wanted = max(CLEARANCE, world.settings.clearance) if clearance is None else clearance
     less = (wanted * 0.5**k for k in range(HALVINGS))
     for searched in chain((wanted + min(wanted, SPARE),), less, (0.0,)):
         yield Room(min(wanted, searched), searched)
@@ -76,13 +76,28 @@ def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> f
     return 0.0 if room is None else room.kept
 
 
+def keeping(world: World, clearance: float, *, proven: float | None = None) -> World:
+    """The same world for searches that leave room: what it keeps itself, or more.
+
+    Args:
+        world: The world, which may keep a clearance of its own.
+        clearance: That motions keep in steps at least [m].
+        proven: That they are proven to keep at least [m]; None if nothing needs be proven that the world does not ask.
+    """
+    own = world.settings
+    roomy = max(clearance, own.clearance)
+    if proven is None:
+        return world.with_settings(clearance=roomy)
+    return world.with_settings(clearance=roomy, proving=max(proven, own.proving or 0.0))
+
+
 def leaving_room(world: World, room: Room) -> World:
     """The same world for searches: motions keep more than what is to be kept, at points that lie close enough.
 
     No point of the arm moves between two of them farther than twice what is kept beyond ``room.kept``, so that what is
     thin is not stepped over: in between, too, obstacles are that far away [16].
     """
-    wider, step = world.with_clearance(room.searched), 2.0 * (room.searched - room.kept)
+    wider, step = keeping(world, room.searched), 2.0 * (room.searched - room.kept)
     return wider.with_resolution(step) if FINEST_RESOLUTION <= step < world.motion_resolution else wider
 
 
@@ -119,7 +134,7 @@ def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> 
     Args:
         world: The world.
         rows: The route.
-        clearance: Wanted [m]; None for a millimetre, or less if the ends have less.
+        clearance: Wanted [m]; None for a millimetre or that of the world, or less if the ends have less.
     """
     room = room_between(world, rows[[0, -1]], clearance)
     for kept in sorted({room.kept, 0.0}, reverse=True) if room is not None else ():

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Vector, finite_array, not_negative
 from rrtik_ompl.choices import Accuracy
-from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.bodies import Body, Pairs
 from rrtik_ompl.collision.certificate import fixed_contact
 from rrtik_ompl.collision.cloud_solid import cloud_solid
 from rrtik_ompl.errors import InputError, UnknownNameError, require
@@ -32,8 +32,8 @@ class MovingWorld:
     """Checks of a robot among obstacles that may be moved; replaces a conservative ``World``.
 
     A configuration is free if it is within the limits, proven free of self-collision, and proven to be farther than
-    margin and ``inflation`` from every obstacle. Motions are checked as a ``World`` does. While an obstacle overlaps
-    the arm's fixed base nothing is free.
+    margin and ``inflation`` from every obstacle, and than the clearance of the world. Motions are checked as a
+    ``World`` does, and proven where it asks for that. While an obstacle overlaps the arm's fixed base nothing is free.
 
     Attributes:
         robot, weights, motion_resolution: Those of the world.
@@ -49,6 +49,9 @@ class MovingWorld:
         moving: Names of the obstacles that may be moved; all of them if None.
         copies: In how many places at once each of these may be (where it is, and where it will be).
         self_collision: False leaves out what does not concern obstacles, so that :meth:`clearance` is of them alone.
+
+    Raises:
+        InputError: If the world has path constraints, which are not kept here.
     """
 
     accuracy: Accuracy = "conservative"
@@ -58,11 +61,16 @@ class MovingWorld:
         self, world: World, *, moving: Sequence[str] | None = None, copies: int = 1, self_collision: bool = True
     ) -> None:
         require(world, World, "world of a moving world", "use World(robot, scene)")
+        if world.constraints is not None:
+            raise InputError("world of a moving world: it has path constraints, which are not kept there; use .unheld")
+        self._proving = world.settings.proving
+        self._room = world.settings.clearance
         self.robot: Robot = world.robot
         self.weights, self.motion_resolution = world.weights, world.motion_resolution
         self.scene, self.checked = world.scene, 0
         names = {o.name for o in self.scene.obstacles} if moving is None else set(moving)
-        self._bodies, pairs, self._copy = _with_copies(world, names, copies)
+        roomy = [self._roomy(body, body.margin) for body in world.bodies]
+        self._bodies, pairs, self._copy = _with_copies(roomy, world.pairs, names, copies)
         self._known = {o.name: o for o in self.scene.obstacles}
         kept = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
         if not self_collision:
@@ -73,14 +81,14 @@ class MovingWorld:
         self._inflation = [0.0] * len(self._bodies)
         self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
-        first = world.bodies  # copies, which come behind them, are not there yet
+        first = tuple(roomy)  # copies, which come behind them, are not there yet
         own = tuple(p for p in kept if max(p) < len(first))
         self._prover = MovingProver(self.robot, first, own, always_colliding=bool(self.blocked))
 
     @property
     def fast(self) -> FastWorld | None:
         """See the class."""
-        return self._fast if self._fast.address and not self.blocked else None
+        return self._fast if self._fast.address and self._proving is None and not self.blocked else None
 
     @property
     def motions(self) -> FastMotions | None:
@@ -119,8 +127,8 @@ class MovingWorld:
                 solid = cloud_solid(now.shape) if isinstance(now.shape, PointCloud) else body.geometry
                 place = now.pose * body.within
                 here = solid is body.geometry and np.array_equal(place.homogeneous, body.placement.homogeneous)
-                if not here or now.margin != body.margin:
-                    self._bodies[k] = replace(body, placement=place, margin=now.margin, geometry=solid)
+                if not here or now.margin + self._room != body.margin:
+                    self._bodies[k] = self._roomy(replace(body, placement=place, geometry=solid), now.margin)
                 if inflation is not None and body.name in inflation:
                     self._inflation[k] = float(inflation[body.name])
         self.scene = scenes[0]
@@ -155,7 +163,10 @@ class MovingWorld:
         self.checked += int(steps.sum()) + len(steps)
         sides = self.robot.joint_values(starts), self.robot.joint_values(ends)
         free: Mask = self._fast.classify_edges(*sides, steps, resolve=False) == FREE
-        return free & self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self.blocked)
+        free &= self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self.blocked)
+        if self._proving is not None:  # beyond the clearance, which the margins of the bodies hold already
+            free[free] = self._prover.proven(starts[free], ends[free], clearance=self._proving - self._room)
+        return free
 
     def motions_proven(self, A: ArrayLike, B: ArrayLike, *, less: float = 0.0) -> Mask:
         """Which straight motions A[k] -> B[k], shapes (m, dof), are proven free as a whole. Shape (m,).
@@ -165,6 +176,11 @@ class MovingWorld:
         """
         starts, ends = (finite_array(Q, (None, self.robot.dof), "ends of motions") for Q in (A, B))
         return self._prover.proven(starts, ends, clearance=-less)
+
+    def _roomy(self, body: Body, margin: float) -> Body:
+        """A body that has a margin [m]; an obstacle with the clearance of the world on top of it."""
+        kept = margin + self._room
+        return body if body.kind != "obstacle" or kept == body.margin else replace(body, margin=kept)
 
     def _contact_of_base(self) -> str:
         """See ``blocked``; predicted places do not count, for nothing can be done about them."""
@@ -196,15 +212,15 @@ def check_held(scene: Scene, before: Scene) -> None:
 
 
 def _with_copies(
-    world: World, names: set[str], copies: int
+    first: Sequence[Body], known: Pairs, names: set[str], copies: int
 ) -> tuple[list[Body], list[tuple[int, int]], dict[int, int]]:
     """Bodies and pairs of a world with further copies of some obstacles, and which copy each body is."""
-    bodies, pairs = list(world.bodies), list(world.pairs)
+    bodies, pairs = list(first), list(known)
     number = dict.fromkeys(range(len(bodies)), 0)
-    for k, body in enumerate(world.bodies):
+    for k, body in enumerate(first):
         if body.kind == "obstacle" and body.name in names:
             for copy in range(1, copies):
                 number[len(bodies)] = copy
-                pairs += [(i, len(bodies)) for pair in world.pairs if k in pair for i in pair if i != k]
+                pairs += [(i, len(bodies)) for pair in known if k in pair for i in pair if i != k]
                 bodies.append(body)
     return bodies, pairs, number

@@ -147,6 +147,21 @@ class Prover:
         other._tables, other._coal = self._tables.for_thread(self.bodies), None
         return other
 
+    def moved(self, bodies: Sequence[Body], numbers: tuple[int, ...], *, always_colliding: bool) -> Prover:
+        """The prover of a world in which some bodies stand elsewhere; it takes over this one's table.
+
+        Args:
+            bodies: All of them, where they stand now.
+            numbers: Of those that stand elsewhere.
+            always_colliding: Whether two that never move touch.
+        """
+        other = copy.copy(self)
+        other.bodies, other._always_colliding, other._kin = bodies, always_colliding, object()
+        other._tables = self._tables.take(numbers)
+        if other._tables.packed is None:
+            other._coal = None
+        return other
+
     @property
     def digest(self) -> str:
         """See :attr:`Proof.digest`."""

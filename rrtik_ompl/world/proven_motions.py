@@ -14,6 +14,7 @@ from rrtik_ompl.fast.search.motions.motion_table import FastMotions
 from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
+from rrtik_ompl.world.kept_clearance import keeping
 from rrtik_ompl.world.motion_queries import MotionQueries, has_kernels
 
 KERNELS = "search.motions.proven_kernels"
@@ -79,4 +80,7 @@ def proven_motions(world: World, clearance: float, within: Matrix) -> MotionQuer
         within: Corners of a box of configurations within the limits, shape (m, n), in which all motions are.
     """
     known: object = world
-    return ProvenMotions(world, clearance) if has_kernels(known, KERNELS, within=within) else world.proving(clearance)
+    kept = max(clearance, world.settings.clearance)
+    if has_kernels(known, KERNELS, within=within):
+        return ProvenMotions(world, kept)
+    return keeping(world, 0.0, proven=kept)

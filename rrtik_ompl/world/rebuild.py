@@ -6,13 +6,13 @@ import copy
 import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from operator import attrgetter
-from typing import Any, TypeVar, cast
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
 
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.collision.bodies import Body, Pairs
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE
@@ -24,9 +24,7 @@ from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Mesh
 from rrtik_ompl.world.exact_checks import ExactChecker
 from rrtik_ompl.world.proof import Prover
-
-_PARTS = attrgetter("robot", "scene")
-_SETTINGS = attrgetter("accuracy", "self_margin", "motion_resolution", "_room", "_proven_clearance")
+from rrtik_ompl.world.settings import WorldSettings
 
 Kind = TypeVar("Kind", bound="Rebuilt")
 
@@ -34,9 +32,8 @@ Kind = TypeVar("Kind", bound="Rebuilt")
 class Rebuilt:
     """A world of which others are made."""
 
-    robot: Robot
     pairs: Pairs
-    _scene: Scene
+    _settings: WorldSettings
     _obstacles: Items[Obstacle]
     _bodies: Items[Body]
     prover: ThreadOwn[Prover] = ThreadOwn()
@@ -46,22 +43,54 @@ class Rebuilt:
     _certificate: Callable[[], Certificate]
     _numbers: _Numbers | None = None
 
+    @classmethod
+    def of(cls: type[Kind], settings: WorldSettings) -> Kind:
+        """A world made from settings: all of them are arguments of its class."""
+        return cls(**{each.name: getattr(settings, each.name) for each in fields(settings)})
+
+    @property
+    def settings(self) -> WorldSettings:
+        """What the world is made from; ``World.of(replace(world.settings, ...))`` is another form of it."""
+        scene = self._settings.scene
+        if (obstacles := self._obstacles.whole) is not scene.obstacles:
+            scene = copy.copy(scene)  # nothing else is checked again
+            object.__setattr__(scene, "obstacles", obstacles)
+            self._settings = replace(self._settings, scene=scene)
+        return self._settings
+
+    @property
+    def robot(self) -> Robot:
+        """The arm."""
+        return self._settings.robot
+
     @property
     def scene(self) -> Scene:
         """The surroundings."""
-        if (obstacles := self._obstacles.whole) is not self._scene.obstacles:
-            self._scene = copy.copy(self._scene)  # nothing else is checked again
-            object.__setattr__(self._scene, "obstacles", obstacles)
-        return self._scene
+        return self.settings.scene
+
+    @property
+    def accuracy(self) -> Accuracy:
+        """What counts as free where the kernels cannot decide: "exact" or "conservative"."""
+        return self._settings.accuracy
+
+    @property
+    def motion_resolution(self) -> float:
+        """Largest step of any point of the arm between two checked configurations [m]."""
+        return self._settings.motion_resolution
+
+    @property
+    def self_margin(self) -> float:
+        """How far links, and what they hold, must stay from each other where they must not touch [m]."""
+        return self._settings.self_margin
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """The solids of the robot and the scene."""
+        """The solids of the robot and the scene, with the margins of obstacles, without the clearance."""
         return self._bodies.whole
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy answers as the world does, and may be used in another thread or process."""
-        return _rebuilt, (type(self), *_PARTS(self), _SETTINGS(self))
+        return _quietly, (type(self), self.settings)
 
     def moved(self: Kind, name: str, pose: ArrayLike | pin.SE3) -> Kind:
         """The world in which an obstacle stands elsewhere; what that costs does not grow with their number.
@@ -95,7 +124,7 @@ class Rebuilt:
         for number, placement in placements.items():
             moved = checks.moved(number, placement)
             if moved is None:
-                return self._anew(other.scene)
+                return _quietly(type(self), other.settings)
             if checks.bodies is other._bodies:
                 other._bodies = moved.bodies
             else:  # there they have other margins
@@ -106,11 +135,9 @@ class Rebuilt:
         other._certificate = Once(_certificate, self.robot, other._bodies, self.pairs)
         still = numbers.standing(None if self._always_colliding else placements)
         other._always_colliding = _touching(self.robot, other._bodies, still)
-        other.prover = _taking_over(self.prover, other, tuple(placements))
+        moving = tuple(placements)
+        other.prover = self.prover.moved(other._bodies, moving, always_colliding=other._always_colliding)
         return other
-
-    def _anew(self: Kind, scene: Scene) -> Kind:
-        return cast(Kind, _rebuilt(type(self), self.robot, scene, _SETTINGS(self)))
 
 
 @dataclass(slots=True, eq=False)
@@ -166,23 +193,11 @@ def _far(first: Body, second: Body) -> bool:
     return bool(math.dist(one, other) > reach)  # no number where one of them has no end
 
 
-def _taking_over(prover: Prover, world: Rebuilt, moved: tuple[int, ...]) -> Prover:
-    """The prover of a world in which some bodies stand elsewhere; it takes over the table of another one."""
-    other = copy.copy(prover)
-    other.bodies, other._always_colliding, other._kin = world._bodies, world._always_colliding, object()
-    other._tables = prover._tables.take(moved)
-    if other._tables.packed is None:
-        other._coal = None
-    return other
-
-
-def _rebuilt(kind: Callable[..., Any], robot: Robot, scene: Scene, settings: tuple[Any, ...]) -> object:
-    accuracy, self_margin, resolution, room, proven = settings
+def _quietly(kind: type[Kind], settings: WorldSettings) -> Kind:
+    """A world like one that there is already; what it doubts was said there."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MeshWarning)  # said where the world was first made
-        world = kind(robot, scene, accuracy=accuracy, self_margin=self_margin)
-    world = world.with_resolution(resolution).with_clearance(room)
-    return world if proven is None else world.proving(proven)
+        warnings.simplefilter("ignore", MeshWarning)
+        return kind.of(settings)
 
 
 def hollow_solids(robot: Robot, scene: Scene) -> Iterator[str]:

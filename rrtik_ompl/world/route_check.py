@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.transitions import in_parts, subdivided
-from rrtik_ompl.world import Proof, World
-from rrtik_ompl.world.holding_world import HoldingWorld
+from rrtik_ompl.world import FINEST_RESOLUTION, Proof, World
 
 VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a motion is checked again
 MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
@@ -37,7 +37,7 @@ class Violation:
 
 def verification_resolution(world: World) -> float:
     """Largest step of any point of the arm between two configurations of the second check [m]."""
-    return world.motion_resolution / VERIFICATION_DENSITY
+    return max(world.motion_resolution / VERIFICATION_DENSITY, FINEST_RESOLUTION)
 
 
 def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
@@ -64,8 +64,8 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
     Raises:
         InputError: If the path is too long for its checks.
     """
-    if isinstance(world, HoldingWorld):
-        broken = _not_held(world, rows)
+    if world.constraints is not None:
+        broken = _not_held(world.constraints, rows)
         others = route_violations(world.unheld, rows, resolution)
         edges = {violation.edge for violation in broken}
         found = [*broken, *(violation for violation in others if violation.edge not in edges)]
@@ -83,9 +83,8 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
     return tuple(found)
 
 
-def _not_held(world: HoldingWorld, rows: Matrix) -> list[Violation]:
-    """The motions that do not keep the path constraints."""
-    constraints = world.constraints
+def _not_held(constraints: HeldRegions, rows: Matrix) -> list[Violation]:
+    """The motions that do not keep path constraints."""
     left = np.flatnonzero(~constraints.route_held(rows))
     ends = [rows[k] if constraints.explain(rows[k]) else rows[k + 1] for k in left]
     return [

@@ -26,7 +26,7 @@ class WeightedMotions(MotionQueries):
     Attributes:
         robot: The arm with limits and joint values of these coordinates.
         fast, motions: What kernels read; None where the world has none.
-        constraints, free_motions: See :class:`~rrtik_ompl.world.holding_world.HoldingWorld`; None where there are none.
+        constraints, free_motions: See :class:`rrtik_ompl.World`; None where there are none.
         weights, motion_resolution, accuracy: See :class:`rrtik_ompl.World`.
 
     Args:

@@ -40,7 +40,7 @@ OMPL_OPTIONS = {
     "BITstar": {"prune_threshold_fraction": -1.0},
 }
 CASES = {
-    "resolution below 0": (lambda: world().with_resolution(-1), "motion_resolution: must be greater than 0"),
+    "resolution below 0": (lambda: world().with_resolution(-1), "motion_resolution must be 1e-05 metres or more"),
     "steps of NaN": (lambda: world().steps([NAN, 0, 0], [0, 0, 0]), "finite"),
     "steps of size 0": (lambda: world().steps([0, 0, 0], [1, 0, 0], 0.0), "resolution: must be greater than 0"),
     "frame of a number": (lambda: small().robot.fk([0, 0, 0], 5), "frame of robot 'planar3' must be of type str"),

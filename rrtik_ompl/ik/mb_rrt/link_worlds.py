@@ -53,8 +53,7 @@ def _first_links(world: World, later: set[int]) -> World:
     names = {*(each.name for each in scene.obstacles), *(each.name for each in held), *robot.link_names}
     allowed = tuple(pair for pair in scene.allowed_collisions if set(pair) <= names)
     part = Scene(scene.obstacles, attached=held, allowed_collisions=allowed)
-    settings = {"motion_resolution": world.motion_resolution, "self_margin": world.self_margin}
-    return World(replace(robot, collision=kept), part, accuracy=world.accuracy, **settings)
+    return world.unheld.with_settings(robot=replace(robot, collision=kept), scene=part)
 
 
 def _moves(robot: Robot, joint: int, later: set[int]) -> bool:

@@ -1,0 +1,91 @@
+"""What a world is made from, as one frozen value: every other form of a world is made from its settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, get_args
+
+from rrtik_ompl.arrays import finite_array, not_negative
+from rrtik_ompl.choices import Accuracy, one_of
+from rrtik_ompl.copies import as_value
+from rrtik_ompl.errors import InputError, listed, require
+from rrtik_ompl.poses import few_joints
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.task_region import TaskRegion
+
+MOTION_RESOLUTION = 0.01  # [m]
+ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
+FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
+LENGTH = {"unit": "m"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorldSettings:
+    """What a :class:`rrtik_ompl.World` is made from; ``dataclasses.replace`` changes some of it, and forgets nothing.
+
+    Attributes:
+        robot: The arm.
+        scene: Its surroundings; moving obstacles are where they are at time 0.
+        accuracy: "exact" or "conservative".
+        motion_resolution: Largest step of any point of the arm between two checked configurations [m].
+        self_margin: How far links, and what they hold, must stay from each other where they must not touch [m].
+        clearance: What checks keep from obstacles on top of their margins [m]; proofs are told theirs.
+        proving: Motions must be proven too, with this clearance [m]; None if they need not be.
+        constraints: Regions that a frame must not leave, placed in the world.
+
+    Raises:
+        InputError: If one of them is of the wrong type, or a length makes no sense.
+        UnknownNameError: If there is no such accuracy.
+
+    Example:
+        >>> from dataclasses import replace
+        >>> settings = rrtik.World(rrtik.load_robot("planar3")).with_clearance(0.05).settings
+        >>> rrtik.World.of(replace(settings, accuracy="conservative")).settings.clearance
+        0.05
+    """
+
+    robot: Robot
+    scene: Scene = field(default_factory=Scene)
+    accuracy: Accuracy = "exact"
+    motion_resolution: float = field(default=MOTION_RESOLUTION, metadata=LENGTH)
+    self_margin: float = field(default=0.0, metadata=LENGTH)
+    clearance: float = field(default=0.0, metadata=LENGTH)
+    proving: float | None = field(default=None, metadata=LENGTH)
+    constraints: tuple[TaskRegion, ...] = ()
+
+    __reduce__ = as_value
+
+    def __post_init__(self) -> None:
+        require(self.robot, Robot, "robot of a world", "use load_robot(name or file)")
+        few_joints(self.robot.model)
+        require(self.scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
+        resolution = float(finite_array(self.motion_resolution, (), "motion_resolution"))
+        if resolution < FINEST_RESOLUTION:
+            raise InputError(
+                f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {self.motion_resolution}"
+            )
+        checked: dict[str, Any] = {
+            "accuracy": one_of(ACCURACIES, self.accuracy, "accuracy"),
+            "motion_resolution": resolution,
+            "self_margin": not_negative(self.self_margin, "self_margin"),
+            "clearance": not_negative(self.clearance, "clearance"),
+            "proving": None if self.proving is None else not_negative(self.proving, "clearance"),
+            "constraints": listed(self.constraints, "path constraints"),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    def unusual(self) -> Iterator[str]:
+        """Each setting beside robot and scene that is not the default, as ``name=value``."""
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if each.default is MISSING or value == each.default:
+                continue
+            if each.name == "constraints":
+                yield f"{len(value)} path constraint{'s' * (len(value) > 1)}"
+            elif "unit" in each.metadata:
+                yield f"{each.name}={value:g} {each.metadata['unit']}"
+            else:
+                yield f"{each.name}={value}"
