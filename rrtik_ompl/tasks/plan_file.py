@@ -73,9 +73,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
     if not plan.paths:
         raise InputError("task plan: it has no motion to save" + (f": {plan.reason}" if plan.reason else ""))
     if plan.worlds[0].constraints is not None:
-        raise InputError(
-            "task plan: its world has path constraints, which the file has no key for; give MoveTo them"
-        )
+        raise InputError("task plan: its world has path constraints, which the file has no key for; give MoveTo them")
     folder = file_name(file).parent
     motions = [
         {

@@ -33,6 +33,7 @@ from rrtik_ompl.world.proof import Gap as Gap
 from rrtik_ompl.world.proof import Proof as Proof
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.rebuild import Rebuilt, hollow_solids
+from rrtik_ompl.world.settings import ACCURACIES as ACCURACIES
 from rrtik_ompl.world.settings import FINEST_RESOLUTION as FINEST_RESOLUTION
 from rrtik_ompl.world.settings import MOTION_RESOLUTION, WorldSettings
 

@@ -51,12 +51,11 @@ class Covered(World):
     """A world with kernels; with ``coarse`` covers, all that comes near anything is undecided."""
 
     def __init__(self, robot, obstacles=(), *, coarse=False, accuracy="exact"):
-        super().__init__(robot, Scene(obstacles), motion_resolution=0.04)
+        super().__init__(robot, Scene(obstacles), motion_resolution=0.04, accuracy=accuracy)
         spheres = [self._spheres(body, coarse) for body in self.bodies]
         outer, inner = ([pair[k] for pair in spheres] for k in (0, 1))
         moving = [p for p in self.pairs if any(self.bodies[i].joint > 0 for i in p)]
         self.tables = FastWorld(robot.chain, self.bodies, moving, outer=outer, inner=inner)
-        self.accuracy = accuracy
         self.asked = []
 
     @property
