@@ -3,8 +3,9 @@
 A way is whatever the library offers to be asked where a robot is free: forms of a world, what is made from one, what
 comes back from a file. `found_ways` finds their names in the library; each has to have a row in `WAYS`.
 
-An answer is right if it is that of the fresh world, or if it is on the safe side where the way says that it refuses what
-it cannot prove. It is wrong if it says free, or proven, where a fresh world that is asked densely does not.
+An answer is right if it is that of the fresh world. It is on the safe side if it refuses what the fresh world takes,
+by a way that takes only what it can prove. It is wrong if it differs otherwise: if it says free, or proven, where a
+fresh world that is asked densely does not.
 
 A further way that is not found here, such as kernels in another language, is one more row of `WAYS`: a function of a
 `Case` that gives `Judged`.
@@ -32,7 +33,7 @@ import rrtik_ompl as rrtik
 import rrtik_planners
 from bench.truth.shape_kinds import kinds
 from rrtik_ompl import AttachedObject, Obstacle, Problem, Roadmap, Robot, Scene, TimedPoses, World
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.certificate import Certificate
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge.motion_checker import SpaceChecker, WorldChecker
@@ -147,7 +148,7 @@ def _with_room(
     for attempt in range(TRIES):
         place = _place(rng, tips)
         place.translation *= 1.0 + 0.2 * attempt
-        scene = Scene([replace(thing, pose=place)], tools)
+        scene = Scene((replace(thing, pose=place),), tuple(tools))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             if World(robot, scene).valid_batch(Q).mean() > LEAST_FREE:
@@ -373,7 +374,7 @@ def _foreseen_worlds(case: Case) -> Judged:
 
 
 def _weighted_motions(case: Case) -> Judged:
-    weights = 2.0 ** (np.arange(case.robot.dof) % 3)  # powers of two: nothing is rounded
+    weights: Vector = np.exp2(np.arange(case.robot.dof) % 3).astype(np.float64)  # powers of two: nothing is rounded
     world = WeightedMotions(case.fresh(), weights)
     scaled = replace_rows(case, weights)
     given = world.valid_batch(scaled.Q), world.motion_valid_batch(scaled.A, scaled.B)
@@ -382,7 +383,7 @@ def _weighted_motions(case: Case) -> Judged:
     return Judged(len(case.Q) + len(case.A) - differ, 0, differ, "weighted: other answers" if differ else "")
 
 
-def replace_rows(case: Case, weights: Matrix) -> Case:
+def replace_rows(case: Case, weights: Vector) -> Case:
     """The case in coordinates multiplied by weights, shape (dof,)."""
     return replace(case, Q=case.Q * weights, A=case.A * weights, B=case.B * weights)
 
@@ -449,13 +450,18 @@ def _routes(roadmap: Roadmap, case: Case) -> Judged:
     free = case.truth.valid_batch(case.A) & case.truth.valid_batch(case.B)
     found = Judged()
     for a, b in zip(case.A[free][:QUERIES], case.B[free][:QUERIES], strict=True):
-        looks = iter(range(LOOKS))
-        rows = roadmap.route(a[None], b[None], lambda looks=looks: next(looks, None) is None)
+        rows = roadmap.route(a[None], b[None], _after(LOOKS))
         if rows is not None:
             valid = case.truth.motion_valid_batch(rows[:-1], rows[1:])
             fault = "" if valid.all() else "route: motions that are not free"
             found += Judged(int(valid.sum()), 0, int((~valid).sum()), fault)
     return found
+
+
+def _after(looks: int) -> Callable[[], bool]:
+    """It is time to stop from so many looks on."""
+    left = iter(range(looks))
+    return lambda: next(left, None) is None
 
 
 # Ways by files
@@ -540,7 +546,7 @@ def found_ways() -> Iterator[str]:
                 yield f"{kind.__name__}.{name}"
     for package in (rrtik, rrtik_planners):
         yield from _classes(Path(str(package.__file__)).parent)
-    for name in rrtik.__all__:
+    for name in vars(rrtik)["__all__"]:
         if name.startswith("load_") and _makes(getattr(rrtik, name)) in (
             *("Problem", "Roadmap", "World", "TaskPlan", "LoadedTask", "Scenario"),
         ):

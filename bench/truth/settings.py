@@ -43,10 +43,10 @@ def _robot() -> Robot:
 def _scene(**ball: Any) -> Scene:
     """A ball and a box beside the arm, and something in its hand."""
     things = [
-        Obstacle("ball", rrtik.Sphere(0.2), [1.4, 1.6, 0.0], **ball),
-        Obstacle("box", rrtik.Box([0.2, 0.2, 0.2]), [-1.5, 1.2, 0.0]),
+        Obstacle("ball", rrtik.Sphere(0.2), rrtik.pose([1.4, 1.6, 0.0]), **ball),
+        Obstacle("box", rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([-1.5, 1.2, 0.0])),
     ]
-    return Scene(things, [AttachedObject("rod", "tip", rrtik.Sphere(0.05), [0.1, 0.0, 0.0])])
+    return Scene(tuple(things), (AttachedObject("rod", "tip", rrtik.Sphere(0.05), rrtik.pose([0.1, 0.0, 0.0])),))
 
 
 def _held(**rod: Any) -> Scene:
@@ -69,7 +69,7 @@ class Set:
     read: Callable[[World], Any]
 
 
-def _of_world(name: str, value: object) -> Set:
+def _of_world(name: str, value: Any) -> Set:
     return Set(lambda: World(_robot(), _scene(), **{name: value}), lambda world: getattr(world.settings, name))
 
 
@@ -98,7 +98,7 @@ SETTINGS: dict[str, Set] = {
         lambda world: getattr(world.scene.obstacle("ball").motion, "velocity", np.zeros(0)).tolist(),
     ),
     "scene: allowed collisions": Set(
-        lambda: World(_robot(), replace(_scene(), allowed_collisions=[(LINK, "box")])),
+        lambda: World(_robot(), replace(_scene(), allowed_collisions=((LINK, "box"),))),
         lambda world: world.scene.allowed_collisions,
     ),
     "scene: padding of what is held": Set(
@@ -203,7 +203,7 @@ def without_row() -> Iterator[str]:
     """A line for each setting, and each way of making a world anew, that has no row here."""
     for each in fields(WorldSettings):
         if not any(name == each.name or name.startswith(f"{each.name}: ") for name in SETTINGS):
-            yield f"WorldSettings.{each.name} has no row in SETTINGS of bench/truth/settings.py; add a world that has it"
+            yield f"WorldSettings.{each.name} has no row in SETTINGS of bench/truth/settings.py; add one"
     for name in dict.fromkeys(found_ways()):
         if ("." in name or name.startswith("load_")) and name not in {*WAYS, *NOT_OF_WORLDS}:
             yield f"{name} has no row in WAYS of bench/truth/settings.py; add one"

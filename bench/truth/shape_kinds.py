@@ -60,7 +60,8 @@ def _polygon(rng: np.random.Generator, size: float) -> Shape:
 def _star(rng: np.random.Generator, size: float, radii: Matrix) -> Matrix:
     corners = len(radii)
     angles = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False) + rng.uniform(0.0, 0.3, corners)
-    return 0.5 * size * radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    around: Matrix = np.column_stack([np.cos(angles), np.sin(angles)])
+    return 0.5 * size * radii[:, None] * around
 
 
 def _closed_mesh(rng: np.random.Generator, size: float) -> Shape:

