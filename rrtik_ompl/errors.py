@@ -189,8 +189,19 @@ def listed(values: object, what: str, most: int = MOST_MEMBERS) -> tuple[Any, ..
     return members
 
 
+def few(names: Iterable[str], most: int = 4) -> str:
+    """The first of some names, and how many more there are: "a, b and 3 more"."""
+    known = tuple(names)
+    rest = len(known) - most
+    return ", ".join(known[:most]) + (f" and {rest} more" if rest > 0 else "")
+
+
 class MeshWarning(UserWarning):
     """A mesh is missing or cannot be the solid that its author probably meant, but work can go on."""
+
+
+class DescriptionWarning(UserWarning):
+    """A robot's description says something that is wrong or is not read, but work can go on."""
 
 
 class TipWarning(UserWarning):

@@ -60,6 +60,8 @@ class Robot:
         velocity, acceleration, jerk: Limits [rad/s, rad/s^2, rad/s^3 or m], shape (dof,), inf where unknown.
         prismatic, continuous: Masks, shape (dof,). tip, postures: Frame that goals refer to; named configurations.
         allowed_collisions: Pairs of link names that are never checked against each other.
+        checked_collisions: Pairs of link names that are checked although a joint joins them.
+        unchecked_solids: Pairs of names of solids of ``collision`` that are never checked against each other.
         model, collision: Pinocchio's model and geometry; do not change them. looks: Gives ``visual``.
         closed_form: The robot's own inverse kinematics, if it brings one.
         gripper: The joints that open and close its gripper, `rrtik_ompl.description.gripper.GripperJoints`, or None.
@@ -84,6 +86,8 @@ class Robot:
     looks: Callable[[], pin.GeometryModel]
     chain: Chain
     self_collision: bool = True
+    checked_collisions: frozenset[frozenset[str]] = frozenset()
+    unchecked_solids: frozenset[frozenset[str]] = frozenset()
     closed_form: Callable[..., Any] | None = None
     gripper: Any = None
     planar: bool = False

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import chain, compress
+from itertools import chain, combinations, compress
 from operator import not_
 from typing import Any, TypeAlias
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.collision.shape_table import Piece, pieces
 from rrtik_ompl.collision.solids import robot_solids
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.errors import DescriptionWarning, InputError, UnknownNameError, few
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 
@@ -123,21 +124,25 @@ def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
 def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:
     """Numbers of the bodies that must not touch: all but what is rigidly joined or allowed, and adjacent links.
 
-    Adjacent links overlap at their joint by construction; what a link holds does not, so it is checked against all
-    links but its own and those that it is allowed to touch.
+    Links are adjacent if one joint lies between them: they overlap at it by construction. What a link holds does not,
+    so it is checked against all links but its own and those that it is allowed to touch.
+
+    Args:
+        robot: The robot.
+        scene: What surrounds it, and what it holds.
+        bodies: Those of `link_bodies`, then those of `scene_bodies`.
 
     Raises:
         UnknownNameError: If an allowed collision names something that does not exist.
     """
     allowed = _allowed(robot, scene)
-    parent = _carrying_parents(robot, bodies)
-    checked_links = _self_collision_names(robot)
+    of_links = _pairs_of_links(robot)
     own = [k for k, body in enumerate(bodies) if body.kind != "obstacle"]
     found = [
         (i, j)
         for place, i in enumerate(own if robot.self_collision else ())
         for j in own[place + 1 :]
-        if _may_meet(bodies[i], bodies[j], parent, checked_links)
+        if ((i, j) in of_links if bodies[j].kind == "link" else _may_meet(bodies[i], bodies[j]))
         and frozenset((bodies[i].name, bodies[j].name)) not in allowed
     ]
     obstacles = [(k, body.name) for k, body in enumerate(bodies) if body.kind == "obstacle"]
@@ -159,14 +164,9 @@ def pair_array(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
     return np.fromiter(chain.from_iterable(pairs), np.int64, 2 * len(pairs)).reshape(-1, 2)
 
 
-def _may_meet(first: Body, second: Body, parent: dict[int, int], checked_links: frozenset[frozenset[str]]) -> bool:
-    """Whether two bodies of the robot, or what it holds, must not touch, as long as nobody allows it."""
-    if first.name == second.name or first.joint == second.joint:
-        return False
-    if not first.kind == second.kind == "link":
-        return True
-    names = frozenset((first.name, second.name))
-    return names in checked_links and not _adjacent(first.joint, second.joint, parent)
+def _may_meet(first: Body, second: Body) -> bool:
+    """Whether two bodies of the robot, or what it holds, are neither one thing nor rigidly joined."""
+    return first.name != second.name and first.joint != second.joint
 
 
 def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
@@ -181,10 +181,44 @@ def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
     return allowed
 
 
+@lru_cache(maxsize=16)
+def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
+    """Numbers of the bodies of links that must not touch.
+
+    A description without a list of allowed pairs says nothing about solids that overlap by construction; two that
+    touch in every one of many random postures can only be such ones. They are left out, and a warning names them. With
+    a list that is done only for links between which other programs may not look: those joined by links without solids,
+    and those that are asked for although a joint joins them.
+    """
+    bodies = link_bodies(robot)
+    solids = [item.name for item in robot.collision.geometryObjects]
+    parents = list(robot.model.parents)
+    nearest = _carrying_parents(robot, bodies)
+    pairs: list[tuple[int, int]] = []
+    doubtful: list[tuple[int, int]] = []
+    for i, j in combinations(range(len(bodies)), 2):
+        first, second = bodies[i], bodies[j]
+        names = frozenset((first.name, second.name))
+        wanted = names in robot.checked_collisions
+        if (
+            not _may_meet(first, second)
+            or (_adjacent(first.joint, second.joint, parents) and not wanted)
+            or names in robot.allowed_collisions
+            or frozenset((solids[i], solids[j])) in robot.unchecked_solids
+        ):
+            continue
+        pairs.append((i, j))
+        if not robot.allowed_collisions or wanted or _adjacent(first.joint, second.joint, nearest):
+            doubtful.append((i, j))
+    if not robot.self_collision:
+        return frozenset(pairs)
+    return frozenset(pairs) - _always_touching(robot, bodies, doubtful)
+
+
 def _carrying_parents(robot: Robot, bodies: Iterable[Body]) -> dict[int, int]:
     """For each joint that carries a body: the nearest joint towards the base that also does."""
-    carrying = {0} | {b.joint for b in bodies if b.kind != "obstacle"}
-    found = {}
+    carrying = {0} | {body.joint for body in bodies}
+    found = {0: 0}
     for joint in carrying - {0}:
         above = int(robot.model.parents[joint])
         while above not in carrying:
@@ -193,42 +227,33 @@ def _carrying_parents(robot: Robot, bodies: Iterable[Body]) -> dict[int, int]:
     return found
 
 
-def _adjacent(first: int, second: int, parent: dict[int, int]) -> bool:
-    return first == second or parent.get(first) == second or parent.get(second) == first
+def _adjacent(first: int, second: int, parents: Mapping[int, int] | Sequence[int]) -> bool:
+    """Whether one of two joints is the parent of the other."""
+    return bool(parents[first] == second or parents[second] == first)
 
 
-@lru_cache(maxsize=16)
-def _self_collision_names(robot: Robot) -> frozenset[frozenset[str]]:
-    """Pairs of links to check. Without a list of allowed pairs, those that always collide are left out.
-
-    A robot description without an SRDF says nothing about links that overlap by construction; a pair that collides in
-    every one of many random configurations can only be such a one.
-    """
-    bodies = link_bodies(robot)
-    parent = _carrying_parents(robot, bodies)
-    pairs = [
-        (i, j)
-        for i in range(len(bodies))
-        for j in range(i + 1, len(bodies))
-        if bodies[i].name != bodies[j].name
-        and not _adjacent(bodies[i].joint, bodies[j].joint, parent)
-        and frozenset((bodies[i].name, bodies[j].name)) not in robot.allowed_collisions
-    ]
-    names = frozenset(frozenset((bodies[i].name, bodies[j].name)) for i, j in pairs)
-    if robot.allowed_collisions or not robot.self_collision:
-        return names
-    return names - _always_colliding(robot, bodies, pairs)
-
-
-def _always_colliding(
-    robot: Robot, bodies: tuple[Body, ...], pairs: list[tuple[int, int]]
-) -> frozenset[frozenset[str]]:
+def _always_touching(robot: Robot, bodies: tuple[Body, ...], pairs: Sequence[tuple[int, int]]) -> set[tuple[int, int]]:
+    """Those of the pairs that touch in every posture of a sample; a warning names them."""
     rng = np.random.default_rng(0)
     samples = robot.joint_frames(rng.uniform(*robot.finite_range(), (ALWAYS_COLLIDING_SAMPLES, robot.dof)))
     suspects = set(pairs)
     for frames in samples:
         suspects = {p for p in suspects if _touch(bodies[p[0]], bodies[p[1]], frames)}
-    return frozenset(frozenset((bodies[i].name, bodies[j].name)) for i, j in suspects)
+    if suspects:
+        names = [" and ".join(_solid_name(bodies, k) for k in pair) for pair in sorted(suspects)]
+        message = (
+            f"robot '{robot.name}': not checked, as they touch in each of {ALWAYS_COLLIDING_SAMPLES} random postures: "
+            f"{few(names)}; correct them, or let them touch: <disable_collisions> of an SRDF, <exclude> of an MJCF"
+        )
+        warnings.warn(DescriptionWarning(message), stacklevel=2)
+    return suspects
+
+
+def _solid_name(bodies: tuple[Body, ...], number: int) -> str:
+    """The link of a body; with its number in the link, counted from 1, if that has several."""
+    link = bodies[number].name
+    own = [k for k, body in enumerate(bodies) if body.name == link]
+    return f"'{link}'" if len(own) == 1 else f"'{link}' (solid {own.index(number) + 1})"
 
 
 def _touch(first: Body, second: Body, frames: Sequence[pin.SE3]) -> bool:

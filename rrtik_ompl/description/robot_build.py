@@ -18,7 +18,9 @@ from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.tree import Joint, Tree
 from rrtik_ompl.description.tree_model import build_models
 from rrtik_ompl.errors import InputError, TipWarning, UnknownNameError, name_of
-from rrtik_ompl.robot import Chain, Robot
+from rrtik_ompl.robot import LIMIT_TOLERANCE, Chain, Robot
+
+RATES = ("velocity", "acceleration", "jerk")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,8 @@ def build_robot(
     limits: Mapping[str, JointLimits] | None = None,
     postures: Mapping[str, Mapping[str, float]] | None = None,
     allowed_collisions: Iterable[Iterable[str]] = (),
+    checked_collisions: Iterable[Iterable[str]] = (),
+    unchecked_solids: Iterable[Iterable[str]] = (),
     self_collision: bool = True,
     closed_form: Callable[..., Any] | None = None,
     planar: bool = False,
@@ -81,9 +85,12 @@ def build_robot(
         locked: Values at which joints that are not actuated are held [rad or m]; 0, moved into the limits, if absent.
         tip: Frame that goals refer to; the last link that every actuated joint moves if None.
         base_pose: ``pinocchio.SE3`` T_world_base; identity if None.
-        limits: Limits by joint name; what is given replaces the tree's.
+        limits: Limits by joint name; what is given replaces the tree's. Those of a joint that follows another hold for
+            what it follows, too.
         postures: Named configurations by joint name; only those that name every actuated joint are kept.
         allowed_collisions: Pairs of link names never checked.
+        checked_collisions: Pairs of link names that are checked although a joint joins them.
+        unchecked_solids: Pairs of solids never checked, by their links' names and numbers: "hand_0".
         self_collision: Whether links are checked against each other.
         closed_form: The robot's own inverse kinematics.
         planar: Whether the arm moves in the xy-plane.
@@ -102,12 +109,13 @@ def build_robot(
                 f"robot '{name}': prismatic joint '{tie.joint}' mimics '{tie.source}', which turns without end; "
                 "give that one limits"
             )
-    held = _held_values(name, movable, actuated, ties, locked or {})
+    limited = _followed(name, movable, actuated, ties, limits or {})
+    held = _held_values(name, limited, actuated, ties, locked or {})
     model, collision, looks = build_models(tree.hold(held), checked_base(base_pose, f"robot '{name}': base_pose"))
     tip_name = _last_link(name, tree, actuated) if tip is None else name_of(tip, f"the tip of robot '{name}'")
     if not model.existFrame(tip_name):
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
-    bounds = _limits(name, [movable[joint] for joint in actuated], limits or {})
+    bounds = _limits(name, [movable[joint] for joint in actuated], limited)
     named = {
         key: frozen(_turned_inside(np.array([values[j] for j in actuated]), bounds))
         for key, values in (postures or {}).items()
@@ -119,7 +127,9 @@ def build_robot(
         movable=frozenset(movable),
         tip=tip_name,
         postures=MappingProxyType(named),
-        allowed_collisions=frozenset(frozenset(pair) for pair in allowed_collisions),
+        allowed_collisions=_pairs(allowed_collisions),
+        checked_collisions=_pairs(checked_collisions),
+        unchecked_solids=_pairs(unchecked_solids),
         model=model,
         collision=collision,
         looks=looks,
@@ -130,6 +140,10 @@ def build_robot(
         source=MappingProxyType(dict(source or {"name": name})),
         **bounds,
     )
+
+
+def _pairs(given: Iterable[Iterable[str]]) -> frozenset[frozenset[str]]:
+    return frozenset(frozenset(pair) for pair in given)
 
 
 def _check_joints(
@@ -154,21 +168,20 @@ def _check_joints(
 
 def _held_values(
     name: str,
-    movable: Mapping[str, Joint],
+    limits: Mapping[str, Mapping[str, float]],
     actuated: tuple[str, ...],
     ties: Mapping[str, Mimic],
     locked: Mapping[str, float],
 ) -> dict[str, float]:
     """Value of every joint that is neither actuated nor follows an actuated one."""
     values: dict[str, float] = {}
-    for joint in movable.values():
-        neutral = 0.0 if joint.kind == "continuous" else min(max(0.0, joint.lower), joint.upper)
-        given = locked.get(joint.name, neutral)
-        values[joint.name] = float(bounded_array(given, (), f"robot '{name}': locked value of joint '{joint.name}'"))
+    for joint, own in limits.items():
+        given = locked.get(joint, min(max(0.0, own["lower"]), own["upper"]))
+        values[joint] = float(bounded_array(given, (), f"robot '{name}': locked value of joint '{joint}'"))
     for tie in ties.values():
         if tie.joint not in locked:
             values[tie.joint] = tie.multiplier * values[tie.source] + tie.offset
-    moving = {joint for joint in movable if joint in actuated or (joint in ties and ties[joint].source in actuated)}
+    moving = {joint for joint in limits if joint in actuated or (joint in ties and ties[joint].source in actuated)}
     return {joint: value for joint, value in values.items() if joint not in moving}
 
 
@@ -199,14 +212,11 @@ def _chain(model: pin.Model, actuated: tuple[str, ...], ties: Mapping[str, Mimic
     )
 
 
-def _limits(name: str, joints: Iterable[Joint], given: Mapping[str, JointLimits]) -> dict[str, Any]:
+def _limits(name: str, joints: Iterable[Joint], found: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
     rows = []
     for joint in joints:
-        wanted = given.get(joint.name, JointLimits())
-        endless = joint.kind == "continuous"
-        low, high = (-np.inf, np.inf) if endless else (joint.lower, joint.upper)
-        low = low if wanted.lower is None else wanted.lower
-        high = high if wanted.upper is None else wanted.upper
+        limits = found[joint.name]
+        low, high = limits["lower"], limits["upper"]
         if not low < high:
             raise InputError(
                 f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; "
@@ -217,18 +227,69 @@ def _limits(name: str, joints: Iterable[Joint], given: Mapping[str, JointLimits]
                 f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres, up to {LARGEST:g}; "
                 "give them in the file or by joint_limits=FILE, or leave the joint out of joints=[...]"
             )
-        rates = [joint.velocity if wanted.velocity is None else wanted.velocity]
-        rates += [np.inf if rate is None else rate for rate in (wanted.acceleration, wanted.jerk)]
-        for what, rate in zip(("velocity", "acceleration", "jerk"), rates, strict=True):
+        rates = [limits[key] for key in RATES]
+        for what, rate in zip(RATES, rates, strict=True):
             if not rate > 0.0:
                 raise InputError(
                     f"robot '{name}': joint '{joint.name}' has {what} limit {rate:g}; it must be greater than 0"
                 )
-        rows.append((low, high, *rates, endless and bool(np.isinf(low) and np.isinf(high)), joint.kind == "prismatic"))
+        endless = joint.kind == "continuous" and bool(np.isinf(low) and np.isinf(high))
+        rows.append((low, high, *rates, endless, joint.kind == "prismatic"))
     columns = list(zip(*rows, strict=True))
-    keys = ("lower", "upper", "velocity", "acceleration", "jerk")
-    found: dict[str, Any] = {key: frozen(column) for key, column in zip(keys, columns, strict=False)}
-    return found | {"continuous": frozen(columns[5], bool), "prismatic": frozen(columns[6], bool)}
+    keys = ("lower", "upper", *RATES)
+    bounds: dict[str, Any] = {key: frozen(column) for key, column in zip(keys, columns, strict=False)}
+    return bounds | {"continuous": frozen(columns[5], bool), "prismatic": frozen(columns[6], bool)}
+
+
+def _followed(
+    name: str,
+    movable: Mapping[str, Joint],
+    actuated: tuple[str, ...],
+    ties: Mapping[str, Mimic],
+    given: Mapping[str, JointLimits],
+) -> dict[str, dict[str, float]]:
+    """The limits of all movable joints, each cut so that what follows the joint stays within its own.
+
+    Raises:
+        InputError: If no value of an actuated joint is within its limits and those of one that follows it.
+    """
+    own = {joint.name: _own_limits(joint, given.get(joint.name)) for joint in movable.values()}
+    found = dict(own)
+    for tie in ties.values():
+        leader, follower = found[tie.source], own[tie.joint]
+        cut = _cut(leader, follower, tie)
+        if cut["lower"] < cut["upper"]:
+            found[tie.source] = cut
+        elif tie.source in actuated and leader["lower"] < leader["upper"]:
+            raise InputError(
+                f"robot '{name}': no value of joint '{tie.source}' within {leader['lower']:g} .. {leader['upper']:g} "
+                f"keeps joint '{tie.joint}', which follows it as {tie.multiplier:g} x + {tie.offset:g}, within its "
+                f"limits {follower['lower']:g} .. {follower['upper']:g}; correct the limits, or how it follows"
+            )
+    return found
+
+
+def _own_limits(joint: Joint, given: JointLimits | None) -> dict[str, float]:
+    """All limits of a joint by their names, infinite where there is none."""
+    endless = joint.kind == "continuous"
+    limits = {
+        "lower": -np.inf if endless else joint.lower,
+        "upper": np.inf if endless else joint.upper,
+        "velocity": joint.velocity,
+        "acceleration": np.inf,
+        "jerk": np.inf,
+    }
+    return limits | {key: value for key in limits if (value := getattr(given, key, None)) is not None}
+
+
+def _cut(leader: Mapping[str, float], follower: Mapping[str, float], tie: Mimic) -> dict[str, float]:
+    """Limits of a joint that are kept where what follows it keeps its own. Torques are not compared: none is known."""
+    if tie.multiplier == 0.0:  # it stands still
+        inside = follower["lower"] - LIMIT_TOLERANCE <= tie.offset <= follower["upper"] + LIMIT_TOLERANCE
+        return dict(leader) if inside else {**leader, "lower": np.inf}
+    ends = [(follower[key] - tie.offset) / tie.multiplier for key in ("lower", "upper")]
+    rates = {key: min(leader[key], follower[key] / abs(tie.multiplier)) for key in RATES}
+    return {"lower": max(leader["lower"], min(ends)), "upper": min(leader["upper"], max(ends)), **rates}
 
 
 def _turned_inside(q: Vector, bounds: Mapping[str, Any]) -> Vector:

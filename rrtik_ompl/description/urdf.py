@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rrtik_ompl.description.faults import not_read, tell
 from rrtik_ompl.description.moveit.srdf import Srdf, read_srdf
 from rrtik_ompl.description.moveit.srdf_gripper import srdf_gripper
 from rrtik_ompl.description.robot_build import JointLimits, build_robot, merge_limits
@@ -23,7 +24,18 @@ if TYPE_CHECKING:
 
 
 FilePath = str | os.PathLike[str]
-URDF_OPTIONS = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "tip", "xacro_args")
+URDF_OPTIONS = (
+    "base_pose",
+    "group",
+    "joint_limits",
+    "joints",
+    "locked",
+    "packages",
+    "srdf",
+    "strict",
+    "tip",
+    "xacro_args",
+)
 
 
 def robot_from_urdf(
@@ -66,6 +78,7 @@ def robot_from_urdf_text(
     self_collision: bool = True,
     closed_form: Callable[..., Any] | None = None,
     source: Mapping[str, Any] | None = None,
+    strict: bool = False,
 ) -> Robot:
     """Load a robot from URDF text.
 
@@ -93,6 +106,8 @@ def robot_from_urdf_text(
         self_collision: Whether links are checked against each other.
         closed_form: The robot's own inverse kinematics.
         source: What a problem file says under ``robot``.
+        strict: Whether an error is made of what is otherwise a warning: names in the SRDF that the robot does not have,
+            postures outside the limits, and what is said about shapes, joints or limits but not read.
 
     Raises:
         InputError: If anything in the text, the files or the options cannot be used.
@@ -106,7 +121,7 @@ def robot_from_urdf_text(
         raise InputError(f"{where}: group '{group}' needs an SRDF file; give srdf=FILE, or joints=[...] in its place")
     end = semantics.group_tip(group, tree) if group in semantics.groups and tip is None and group is not None else tip
     actuated = _actuated(description, semantics, group, joints, tip)
-    from_file = {} if joint_limits is None else _limits_of_file(joint_limits, tree)
+    from_file, unread_limits = ({}, []) if joint_limits is None else _limits_of_file(joint_limits, tree)
     with located(where):
         robot = build_robot(
             name or description.name or Path(where).stem,
@@ -119,11 +134,30 @@ def robot_from_urdf_text(
             limits=merge_limits(from_file, limits or {}),
             postures=semantics.postures(group) | {key: dict(value) for key, value in (postures or {}).items()},
             allowed_collisions=[*semantics.allowed_pairs(tree), *allowed_collisions],
+            checked_collisions=semantics.checked,
             self_collision=self_collision,
             closed_form=closed_form,
             source=source,
         )
-        return replace(robot, gripper=srdf_gripper(semantics, tree, description.mimics, actuated))
+        robot = replace(robot, gripper=srdf_gripper(semantics, tree, description.mimics, actuated))
+    tell(
+        [
+            *semantics.unknown_names(tree),
+            *semantics.short_states(group, actuated),
+            *_outside(robot, semantics, group),
+            *not_read(where, description.unread),
+            *not_read(str(joint_limits), unread_limits),
+        ],
+        strict,
+    )
+    return robot
+
+
+def _outside(robot: Robot, semantics: Srdf, group: str | None) -> list[str]:
+    """A line for each state of an SRDF that is a posture and outside the robot's limits."""
+    states = {state for _, state in semantics.states}
+    faults = {name: robot.limit_fault(q) for name, q in robot.postures.items() if name in states}
+    return [f"{semantics.place_of(name, group)}: posture '{name}': {fault}" for name, fault in faults.items() if fault]
 
 
 def package_roots(packages: FilePath | Iterable[FilePath]) -> list[Path]:
@@ -151,7 +185,8 @@ def _actuated(
     return movable
 
 
-def _limits_of_file(file: FilePath, tree: Tree) -> dict[str, JointLimits]:
-    from rrtik_ompl.description.moveit.joint_limits import read_joint_limits  # most robots need no YAML
+def _limits_of_file(file: FilePath, tree: Tree) -> tuple[dict[str, JointLimits], list[str]]:
+    """Limits by joint, and what the file says about limits besides."""
+    from rrtik_ompl.description.moveit.joint_limits import read_joint_limits, unread_limits  # most need no YAML
 
-    return read_joint_limits(file, [joint.name for joint in tree.joints])
+    return read_joint_limits(file, [joint.name for joint in tree.joints]), unread_limits(file)

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element
+from xml.parsers import expat
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +17,7 @@ import pinocchio as pin
 from rrtik_ompl.description.package_path import resolve_mesh
 from rrtik_ompl.description.robot_build import Mimic
 from rrtik_ompl.description.tree import KINDS, Joint, Link, MeshFile, Solid, Tree
+from rrtik_ompl.description.urdf_unread import unread_of_urdf
 from rrtik_ompl.errors import InputError, MeshWarning, MissingFileError, RrtikError, UnknownNameError
 from rrtik_ompl.poses import pose_from_rpy
 from rrtik_ompl.shapes import SHAPES, Cylinder, Measure, Shape
@@ -26,11 +28,15 @@ _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UrdfDescription:
-    """What a URDF says: its name, its tree, and which joints follow others (followers of followers resolved)."""
+    """What a URDF says: its name, its tree, and which joints follow others (followers of followers resolved).
+
+    What it says besides about shapes, joints and limits is in ``unread``.
+    """
 
     name: str
     tree: Tree
     mimics: tuple[Mimic, ...]
+    unread: tuple[str, ...] = ()
 
 
 def read_urdf(
@@ -59,7 +65,8 @@ def read_urdf(
         warnings.warn(MeshWarning(f"{message}; collision shapes are drawn instead"), stacklevel=2)
     joints = [reader.joint(element) for element in robot.findall("joint")]
     mimics = [tie for element in robot.findall("joint") for tie in reader.mimics(element)]
-    return UrdfDescription(robot.get("name", ""), Tree(where, links, joints), _flatten(where, joints, mimics))
+    tree = Tree(where, links, joints)
+    return UrdfDescription(robot.get("name", ""), tree, flattened(where, joints, mimics), tuple(unread_of_urdf(robot)))
 
 
 def parse_xml(text: str, root: str | None, where: str) -> Element:
@@ -76,6 +83,22 @@ def parse_xml(text: str, root: str | None, where: str) -> Element:
     if root is not None and element.tag != root:
         raise InputError(f"{where}: the top element is <{element.tag}>, expected <{root}>; is it the right file?")
     return element
+
+
+def element_lines(root: Element, text: str, where: str) -> dict[Element, str]:
+    """File and line of each element of XML text that :func:`parse_xml` has read.
+
+    The file alone if macros have made the text, for they move its lines.
+    """
+    lines: list[int] = []
+    if not where.lower().endswith(".xacro"):
+        parser = expat.ParserCreate()
+        parser.StartElementHandler = lambda *_: lines.append(parser.CurrentLineNumber)
+        parser.Parse(text.strip(), True)
+    above = text[: len(text) - len(text.lstrip())].count("\n")
+    elements = list(root.iter())
+    places = [f"{where}:{line + above}" for line in lines] or [where] * len(elements)
+    return dict(zip(elements, places, strict=True))
 
 
 def numbers(element: Element, key: str, count: int, default: Sequence[float] | None, where: str) -> list[float]:
@@ -263,7 +286,7 @@ def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
     return pin.Inertia(weight, placement.translation, turned)
 
 
-def _flatten(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> tuple[Mimic, ...]:
+def flattened(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> tuple[Mimic, ...]:
     """Make every follower follow a joint that follows nothing."""
     ties = {tie.joint: tie for tie in mimics}
     movable = [joint.name for joint in joints if joint.kind != "fixed"]

@@ -94,6 +94,7 @@ class _Described(_Mounted):
     packages: list[Name] | Name | None = Field(None, description="folders in which package:// names are sought")
     locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
     xacro_args: dict[Name, Name | Number] | None = Field(None, description="arguments of the macros of a .xacro file")
+    strict: bool | None = Field(None, description="whether what is wrong in the description, or not read, is an error")
 
 
 class UrdfRobot(_Described):
@@ -116,6 +117,7 @@ class MjcfRobot(_Mounted):
     joints: Annotated[list[Name], Field(min_length=1)] | None = Field(None, description="joints that move, in order")
     joint_limits: Name | None = Field(None, description="file in the format of joint_limits.yaml")
     locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
+    strict: bool | None = Field(None, description="whether what is wrong in the description, or not read, is an error")
 
 
 class DhRobot(_Mounted):

@@ -18,7 +18,7 @@ from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE
 from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.copies import Items, KeptHere, Once, ThreadOwn
-from rrtik_ompl.errors import MeshWarning, UnknownNameError, require
+from rrtik_ompl.errors import DescriptionWarning, MeshWarning, UnknownNameError, require
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Mesh
@@ -196,7 +196,8 @@ def _far(first: Body, second: Body) -> bool:
 def _quietly(kind: type[Kind], settings: WorldSettings) -> Kind:
     """A world like one that there is already; what it doubts was said there."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MeshWarning)
+        for doubt in (MeshWarning, DescriptionWarning):
+            warnings.simplefilter("ignore", doubt)
         return kind.of(settings)
 
 

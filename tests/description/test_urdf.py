@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.description.urdf import robot_from_urdf, robot_from_urdf_text
-from rrtik_ompl.errors import InputError, TipWarning
+from rrtik_ompl.errors import DescriptionWarning, InputError, TipWarning
 from rrtik_robots.example_arms import data_folder
 
 
@@ -195,8 +195,10 @@ def test_group_states_become_postures_if_they_name_every_joint(srdf):
     assert {name: q.tolist() for name, q in robot.postures.items()} == {"folded": [0.5, -0.5]}
 
 
-def test_disabled_pairs_are_allowed_and_unknown_ones_are_silent(srdf):
-    assert frozenset(("base", "hand")) in robot_from_urdf_text(arm(), srdf=srdf).allowed_collisions
+def test_disabled_pairs_are_allowed_and_of_unknown_ones_a_warning_tells(srdf):
+    with pytest.warns(DescriptionWarning, match=r"arm\.srdf:\d+: <disable_collisions>: no link 'nowhere'"):
+        robot = robot_from_urdf_text(arm(), srdf=srdf)
+    assert frozenset(("base", "hand")) in robot.allowed_collisions
 
 
 def test_joint_limits_replace_those_of_the_urdf(tmp_path):

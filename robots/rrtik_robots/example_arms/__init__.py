@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, distribution
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 from rrtik_ompl.description.gripper import GripperJoints
 from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.description.urdf import robot_from_urdf
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import DescriptionWarning, InputError
 from rrtik_ompl.robot import Robot
 
 if TYPE_CHECKING:
@@ -76,20 +77,22 @@ class ExampleArm:
             InputError: If the package is not installed, or an option makes no sense.
         """
         folder = data_folder()
-        robot = robot_from_urdf(
-            folder / self.urdf,
-            name=self.name,
-            srdf=folder / self.srdf if self.srdf else None,
-            joints=self.joints,
-            tip=self.tip if tip is None else tip,
-            locked=locked,
-            base_pose=base_pose,
-            postures={key: dict(zip(self.joints, q, strict=True)) for key, q in self.postures.items()},
-            limits={
-                joint: JointLimits(acceleration=acceleration, jerk=jerk)
-                for joint, acceleration, jerk in zip(self.joints, self.acceleration, self.jerk, strict=False)
-            },
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DescriptionWarning)  # known: an SRDF of a whole robot serves one arm of it
+            robot = robot_from_urdf(
+                folder / self.urdf,
+                name=self.name,
+                srdf=folder / self.srdf if self.srdf else None,
+                joints=self.joints,
+                tip=self.tip if tip is None else tip,
+                locked=locked,
+                base_pose=base_pose,
+                postures={key: dict(zip(self.joints, q, strict=True)) for key, q in self.postures.items()},
+                limits={
+                    joint: JointLimits(acceleration=acceleration, jerk=jerk)
+                    for joint, acceleration, jerk in zip(self.joints, self.acceleration, self.jerk, strict=False)
+                },
+            )
         return replace(robot, gripper=self.gripper or robot.gripper)
 
 

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from rrtik_ompl.description.faults import not_read, tell
 from rrtik_ompl.description.mjcf.read import Mjcf, read_mjcf
-from rrtik_ompl.description.moveit.joint_limits import read_joint_limits
+from rrtik_ompl.description.moveit.joint_limits import read_joint_limits, unread_limits
 from rrtik_ompl.description.robot_build import build_robot
 from rrtik_ompl.description.robot_source import source_entry
 from rrtik_ompl.description.urdf_read import located
@@ -16,7 +17,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import read_text
 from rrtik_ompl.robot import Robot
 
-MJCF_OPTIONS = ("base_pose", "joint_limits", "joints", "locked", "tip")
+MJCF_OPTIONS = ("base_pose", "joint_limits", "joints", "locked", "strict", "tip")
 TIP_SITES = ("attachment_site", "tip", "tcp", "ee", "ee_site", "end_effector", "eef", "grip_site", "pinch")  # by custom
 BEGINNING = 65536  # characters in which the top element of a file stands
 
@@ -39,13 +40,16 @@ def robot_from_mjcf(
     joint_limits: str | os.PathLike[str] | None = None,
     locked: Mapping[str, float] | None = None,
     base_pose: Any = None,
+    strict: bool = False,
 ) -> Robot:
     """Load a robot from an MJCF file.
 
     Bodies and sites become links. Geoms that may collide (``contype``, ``conaffinity``) are collision geometry, meshes
-    as they are and not their hulls; planes and height fields belong to the scene and are left out. ``<exclude>`` and
-    the masks give pairs that are never checked, ``<equality><joint>`` joints that follow others, keyframes postures.
-    Free joints are held where the file puts them. MJCF knows no limits of velocity: give ``joint_limits``.
+    as they are and not their hulls; planes and height fields belong to the scene and are left out. ``<exclude>`` gives
+    pairs of links that are never checked, the masks pairs of solids; what is welded to the world is checked against all
+    that moves, as in MuJoCo. ``<equality><joint>`` gives joints that follow others, keyframes postures. Free joints are
+    held where the file puts them. One warning names what is left out. MJCF knows no limits of velocity: give
+    ``joint_limits``.
 
     Args:
         path: The file; what it includes is read too.
@@ -54,6 +58,7 @@ def robot_from_mjcf(
         joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
         locked: Values [rad or m] of joints that are held still.
         base_pose: ``pinocchio.SE3`` T_world_base.
+        strict: Whether it is an error if anything is left out, or a keyframe is outside the limits.
 
     Raises:
         InputError: If anything in the file cannot be used; one line names file, element and remedy.
@@ -62,7 +67,7 @@ def robot_from_mjcf(
     options = {"joints": joints, "tip": tip, "joint_limits": joint_limits, "locked": locked, "base_pose": base_pose}
     limits = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in found.tree.joints])
     with located(str(path)):
-        return build_robot(
+        robot = build_robot(
             found.name or Path(path).stem,
             found.tree,
             joints=_actuated(found, joints, tip),
@@ -73,8 +78,20 @@ def robot_from_mjcf(
             limits=limits,
             postures=found.postures,
             allowed_collisions=found.excluded,
+            checked_collisions=found.touchable,
+            unchecked_solids=found.apart,
             source={"mjcf": str(Path(path).resolve())} | source_entry(options),
         )
+    faults = {name: robot.limit_fault(q) for name, q in robot.postures.items()}
+    tell(
+        [
+            *(f"{path}: key '{name}': {fault}" for name, fault in faults.items() if fault),
+            *not_read(str(path), found.unread),
+            *not_read(str(joint_limits), [] if joint_limits is None else unread_limits(joint_limits)),
+        ],
+        strict,
+    )
+    return robot
 
 
 def _actuated(found: Mjcf, joints: Iterable[str] | None, tip: str | None) -> tuple[str, ...]:

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.description.mjcf.bodies import WORLD, Body, joined_by_several, meet, solids_apart, touchable
 from rrtik_ompl.description.mjcf.geoms import OF_THE_SCENE, masks, meshes_of, solid_of
+from rrtik_ompl.description.mjcf.unread import unread_of_mjcf
 from rrtik_ompl.description.mjcf.values import MAIN, Settings
 from rrtik_ompl.description.robot_build import Mimic
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
-from rrtik_ompl.description.urdf_read import attribute, located, numbers, parse_xml
+from rrtik_ompl.description.urdf_read import attribute, flattened, located, numbers, parse_xml
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.text import read_text
 
-WORLD = "world"
 MOST_FILES = 100  # that include each other
 UNREAD = ("composite", "flexcomp", "replicate", "attach", "frame")  # what makes bodies out of other bodies
 SIZES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}  # numbers of a joint in a keyframe
@@ -35,6 +36,9 @@ class Mjcf:
         sites: Names of the sites.
         mimics: Joints that follow others.
         excluded: Pairs of links that never collide.
+        apart: Pairs of solids that never collide, by links and numbers: "hand_0".
+        touchable: Pairs of links that may collide though a joint joins them, as one is welded to the world.
+        unread: What the file says besides about shapes, joints and limits.
         postures: Keyframes: joint values [rad or m] by name.
     """
 
@@ -43,6 +47,9 @@ class Mjcf:
     sites: tuple[str, ...]
     mimics: tuple[Mimic, ...]
     excluded: frozenset[frozenset[str]]
+    apart: frozenset[frozenset[str]]
+    touchable: frozenset[frozenset[str]]
+    unread: tuple[str, ...]
     postures: Mapping[str, Mapping[str, float]]
 
 
@@ -62,8 +69,18 @@ def read_mjcf(path: Path) -> Mjcf:
         reader.read(world)
     tree = Tree(where, reader.finished(), reader.joints)
     sites = tuple(dict.fromkeys(reader.sites))
+    excluded = _excluded(root, reader)
+    unread = unread_of_mjcf(root, reader.bodies, reader.scenery, {name for name, _ in reader.moving})
     return Mjcf(
-        root.get("model", ""), tree, sites, _followers(root, where), _excluded(root, reader), _keys(root, reader)
+        name=root.get("model", ""),
+        tree=tree,
+        sites=sites,
+        mimics=flattened(where, reader.joints, _followers(root, reader)),
+        excluded=excluded,
+        apart=_apart(reader),
+        touchable=touchable(reader.bodies),
+        unread=tuple(unread),
+        postures=_keys(root, reader),
     )
 
 
@@ -98,6 +115,9 @@ class _Reader:
     sites: list[str] = field(default_factory=list)
     masks: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
     moving: list[tuple[str, str]] = field(default_factory=list)  # joints and their kinds, in the order of keyframes
+    bodies: dict[str, Body] = field(default_factory=lambda: {WORLD: Body("", ())})
+    scenery: list[str] = field(default_factory=list)  # geoms that are left out
+    zeros: dict[str, float] = field(default_factory=dict)  # joints' values where the file draws the bodies
 
     def read(self, world: Element) -> None:
         """Bodies, each branch to its end before the next one begins, which is the order of keyframes."""
@@ -118,6 +138,7 @@ class _Reader:
         for item in element.findall("geom"):
             geom = self.settings.filled(item, style, place)
             if geom.get("type") in OF_THE_SCENE:
+                self.scenery.append(f"{geom.get('type')} '{geom.get('name', link)}'")
                 continue
             with located(place):
                 solid, mask = solid_of(geom, self.settings, self.meshes, place), masks(geom, place)
@@ -138,6 +159,7 @@ class _Reader:
         if name in self.solids:
             raise InputError(f"{place}: its name stands there twice; rename one body or site")
         link, offset = parent, self.settings.placement(body, place)
+        kinds = []
         for number, item in enumerate([*body.findall("joint"), *body.findall("freejoint")]):
             joint = self.settings.filled(item, style, place)
             called = joint.get("name") or f"{name}/joint{number + 1}"
@@ -145,8 +167,10 @@ class _Reader:
             if kind not in SIZES or kind == "ball":
                 raise UnknownNameError("usable type of joint", kind, ("hinge", "slide", "free"), where=place)
             self.moving.append((called, kind))
+            kinds.append(kind)
             if kind != "free":
                 link, offset = self.turned(joint, kind, called, link, offset)
+        self.bodies[name] = Body(parent, tuple(kinds))
         self.solids[name] = [], []
         self.fix(link, name, offset)
 
@@ -167,6 +191,7 @@ class _Reader:
             self.joints.append(Joint(name, known, link, child, offset * at, axis, **bounds))
         self.solids[child] = [], []
         zero = unit * numbers(joint, "ref", 1, (0.0,), place)[0]
+        self.zeros[name] = zero
         way = -zero * self.joints[-1].axis
         back = pin.SE3(np.eye(3), way) if slides else pin.SE3(pin.exp3(way), np.zeros(3))
         return child, back * at.inverse()
@@ -189,8 +214,9 @@ def _below(body: Element, name: str, style: str) -> list[tuple[Element, str, str
     return found[::-1]
 
 
-def _followers(root: Element, where: str) -> tuple[Mimic, ...]:
-    found = []
+def _followers(root: Element, reader: _Reader) -> tuple[Mimic, ...]:
+    """Joints that follow others: by how much from where the file draws them."""
+    where, found = reader.where, []
     for tie in root.findall("equality/joint"):
         if tie.get("joint2") is None or tie.get("active", "true") != "true":
             continue
@@ -198,7 +224,8 @@ def _followers(root: Element, where: str) -> tuple[Mimic, ...]:
         words = [float(number) for number in numbers(tie, "polycoef", 5, (0.0, 1.0, 0.0, 0.0, 0.0), where)]
         if any(words[2:]):
             raise InputError(f"{where}: joint '{name}' follows '{source}' by a curve; only straight lines can be read")
-        found.append(Mimic(name, source, words[1], words[0]))
+        zeros = [reader.zeros.get(joint, 0.0) for joint in (name, source)]
+        found.append(Mimic(name, source, words[1], words[0] + zeros[0] - words[1] * zeros[1]))
     return tuple(found)
 
 
@@ -206,9 +233,18 @@ def _excluded(root: Element, reader: _Reader) -> frozenset[frozenset[str]]:
     """Pairs that ``<exclude>`` names, and those of which no two geoms have masks that meet."""
     pairs = {frozenset((item.get("body1", ""), item.get("body2", ""))) for item in root.findall("contact/exclude")}
     for (one, own), (other, others) in combinations(reader.masks.items(), 2):
-        if not any(a & d or c & b for a, b in own for c, d in others):
+        if not any(meet(a, b) for a in own for b in others):
             pairs.add(frozenset((one, other)))
     return frozenset(pair for pair in pairs if len(pair) == 2)
+
+
+def _apart(reader: _Reader) -> frozenset[frozenset[str]]:
+    """Pairs of solids that never collide: by their masks, or as several joints lie between their bodies."""
+    found = set(solids_apart(reader.masks))
+    for one, other in joined_by_several(reader.bodies):
+        numbered = ([f"{name}_{k}" for k in range(len(reader.masks.get(name, ())))] for name in (one, other))
+        found |= {frozenset(pair) for pair in product(*numbered)}
+    return frozenset(found)
 
 
 def _keys(root: Element, reader: _Reader) -> dict[str, dict[str, float]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rrtik_ompl.description.moveit.parameters import parameters
 from rrtik_ompl.description.robot_build import JointLimits
-from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.errors import UnknownNameError, few
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe, read_yaml
 
 RATES = ("velocity", "acceleration", "jerk")
@@ -18,6 +18,7 @@ _FLAGS = ("position", "velocity", "acceleration", "deceleration", "jerk", "effor
 _NUMBERS = ("min_position", "max_position", "max_velocity", "max_acceleration", "max_jerk")
 _UNUSED = ("max_deceleration", "min_jerk", "max_effort", "angle_wraparound", "k_position", "k_velocity")
 _SOFT = ("soft_lower_limit", "soft_upper_limit")
+_NARROWING = {"max_deceleration": "deceleration", "min_jerk": "jerk", **dict.fromkeys(_SOFT, "soft")}  # of _UNUSED
 _KEYS = (*(f"has_{flag}_limits" for flag in _FLAGS), *_NUMBERS, *_UNUSED, *_SOFT)
 
 
@@ -48,6 +49,17 @@ def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> di
             raise document.error(location, f"expected keys such as max_velocity, found {describe(values)}")
         limits[joint] = _joint(document, location, values)
     return limits
+
+
+def unread_limits(path: str | os.PathLike[str]) -> list[str]:
+    """What a file that :func:`read_joint_limits` takes says about limits and is not read: "max_deceleration of 'a'"."""
+    _, found = parameters(read_yaml(path), "robot_description_planning")
+    named: dict[str, list[str]] = {}
+    for joint, values in found["joint_limits"].items():
+        for key, flag in _NARROWING.items():
+            if values.get(key) is not None and values.get(f"has_{flag}_limits") is not False:
+                named.setdefault(key, []).append(f"'{joint}'")
+    return [f"{key} of {few(joints, 3)}" for key, joints in named.items()]
 
 
 def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]) -> JointLimits:

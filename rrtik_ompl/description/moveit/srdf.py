@@ -2,13 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
+from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.tree import Tree
-from rrtik_ompl.description.urdf_read import attribute, numbers, parse_xml
+from rrtik_ompl.description.urdf_read import attribute, element_lines, numbers, parse_xml
 from rrtik_ompl.errors import InputError, UnknownNameError
+
+# Where an SRDF names something that must be there: elements, the attribute, what is named by it.
+MENTIONS = (
+    ("disable_collisions", "link1", "link"),
+    ("disable_collisions", "link2", "link"),
+    ("enable_collisions", "link1", "link"),
+    ("enable_collisions", "link2", "link"),
+    ("disable_default_collisions", "link", "link"),
+    ("group/link", "name", "link"),
+    ("group/chain", "base_link", "link"),
+    ("group/chain", "tip_link", "link"),
+    ("group/joint", "name", "joint"),
+    ("group/group", "name", "group"),
+    ("group_state", "group", "group"),
+    ("group_state/joint", "name", "joint"),
+    ("end_effector", "parent_link", "link"),
+    ("end_effector", "group", "group"),
+    ("end_effector", "parent_group", "group"),
+    ("passive_joint", "name", "joint"),
+    ("virtual_joint", "child_link", "link"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Mention:
+    """That an element names a link, joint or group: where it stands, its tag, which of the three, and the name."""
+
+    place: str
+    tag: str
+    kind: str
+    name: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +78,8 @@ class Srdf:
         end_effectors: In the order of the file.
         passive: Joints that no motor moves.
         virtual: Joints between the world and the base.
+        mentions: All names of links, joints and groups that must exist.
+        places: File and line of each state, by (group, state).
     """
 
     where: str
@@ -57,6 +91,39 @@ class Srdf:
     end_effectors: tuple[EndEffector, ...] = ()
     passive: frozenset[str] = frozenset()
     virtual: frozenset[str] = frozenset()
+    mentions: tuple[Mention, ...] = ()
+    places: Mapping[tuple[str, str], str] = field(default_factory=dict)
+
+    def unknown_names(self, tree: Tree) -> list[str]:
+        """A line for each name that neither the robot nor the file has, with its place and the nearest name."""
+        known = {
+            "link": {link.name for link in tree.links},
+            "joint": {joint.name for joint in tree.joints} | self.virtual,
+            "group": set(self.groups),
+        }
+        first: dict[tuple[str, str], Mention] = {}
+        for mention in self.mentions:
+            if mention.name not in known[mention.kind]:
+                first.setdefault((mention.kind, mention.name), mention)
+        return [
+            f"{each.place}: <{each.tag}>: no {each.kind} '{each.name}'{nearest_name(each.name, known[each.kind])}"
+            for each in first.values()
+        ]
+
+    def short_states(self, group: str | None, joints: Iterable[str]) -> list[str]:
+        """A line for each state of a group that lacks a value of one of some joints, and is thus no posture."""
+        found = []
+        for (owner, state), values in self.states.items():
+            lacking = [joint for joint in joints if joint not in values]
+            if owner == group and lacking:
+                place = self.places[owner, state]
+                found.append(f"{place}: group_state '{state}' has no value of joint '{lacking[0]}' and is left out")
+        return found
+
+    def place_of(self, state: str, group: str | None) -> str:
+        """File and line of a state of a group, or of another group if this one has no such state."""
+        places = [place for (_, name), place in self.places.items() if name == state]
+        return self.places.get((group or "", state), places[-1] if places else self.where)
 
     def group_joints(self, group: str, tree: Tree) -> tuple[str, ...]:
         """Movable joints of a group, parents before children.
@@ -133,11 +200,20 @@ def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
         InputError: If the text is not XML, or an element lacks what it must have; the message names it.
     """
     robot = parse_xml(text, "robot", where)
+    lines = element_lines(robot, text, where)
     groups = [_group(element, where) for element in robot.findall("group")]
     states: dict[tuple[str, str], dict[str, float]] = {}
+    places: dict[tuple[str, str], str] = {}
     for element in robot.findall("group_state"):
         name = attribute(element, "group_state", "name", where)
         states[(element.get("group", ""), name)] = _state(element, f"{where}: group_state '{name}'")
+        places[(element.get("group", ""), name)] = lines[element]
+    mentions = tuple(
+        Mention(lines[element], element.tag, kind, element.get(key, ""))
+        for tags, key, kind in MENTIONS
+        for element in robot.findall(tags)
+        if element.get(key)
+    )
     ends = tuple(
         EndEffector(*(element.get(key, "") for key in ("name", "parent_link", "group", "parent_group")))
         for element in robot.findall("end_effector")
@@ -152,6 +228,8 @@ def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
         end_effectors=ends,
         passive=frozenset(e.get("name", "") for e in robot.findall("passive_joint")),
         virtual=frozenset(e.get("name", "") for e in robot.findall("virtual_joint")),
+        mentions=mentions,
+        places=places,
     )
 
 

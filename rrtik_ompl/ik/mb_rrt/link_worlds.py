@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from typing import Any
 
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.errors import DescriptionWarning
 from rrtik_ompl.ik.mb_rrt.axes import Axes
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
@@ -53,7 +55,9 @@ def _first_links(world: World, later: set[int]) -> World:
     names = {*(each.name for each in scene.obstacles), *(each.name for each in held), *robot.link_names}
     allowed = tuple(pair for pair in scene.allowed_collisions if set(pair) <= names)
     part = Scene(scene.obstacles, attached=held, allowed_collisions=allowed)
-    return world.unheld.with_settings(robot=replace(robot, collision=kept), scene=part)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DescriptionWarning)  # said where the whole world was made
+        return world.unheld.with_settings(robot=replace(robot, collision=kept), scene=part)
 
 
 def _moves(robot: Robot, joint: int, later: set[int]) -> bool:

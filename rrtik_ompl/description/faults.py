@@ -1,0 +1,42 @@
+"""What is wrong in a robot's description, or is not read, though the robot can be loaded: a warning, or a refusal."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+
+from rrtik_ompl.errors import DescriptionWarning, InputError, few, printable
+
+MOST_NAMED = 3  # faults in one line
+MOST_UNREAD = 8  # things in one line
+
+
+def tell(faults: Sequence[str], strict: bool) -> None:
+    """Warn of faults, all in one line; or refuse them.
+
+    Args:
+        faults: Each with its file, and its line if that is known.
+        strict: Whether any of them is an error.
+
+    Raises:
+        InputError: If there are any, and ``strict``.
+    """
+    if not faults:
+        return
+    more = len(faults) - MOST_NAMED
+    line = "; ".join(faults[:MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
+    if strict:
+        raise InputError(f"{line}; correct this, or load without strict")
+    warnings.warn(DescriptionWarning(printable(line)), stacklevel=3)
+
+
+def not_read(where: str, things: Sequence[str]) -> list[str]:
+    """The fault of a file that says more than is read of it; none if there is nothing."""
+    return [f"{where}: not read: {few(things, MOST_UNREAD)}"] if things else []
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str:
+    """A question about the nearest of the known names: "; did you mean 'elbow'?", or nothing."""
+    near = get_close_matches(name, list(known), n=1)
+    return f"; did you mean '{near[0]}'?" if near else ""

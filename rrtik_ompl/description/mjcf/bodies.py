@@ -1,0 +1,93 @@
+"""Which bodies of an MJCF may collide with which, as MuJoCo decides it by joints and by the masks of geoms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+
+WORLD = "world"
+HELD = ("free",)  # kinds of joints that are held still
+
+Mask = tuple[int, int]  # contype and conaffinity
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A body: the one that it hangs on, and the kinds of the joints between the two."""
+
+    parent: str
+    joints: tuple[str, ...]
+
+
+def meet(first: Mask, second: Mask) -> bool:
+    """Whether geoms with these masks may collide."""
+    return bool(first[0] & second[1] or second[0] & first[1])
+
+
+def solids_apart(masks: Mapping[str, Sequence[Mask]]) -> frozenset[frozenset[str]]:
+    """Pairs of solids whose masks do not meet.
+
+    Args:
+        masks: Of the solids of each body, in their order.
+    """
+    return frozenset(
+        frozenset((f"{one}_{i}", f"{other}_{j}"))
+        for (one, own), (other, others) in combinations(masks.items(), 2)
+        for (i, first), (j, second) in product(enumerate(own), enumerate(others))
+        if not meet(first, second)
+    )
+
+
+def joined_by_several(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
+    """Pairs of bodies that several joints join, and what is rigidly joined to one of the two.
+
+    To MuJoCo they are neighbours as any others; here each joint has a link of its own behind it.
+    """
+    rigid: dict[str, list[str]] = {}
+    for name in bodies:
+        rigid.setdefault(_carrier(name, bodies), []).append(name)
+    several = [name for name, body in bodies.items() if len(_moving(body)) > 1]
+    found = {
+        frozenset(pair)
+        for name in several
+        for pair in product(rigid[name], rigid[_carrier(bodies[name].parent, bodies)])
+    }
+    return frozenset(found) - touchable(bodies)
+
+
+def touchable(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
+    """Pairs of bodies that may collide though one joint joins them: one stands still, the other moves.
+
+    Bodies that are welded to the world are no neighbours of others to MuJoCo. What is rigidly part of a free body is.
+    """
+    still = [name for name in bodies if _carrier(name, bodies) == WORLD]
+    found = set()
+    for name in bodies:
+        base = bodies[_carrier(name, bodies)].parent
+        if base in still:
+            own = _welded(base, bodies)
+            found |= {frozenset((name, other)) for other in still if own == WORLD or _welded(other, bodies) != own}
+    return frozenset(found)
+
+
+def _moving(body: Body) -> tuple[str, ...]:
+    """Kinds of the joints that move a body against the one that it hangs on."""
+    return tuple(kind for kind in body.joints if kind not in HELD)
+
+
+def _upwards(name: str, bodies: Mapping[str, Body]) -> Iterator[str]:
+    """A body, the one that it hangs on, and so on to the world."""
+    while name:
+        yield name
+        name = bodies[name].parent
+
+
+def _carrier(name: str, bodies: Mapping[str, Body]) -> str:
+    """The nearest body towards the world, itself among them, that a joint moves; the world if there is none."""
+    return next((each for each in _upwards(name, bodies) if _moving(bodies[each])), WORLD)
+
+
+def _welded(name: str, bodies: Mapping[str, Body]) -> str:
+    """As `_carrier`, where a free joint counts as one that moves."""
+    return next((each for each in _upwards(name, bodies) if bodies[each].joints), WORLD)
