@@ -147,7 +147,9 @@ def load_robot(
         **options: What the robot takes: any ``padding`` (see `rrtik_ompl.padded`) and ``joint_weights`` (`weighted`),
             and ``base_pose``, ``tip`` and ``locked`` where they apply; a URDF ``srdf, group, joints, joint_limits,
             packages, xacro_args``, a folder also ``urdf``; a shipped robot for instance ``limits="envelope"``.
-            ``base_pose`` is a ``pinocchio.SE3`` or ``{"xyz": [..], "quat_xyzw": [..]}``.
+            ``base_pose`` is a ``pinocchio.SE3`` or ``{"xyz": [..], "quat_xyzw": [..]}``. With ``strict=True`` a
+            URDF, folder or MJCF is refused of which a `DescriptionWarning` would say that a name in it does not exist,
+            that a posture is outside the limits, or that something in it is not read.
 
     Raises:
         UnknownNameError: If there is no robot of that name.
@@ -168,7 +170,7 @@ def load_robot(
             robot = recipe.make(**{option: value for option, value in given.items() if option not in OF_ALL})
         for option, of_all in OF_ALL.items():
             robot = of_all(robot, given[option]) if option in given else robot
-        files = [recipe.target, *_paths(given), *_paths(robot.source)]
+        files = [recipe.target, *recipe.beside, *_paths(given), *_paths(robot.source)]
         cached = _cache.put(key, replace(robot, source=recipe.source(given)), files)
     return cached
 
@@ -219,6 +221,7 @@ class _Recipe:
     target: str
     make: Callable[..., Robot]
     options: tuple[str, ...]
+    beside: tuple[str, ...] = ()  # files that say how to make it, besides the target and the options
 
     def source(self, given: Mapping[str, Any]) -> dict[str, Any]:
         options = source_entry(given)
@@ -247,9 +250,11 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
     if suffix in (".urdf", ".xml", ".xacro"):
         return _Recipe("urdf", str(path.resolve()), lambda **given: robot_from_urdf(path, **given), URDF_OPTIONS)
     if os.path.isdir(path):
-        from rrtik_ompl.description.moveit.config import CONFIG_OPTIONS, robot_from_moveit
+        from rrtik_ompl.description.moveit.config import CHOOSING_FILES, CONFIG_OPTIONS, robot_from_moveit
 
-        return _Recipe("moveit", str(path.resolve()), lambda **given: robot_from_moveit(path, **given), CONFIG_OPTIONS)
+        target = path.resolve()
+        beside = tuple(str(target / file) for file in CHOOSING_FILES)
+        return _Recipe("moveit", str(target), lambda **given: robot_from_moveit(path, **given), CONFIG_OPTIONS, beside)
     if path.parent != Path() or os.path.exists(path):  # which takes a name of any length
         raise InputError(f"{text}: not a robot file; expected a URDF (.urdf, .xacro), a DH table (.yaml) or a folder")
     raise UnknownNameError("robot", text, list_robots())

@@ -8,7 +8,7 @@ import pytest
 
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.description.moveit.joint_limits import read_joint_limits
-from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
+from rrtik_ompl.errors import DescriptionWarning, InputError, RrtikError, UnknownNameError
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
 from rrtik_ompl.world import World
@@ -187,7 +187,19 @@ FAULTS = {
     "assistant no YAML": (lambda f: broken(f, ".setup_assistant", ":", "["), r"\.setup_assistant:\d"),
     "group of kinematics": (lambda f: broken(f, "kinematics.yaml", "panda_arm", "arm"), r"yaml:1: arm: no group 'arm'"),
     "joint of a limit": (lambda f: broken(f, "joint_limits.yaml", "t1", "t99"), r"joint_limits.yaml:4: .*no joint"),
-    "joint of a group": (lambda f: broken(f, "panda.srdf", '"panda_finger_', '"'), r"panda.srdf: group 'hand'"),
+    "joint of the arm": (
+        lambda f: broken(f, "panda.srdf", 'tip_link="panda_link8"', 'tip_link="link8"'),
+        r"panda.urdf: no link 'link8'",
+    ),
+    "words of xacro": (
+        lambda f: (
+            broken(f, ".setup_assistant", "urdf/panda.urdf", "urdf/arm.urdf.xacro, xacro_args: 'hand=false'"),
+            (f.parent / PACKAGE).unlink(),
+            (f.parent / PACKAGE / "urdf").mkdir(parents=True),
+            (f.parent / PACKAGE / "urdf" / "arm.urdf.xacro").write_text("<robot/>"),
+        ),
+        r"\.setup_assistant: xacro_args: expected words such as name:=value, found 'hand=false'",
+    ),
     "two arms": (
         lambda f: (
             broken(f, "panda.srdf", "</robot>", '<group name="b"><joint name="panda_joint1"/></group></robot>'),
@@ -281,3 +293,102 @@ def test_arguments_of_macros_are_for_macros():
 def test_a_name_of_no_robot_lists_robots_still():
     with pytest.raises(UnknownNameError, match="no robot 'pandda'"):
         load_robot("pandda")
+
+
+def test_a_joint_that_a_gripper_lacks_is_a_warning_and_the_arm_is_the_same(folder):
+    broken(folder, "panda.srdf", '"panda_finger_', '"')
+    with pytest.warns(DescriptionWarning, match=r"panda\.srdf:\d+: <joint>: no joint 'joint1'"):
+        robot = load_robot(folder)
+    assert list(robot.joint_names) == ARM
+
+
+LENGTH = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="long" default="false"/><xacro:arg name="name" default="far"/>
+<xacro:property name="l" value="${0.9 if '$(arg long)' == 'true' else 0.3}"/>
+<link name="base"/><link name="a"/><link name="b"/><link name="$(arg name)"/>
+<joint name="j1" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="j2" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 ${l}"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="jf" type="prismatic"><parent link="b"/><child link="$(arg name)"/><axis xyz="0 1 0"/>
+<limit lower="0" upper="0.1" velocity="1" effort="1"/></joint></robot>"""
+ARM_GROUP = '<robot name="arm"><group name="arm"><chain base_link="base" tip_link="b"/></group></robot>'
+
+
+@pytest.fixture
+def workspace(tmp_path):
+    """A description with arguments, beside a configuration folder."""
+    config = tmp_path / "arm_moveit_config" / "config"
+    config.mkdir(parents=True)
+    (config / "arm.srdf").write_text(ARM_GROUP)
+    (tmp_path / "arm_description" / "urdf").mkdir(parents=True)
+    (tmp_path / "arm_description" / "urdf" / "arm.urdf.xacro").write_text(LENGTH)
+    assisted(config.parent, "''")
+    return config.parent
+
+
+def assisted(folder, xacro_args):
+    (folder / ".setup_assistant").write_text(
+        "moveit_setup_assistant_config:\n  URDF:\n    package: arm_description\n"
+        f"    relative_path: urdf/arm.urdf.xacro\n    xacro_args: {xacro_args}\n"
+        "  SRDF: {relative_path: config/arm.srdf}\n"
+    )
+
+
+def reach(robot):
+    return float(robot.fk(np.zeros(robot.dof), "b").translation[2])
+
+
+FORMS = {
+    "one text": '"--inorder long:=true name:=finger"',
+    "words on lines": "\n      --inorder\n      long:=true\n      name:=finger",
+    "a list": "[long:=true, name:=finger]",
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_arm_is_the_one_that_the_assistant_has_expanded(workspace, form):
+    pytest.importorskip("xacro")
+    assert reach(load_robot(workspace)) == pytest.approx(0.3)
+    assisted(workspace, FORMS[form])
+    robot = load_robot(workspace)
+    assert reach(robot) == pytest.approx(0.9)
+    assert "finger" in robot.link_names
+    own = load_robot(workspace, xacro_args={"long": "false"})
+    assert reach(own) == pytest.approx(0.3)
+    assert "finger" in own.link_names
+    own_file = workspace.parent / "arm_description" / "urdf" / "arm.urdf.xacro"
+    assert reach(load_robot(workspace, urdf=own_file)) == pytest.approx(0.3)
+    save_problem(Problem(World(robot), [0.1, 0.2], [0.3, 0.4]), workspace.parent / "p.yaml")
+    assert load_problem(workspace.parent / "p.yaml").robot is robot
+
+
+def test_the_urdf_for_gazebo_is_read_only_if_there_is_no_other(workspace):
+    pytest.importorskip("xacro")
+    old = LENGTH.replace("${l}", "0.1").replace("$(arg name)", "far").replace("xacro:", "")
+    old = "\n".join(line for line in old.splitlines() if not line.startswith(("<arg", "<property")))
+    (workspace / "config" / "gazebo_arm.urdf").write_text(old)
+    assert reach(load_robot(workspace)) == pytest.approx(0.3)
+    (workspace / "config" / "own.urdf").write_text(old.replace("0 0 0.1", "0 0 0.5"))
+    assert reach(load_robot(workspace)) == pytest.approx(0.5)
+    (workspace / "config" / "own.urdf").unlink()
+    (workspace.parent / "arm_description" / "urdf" / "arm.urdf.xacro").unlink()
+    assert reach(load_robot(workspace)) == pytest.approx(0.1)
+
+
+TWO_GROUPS = """<robot name="arm"><group name="arm"><joint name="j1"/><joint name="j2"/></group>
+<group name="gripper"><joint name="jf"/></group><end_effector name="ee" parent_link="b" group="{}"/></robot>"""
+
+
+@pytest.mark.parametrize("solved", [("arm",), ("arm", "gripper"), ()])
+@pytest.mark.parametrize("held", ["arm", "gripper"])
+def test_the_arm_is_the_group_with_a_solver_and_no_gripper_that_has_fewer_joints(workspace, held, solved):
+    pytest.importorskip("xacro")
+    (workspace / "config" / "arm.srdf").write_text(TWO_GROUPS.format(held))
+    solver = "".join(f"{group}: {{kinematics_solver: kdl}}\n" for group in solved)
+    (workspace / "config" / "kinematics.yaml").write_text(solver or "{}")
+    if held == "arm" and solved != ("arm",):  # the file says that the arm is a gripper, and does not contradict itself
+        with pytest.raises(InputError, match=r"which group is the arm.*arm, gripper"):
+            load_robot(workspace)
+    else:
+        assert load_robot(workspace).joint_names == ("j1", "j2")

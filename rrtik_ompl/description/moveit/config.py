@@ -10,14 +10,17 @@ from typing import Any
 from rrtik_ompl.description.moveit.parameters import parameters
 from rrtik_ompl.description.moveit.srdf import Srdf, read_srdf
 from rrtik_ompl.description.package_path import package_folder
+from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf import URDF_OPTIONS, package_roots, robot_from_urdf
 from rrtik_ompl.description.urdf_read import read_urdf
-from rrtik_ompl.description.xacro_text import robot_text
+from rrtik_ompl.description.xacro_text import is_xacro, robot_text
 from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.robot import Robot
 
 ASSISTANT = ".setup_assistant"  # where MoveIt's setup assistant writes which URDF a folder is for
+CHOOSING_FILES = (ASSISTANT, "kinematics.yaml", "config/kinematics.yaml", ".", "config")  # which URDF, which group
+SIMULATED = "gazebo_"  # begins the name of the URDF that the assistant writes for Gazebo, maybe long ago
 CONFIG_OPTIONS = tuple(sorted({*URDF_OPTIONS, "urdf"}))
 FilePath = str | os.PathLike[str]
 
@@ -27,12 +30,13 @@ def robot_from_moveit(folder: FilePath, **options: Any) -> Robot:
 
     Read are the SRDF (groups, postures, allowed collisions, end effectors), ``joint_limits.yaml``, ``kinematics.yaml``
     (which groups have inverse kinematics; the solver is ours), and the URDF: one in the folder, that of the package
-    which ``.setup_assistant`` names, or a ``.urdf.xacro`` in the folder. Robots of several groups need ``group``.
+    which ``.setup_assistant`` names, with the arguments that stand there, or a ``.urdf.xacro`` in the folder. Robots of
+    several groups need ``group`` if not exactly one has a solver.
 
     Args:
         folder: With the files, or with a folder ``config`` that has them.
         **options: As of `rrtik_ompl.description.urdf.robot_from_urdf_text`, and ``urdf``; a file that is given is read
-            in place of the folder's.
+            in place of the folder's; ``xacro_args`` are added to the folder's.
 
     Raises:
         InputError: If a file is missing or cannot be used; one line names it and the remedy.
@@ -42,7 +46,9 @@ def robot_from_moveit(folder: FilePath, **options: Any) -> Robot:
 
 
 def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The files of a folder, ``urdf, srdf, joint_limits``, and the ``group``; what is given stays so.
+    """The files of a folder, ``urdf, srdf, joint_limits``, the arguments of macros, and the ``group``.
+
+    What is given stays so; arguments of macros that are given are added to the folder's.
 
     Raises:
         InputError: See :func:`robot_from_moveit`.
@@ -54,13 +60,18 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
     packages = package_roots(given.get("packages", ()))
     named = _assistant(home, config)
     srdf = given.get("srdf") or _srdf(home, config, named)
-    urdf = given.get("urdf") or _urdf(home, config, named, packages)
-    found: dict[str, Any] = {"urdf": Path(urdf), "srdf": Path(srdf)}
+    urdf = Path(given.get("urdf") or _urdf(home, config, named, packages))
+    found: dict[str, Any] = {"urdf": urdf, "srdf": Path(srdf)}
+    arguments = dict(given.get("xacro_args") or {})
+    if is_xacro(urdf) and not given.get("urdf"):
+        arguments = _xacro_args(home, named) | arguments
+    if arguments:
+        found["xacro_args"] = arguments
     limits = given.get("joint_limits") or config / "joint_limits.yaml"
     if given.get("joint_limits") or os.path.isfile(limits):
         found["joint_limits"] = Path(limits)
     if given.get("group") is None and given.get("joints") is None:
-        found["group"] = _group(home, config, found, packages, given.get("xacro_args"))
+        found["group"] = _group(home, config, found, packages)
     return found
 
 
@@ -83,6 +94,23 @@ def _srdf(home: Path, config: Path, named: Mapping[str, Any]) -> Path:
     return _only(config, ("*.srdf", "*.srdf.xacro"), "SRDF", "srdf") or _missing(config, "SRDF", "srdf")
 
 
+def _xacro_args(home: Path, named: Mapping[str, Any]) -> dict[str, str]:
+    """Arguments with which the setup assistant has expanded the URDF, as behind the command xacro.
+
+    One text, or a list of words; words such as ``--inorder`` are switches of the command and not for the macros.
+    """
+    given = named.get("urdf", {}).get("xacro_args") or ""
+    texts = given if isinstance(given, list) else [given]
+    found = {}
+    for word in (word for text in texts for word in str(text).split()):
+        name, assigned, value = word.partition(":=")
+        if assigned and name:
+            found[name] = value
+        elif not name.startswith("-"):
+            raise InputError(f"{home / ASSISTANT}: xacro_args: expected words such as name:=value, found '{word}'")
+    return found
+
+
 def _urdf(home: Path, config: Path, named: Mapping[str, Any], packages: Iterable[Path]) -> Path:
     own = _only(config, ("*.urdf",), "URDF", "urdf")
     if own is not None:
@@ -91,7 +119,7 @@ def _urdf(home: Path, config: Path, named: Mapping[str, Any], packages: Iterable
     where = package_folder(package, home.resolve(), packages) if isinstance(package, str) else None
     if where is not None and isinstance(relative, str) and os.path.isfile(where / relative):
         return where / relative
-    own = _only(config, ("*.urdf.xacro",), "URDF", "urdf")
+    own = _only(config, ("*.urdf.xacro",), "URDF", "urdf") or _only(config, (f"{SIMULATED}*.urdf",), "URDF", "urdf")
     if own is None and isinstance(package, str):
         raise InputError(
             f"{home / ASSISTANT}: the URDF {relative} of package '{package}' is not found; "
@@ -105,9 +133,10 @@ def _missing(config: Path, kind: str, option: str) -> Path:
 
 
 def _only(config: Path, patterns: Iterable[str], kind: str, option: str) -> Path | None:
-    """The only file of the first pattern that any file has; None if none has."""
+    """The only file of the first pattern that any file has; None if none has. Those for Gazebo must be asked for."""
     for pattern in patterns:
-        found = sorted(config.glob(pattern))
+        asked_for = pattern.startswith(SIMULATED)
+        found = sorted(file for file in config.glob(pattern) if asked_for or not file.name.startswith(SIMULATED))
         if len(found) > 1:
             names = ", ".join(each.name for each in found)
             raise InputError(f"{config}: {len(found)} files are an {kind}: {names}; choose one by {option}=FILE")
@@ -116,21 +145,44 @@ def _only(config: Path, patterns: Iterable[str], kind: str, option: str) -> Path
     return None
 
 
-def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Path], words: Any) -> str:
-    """The group that is the arm: the only one that moves and is no gripper's, or the only one that has a solver."""
+def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Path]) -> str:
+    """The group that is the arm: the only one that has a solver, or the only one that moves; but no gripper's."""
     semantics = read_srdf(robot_text(files["srdf"], packages), str(files["srdf"]))
     urdf = files["urdf"]
-    text = robot_text(urdf, packages, words)
+    text = robot_text(urdf, packages, files.get("xacro_args"))
     tree = read_urdf(text, where=str(urdf), folder=urdf.resolve().parent, packages=packages).tree
-    moving = [name for name in semantics.groups if semantics.movable(name, tree)]
+    sizes = {name: _size(semantics, name, tree) for name in semantics.groups}
+    moving = [name for name, size in sizes.items() if size > 0]
     solved = _solved(config, semantics)
-    held = {end.group for end in semantics.end_effectors if end.group != end.parent_group}
-    arms = [name for name in moving if name not in held] or moving
-    for names in (arms, [name for name in arms if name in solved]):
+    grippers = _grippers(semantics, sizes, solved)
+    arms = [name for name in moving if name not in grippers] or moving
+    for names in ([name for name in arms if name in solved], arms):
         if len(names) == 1:
             return names[0]
     choice = ", ".join(arms) or "none that moves"
     raise InputError(f"{home}: which group is the arm? choose one by group=, of {choice}")
+
+
+def _size(semantics: Srdf, group: str, tree: Tree) -> int:
+    """Number of movable joints of a group; 1 if it names what is not there, which an error says if it is chosen."""
+    try:
+        return len(semantics.movable(group, tree))
+    except InputError:
+        return 1
+
+
+def _grippers(semantics: Srdf, sizes: Mapping[str, int], solved: set[str]) -> set[str]:
+    """Groups of end effectors, but for one that an SRDF calls so by mistake: it has more joints than any other one.
+
+    Where another one has as many, a solver tells.
+    """
+    found = set()
+    for end in semantics.end_effectors:
+        if end.group in sizes and end.group != end.parent_group:
+            most = max((size for name, size in sizes.items() if name != end.group), default=0)
+            if (sizes[end.group], end.group in solved) <= (most, False):
+                found.add(end.group)
+    return found
 
 
 def _solved(config: Path, semantics: Srdf) -> set[str]:
