@@ -90,8 +90,10 @@ class Problem:
         if isinstance(wanted, JointGoal):
             _keep(world.robot, held, ends["goal"], "goal")
             wanted = JointGoal(_nearest_turn(world, self.start, ends["goal"]), wanted.tolerance)
-        elif any(part.frame or part.from_start for part in parts_of(wanted) if isinstance(part, TaskRegion)):
-            raise InputError("goal region: frame and from_start are for path constraints; a goal is of the tip")
+        elif any(_of_a_path(part) for part in parts_of(wanted) if isinstance(part, TaskRegion)):
+            raise InputError(
+                "goal region: frame, from_start and allowances are for path constraints; a goal is of the tip"
+            )
         if isinstance(wanted, MultiGoal):
             goal_regions(world.robot, world.scene, wanted)  # refuses links that do not exist
         self.goal: Goal = wanted
@@ -199,6 +201,11 @@ def _not_touching(world: World, q: Vector, what: str) -> ProblemError:
     pairs = [] if nearest is None else [(nearest.first, nearest.second)]
     remedy = 'move it, or use accuracy="exact"' if world.accuracy == "conservative" else "move it"
     return ProblemError(f"{what} is not proven free: {world.explain(q)}; {remedy}", pairs, part=what)
+
+
+def _of_a_path(region: TaskRegion) -> bool:
+    """Whether a region says what only path constraints can."""
+    return bool(region.frame or region.from_start or region.position_allowance or region.orientation_allowance)
 
 
 def _keep(robot: Robot, held: HeldRegions, q: Vector, what: str) -> None:

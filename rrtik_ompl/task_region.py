@@ -15,7 +15,18 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen, number_rows, positive, whole_number
+from rrtik_ompl.arrays import (
+    TAU,
+    Mask,
+    Matrix,
+    Vector,
+    finite_array,
+    frozen,
+    not_negative,
+    number_rows,
+    positive,
+    whole_number,
+)
 from rrtik_ompl.copies import as_value
 from rrtik_ompl.errors import InputError, name_of, require
 from rrtik_ompl.poses import rigid, rotation_angles, rpy_matrices, turned_z, unit_vector
@@ -78,6 +89,9 @@ class TaskRegion(WithinTolerances):
         position_tolerance: [m].
         orientation_tolerance: [rad].
         frame: What has to be there in place of the tip, for path constraints: a link or an attached object.
+        position_allowance: How far a path constraint may be left between the waypoints of a path, beyond its tolerance
+            [m]: none unless it is asked for.
+        orientation_allowance: Likewise [rad].
         from_start: Whether ``T_world_w`` is the frame of the region as seen from the constrained frame at the start of
             a path; a :class:`rrtik_ompl.Problem` makes a region of the world of it.
 
@@ -96,6 +110,8 @@ class TaskRegion(WithinTolerances):
     orientation_tolerance: float = 1e-2
     frame: str | None = None
     from_start: bool = False
+    position_allowance: float = 0.0
+    orientation_allowance: float = 0.0
 
     __reduce__ = as_value
 
@@ -108,6 +124,8 @@ class TaskRegion(WithinTolerances):
         object.__setattr__(self, "bounds", frozen(bounds))
         for name in ("position_tolerance", "orientation_tolerance"):
             object.__setattr__(self, name, positive(getattr(self, name), f"goal region: {name}"))
+        for name in ("position_allowance", "orientation_allowance"):
+            object.__setattr__(self, name, not_negative(getattr(self, name), f"path constraint: {name}"))
         require(self.frame, str | None, "frame of a region", "name a link or an attached object")
         if self.frame is not None:
             name_of(self.frame, "the frame of a region")

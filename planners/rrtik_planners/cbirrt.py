@@ -86,7 +86,8 @@ class CBiRRT(SafePlanner):
         tables: HeldTables,
     ) -> SearchResult:
         lower, upper = self._box(motions)
-        search = ConstrainedSearch(motions, tables.address, lower, upper, range_=self.range)
+        shortest = tables.shortest
+        search = ConstrainedSearch(motions, tables.address, lower, upper, range_=self.range, shortest=shortest)
         ask = decider(self._world, checker.motion_valid_batch)
         limit = NO_LIMIT if self.max_iterations is None else self.max_iterations
         seed, first = self.rng.bit_generator.random_raw(), min(limit, PLAIN_SAMPLES)

@@ -2,8 +2,9 @@
 
 Each region is a convex set of a few smooth functions of the configuration ("measures"), so that a straight motion in
 configuration space leaves it by no more than its ends do and a second-order term: where ``f`` is such a function,
-``|f(t) - (1 - t) f(0) - t f(1)| <= max |f''| / 8``. The second derivatives are bounded by the ways of the joints, after
-the geometric Jacobian: those of a frame's origin by levers, those of its axes and of its quaternion by angles alone.
+``|f(t) - (1 - t) f(0) - t f(1)| <= t (1 - t) max |f''| / 2``. The second derivatives are bounded by the ways of the
+joints, after the geometric Jacobian: those of a frame's origin by levers, those of its axes and of its quaternion by
+angles alone.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.task_region import TaskRegion, into_range, roll_pitch_yaw
 
-SLACK_POSITION = 5e-4  # [m] by which motions between stored configurations may leave a region
-SLACK_ANGLE = np.radians(0.2)  # [rad]
 LARGEST_PITCH = np.radians(75.0)  # of ranges of roll, pitch and yaw: beyond, roll and yaw run away
+STEEPEST_PITCH = np.radians(89.0)  # that a frame may come to on its way, with the tolerance
+KEPT_SHARE = 0.95  # of a tolerance, less the inset, up to which configurations are left where they are
+AIMED_SHARE = 0.8  # of a tolerance, less the inset, to which others are moved
 ANYWHERE = 1000.0  # [m]; bounds of a position from here on are none: farther than any arm reaches
 BEHIND = 2.0  # measure of an axis that points more than a quarter turn away; more than any that is allowed
 
@@ -58,6 +60,8 @@ class HeldRegion:
         levers: Largest distance of the frame's origin from the axis of each joint that turns it, 1 for one that slides
             it, shape (joints,); all 0 where the region says nothing of the position.
         turns: Which joints turn the frame, 1 or 0, shape (joints,).
+        inset: How much deeper inside the tolerances configurations are sought, so that motions between them have room
+            to bend [m; rad], shape (2,).
     """
 
     robot: Robot
@@ -71,6 +75,7 @@ class HeldRegion:
     direction: Vector
     levers: Vector
     turns: Vector
+    inset: Vector
 
     @property
     def T_world_w(self) -> NDArray[np.float64]:
@@ -101,16 +106,49 @@ class HeldRegion:
         away = D[:, :3, 3] - np.clip(D[:, :3, 3], *self.region.bounds[:3].T)
         return np.column_stack([np.linalg.norm(away, axis=1), self._turned(D[:, :3, :3])])
 
-    def limits(self, *, slack: bool) -> Vector:
-        """The largest measures allowed: at stored configurations or, with the slack, in between; shape (2,)."""
-        region = self.region
-        metres = region.position_tolerance + (SLACK_POSITION if slack else 0.0)
-        angle = min(region.orientation_tolerance + (SLACK_ANGLE if slack else 0.0), 0.5 * np.pi)
+    @property
+    def tolerances(self) -> Vector:
+        """Of the position and of the orientation at stored configurations [m; rad], shape (2,)."""
+        return np.array([self.region.position_tolerance, self.region.orientation_tolerance])
+
+    @property
+    def allowances(self) -> Vector:
+        """How far motions between stored configurations may go beyond the tolerances [m; rad], shape (2,)."""
+        return np.array([self.region.position_allowance, self.region.orientation_allowance])
+
+    def limits(self, *, between: bool = False) -> Vector:
+        """The largest measures allowed: at stored configurations, or between them; shape (2,)."""
+        return self.measured(self.tolerances + self.allowances if between else self.tolerances)
+
+    def measured(self, amounts: Vector) -> Vector:
+        """The measures of a distance [m] and an angle [rad], shape (2,)."""
+        metres, angle = amounts
+        angle = min(angle, 0.5 * np.pi)
         if self.turning == Turning.AXIS:
             angle = np.sin(angle)
         elif self.turning == Turning.BALL:
             angle = np.sin(0.5 * angle)
         return np.array([metres, angle])
+
+    def angle_of(self, measure: float) -> float:
+        """The angle [rad] that a small measure of the orientation stands for."""
+        if self.turning == Turning.AXIS:
+            return float(np.arcsin(min(measure, 1.0)))
+        if self.turning == Turning.BALL:
+            return float(2.0 * np.arcsin(min(measure, 1.0)))
+        return float(measure)
+
+    @property
+    def kept(self) -> Vector:
+        """Measures up to which a search leaves configurations where they are, shape (2,)."""
+        within: Vector = KEPT_SHARE * self.limits() - self.measured(self.inset)
+        return within
+
+    @property
+    def aimed(self) -> Vector:
+        """How near to a region a search moves others [m; rad], shape (2,)."""
+        near: Vector = AIMED_SHARE * self.tolerances - self.inset
+        return near
 
     def deviations(self, A: Matrix, B: Matrix) -> Matrix:
         """How far the measures of motions A[k] -> B[k], shapes (m, dof), exceed those of their ends, shape (m, 2)."""
@@ -125,8 +163,10 @@ class HeldRegion:
     def curvature(self) -> float:
         """Second derivative of the orientation's measure for joint speeds whose sum is 1 rad."""
         if self.turning == Turning.RANGES:
-            steep = 1.0 / np.cos(np.abs(self.region.bounds[4]).max() + self.region.orientation_tolerance + SLACK_ANGLE)
-            return float(3.0 * (0.5 * steep + 2.0 * steep * steep))
+            tolerance = float(self.limits(between=True)[1])
+            pitch = float(np.abs(self.region.bounds[4]).max()) + tolerance
+            # a motion that is bounded turns by sqrt(8 tolerance / curvature) at most, its pitch by half of that
+            return _curvature(pitch + np.sqrt(2.0 * tolerance / _curvature(pitch)))
         return {Turning.FREE: 0.0, Turning.AXIS: 1.0, Turning.BALL: 0.25}[self.turning]
 
     def outside(self, q: Vector) -> tuple[float, float]:
@@ -174,7 +214,14 @@ def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> H
     turns, rows = np.zeros(len(robot.chain.parent)), _rows_to(robot, joint)
     turns[rows] = ~robot.chain.prismatic[rows]
     T_w_world = region.T_world_w.inverse().homogeneous
-    return HeldRegion(robot, region, label, link, joint, T_joint_d, T_w_world, turning, before, levers, turns)
+    none = np.zeros(2)
+    return HeldRegion(robot, region, label, link, joint, T_joint_d, T_w_world, turning, before, levers, turns, none)
+
+
+def _curvature(pitch: float) -> float:
+    """Second derivative of the sum of roll, pitch and yaw up to a pitch [rad], for joint speeds whose sum is 1 rad."""
+    steep = 1.0 / np.cos(min(pitch, STEEPEST_PITCH))
+    return float(3.0 * (0.5 * steep + 2.0 * steep * steep))
 
 
 def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tuple[str, int, Any]:
@@ -212,9 +259,15 @@ def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[n
         before, after = ((z @ y, np.eye(3)), (z, x), (np.eye(3), y @ x))[k]
         return Turning.AXIS, before[:, k], after.T @ turned_z(np.eye(3)[k])
     pitch = np.abs(region.bounds[4]).max()
+    reached = pitch + region.orientation_tolerance + region.orientation_allowance
     if pitch > LARGEST_PITCH:
         raise InputError(
-            f"{label}: pitch may reach {np.degrees(pitch):.1f} degrees beside ranges of roll or yaw, more than "
+            f"{label}: pitch may reach {np.degrees(reached):.1f} degrees beside ranges of roll or yaw, more than "
             f"{np.degrees(LARGEST_PITCH):g}; turn the frame of the region, or use two constraints"
+        )
+    if reached > STEEPEST_PITCH:
+        raise InputError(
+            f"{label}: with its tolerance pitch may reach {np.degrees(reached):.1f} degrees beside ranges of roll or "
+            f"yaw, more than {np.degrees(STEEPEST_PITCH):g}; take a smaller orientation_tolerance"
         )
     return Turning.RANGES, nowhere, np.eye(3)

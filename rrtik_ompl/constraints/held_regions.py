@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.constraints.held_region import HeldRegion, Turning, frame_place, held_region
@@ -17,14 +19,18 @@ from rrtik_ompl.task_region import TaskRegion
 
 HALVINGS = 7  # of a motion, at most, to see that it keeps to a region
 ROUNDING = 1e-9  # without unit; of a measure
+INSET = np.array([5e-4, np.radians(0.2)])  # [m; rad] that configurations are kept inside a region, at most ...
+INSET_SHARE = 0.45  # ... and of its tolerance
+SMALLEST_STEP = 2e-4  # [rad or m] of a motion that is no longer divided
 
 
 class HeldRegions:
     """The path constraints of a problem.
 
     A configuration is held if its frames are in all regions, within their tolerances. A straight motion is held if that
-    is so at both ends and it leaves no region by more than 0.5 mm and 0.2 degrees in between; this is proven, by the
-    bound of :meth:`HeldRegion.deviations` on parts of it, not looked up at samples.
+    is so at each of its points; beyond the tolerances between its ends by what a region allows there, which is nothing
+    unless somebody asked for it. This is proven, by the bound of :meth:`HeldRegion.deviations` on parts of it, not
+    looked up at samples.
 
     Attributes:
         regions: One or more.
@@ -41,7 +47,7 @@ class HeldRegions:
         """Which configurations, shape (m, dof), are in all regions, shape (m,)."""
         mask = np.ones(len(Q), dtype=bool)
         for region in self.regions:
-            mask &= (region.measures(Q) <= region.limits(slack=False) + ROUNDING).all(axis=1)
+            mask &= (region.measures(Q) <= region.limits() + ROUNDING).all(axis=1)
         return mask
 
     def motions_held(self, A: Matrix, B: Matrix) -> Mask:
@@ -49,7 +55,7 @@ class HeldRegions:
         mask = np.ones(len(A), dtype=bool)
         for region in self.regions:
             both = region.measures(np.concatenate([A[mask], B[mask]])).reshape(2, -1, 2)
-            mask[mask] = _keeps(region, A[mask], B[mask], both.max(axis=0))
+            mask[mask] = _keeps(region, A[mask], B[mask], both)
         return mask
 
     def route_held(self, rows: Matrix) -> Mask:
@@ -57,14 +63,14 @@ class HeldRegions:
         mask = np.ones(max(len(rows) - 1, 0), dtype=bool)
         for region in self.regions:
             measures = region.measures(rows)
-            worst = np.maximum(measures[:-1], measures[1:])
-            mask[mask] = _keeps(region, rows[:-1][mask], rows[1:][mask], worst[mask])
+            ends = np.stack([measures[:-1], measures[1:]])
+            mask[mask] = _keeps(region, rows[:-1][mask], rows[1:][mask], ends[:, mask])
         return mask
 
     def explain(self, q: Vector) -> str:
         """A line that says which region a configuration, shape (dof,), is outside, and by how much; "" for none."""
         for region in self.regions:
-            kept = region.measures(q[None])[0] <= region.limits(slack=False) + ROUNDING
+            kept = region.measures(q[None])[0] <= region.limits() + ROUNDING
             if not kept.all():
                 metres, angle = region.outside(q)
                 amounts = [f"{1e3 * metres:.3g} mm"] * (not kept[0])
@@ -113,17 +119,36 @@ def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: V
             f"{label}: orientation_tolerance is {np.degrees(tolerance):g} degrees, and more than 90 cannot be held; "
             "take less, or leave the angles free"
         )
+    inset = np.minimum(INSET, INSET_SHARE * held.tolerances)
+    held = replace(held, inset=np.maximum(inset - held.allowances, 0.0))
+    _refuse_too_narrow(held)
     return held
 
 
-def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: Matrix) -> Mask:
+def _refuse_too_narrow(region: HeldRegion) -> None:
+    """Refuse tolerances that not even the smallest motions of all joints at once keep."""
+    dof = region.robot.dof
+    step = np.full((1, dof), SMALLEST_STEP / np.sqrt(dof))
+    needed = region.deviations(np.zeros((1, dof)), step)[0] / INSET_SHARE
+    narrow = needed > region.limits(between=True)
+    least = [f"{needed[0]:.1e} m"] * bool(narrow[0])
+    least += [f"{np.degrees(region.angle_of(needed[1])):.1e} degrees"] * bool(narrow[1])
+    if least:
+        raise InputError(
+            f"{region.label}: a tolerance so small cannot be kept along whole motions of robot "
+            f"'{region.robot.name}'; {' and '.join(least)} is the least that can, or allow more between waypoints "
+            f"(allowance)"
+        )
+
+
+def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) -> Mask:
     """Which motions keep one region: halved until the bound on each part is small enough, or an end of one is outside.
 
-    ``ends``: the larger measures of both ends, shape (m, 2).
+    ``ends``: the measures of both ends, shape (2, m, 2).
     """
-    deviations, most = region.deviations(A, B), region.limits(slack=True)
-    stored: Mask = np.logical_and.reduce(ends <= region.limits(slack=False) + ROUNDING, axis=1)
-    near: Mask = np.logical_and.reduce(ends + deviations <= most, axis=1)
+    deviations, most = region.deviations(A, B), region.limits(between=True) + ROUNDING
+    stored: Mask = (ends <= region.limits() + ROUNDING).all(axis=(0, 2))
+    near: Mask = (_highest(ends[0], ends[1], deviations) <= most).all(axis=1)
     kept = stored & near
     open_ = np.flatnonzero(stored & ~kept)
     for level in range(1, HALVINGS + 1):
@@ -131,11 +156,23 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: Matrix) -> Mask:
             break
         parts = 2**level
         rows = _nodes(A[open_], B[open_], parts)
-        worst = region.measures(rows.reshape(-1, A.shape[1])).reshape(len(open_), parts + 1, 2).max(axis=1)
-        done = (worst + deviations[open_] / parts**2 <= most).all(axis=1)
+        measures = region.measures(rows.reshape(-1, A.shape[1])).reshape(len(open_), parts + 1, 2)
+        highest = _highest(measures[:, :-1], measures[:, 1:], deviations[open_, None] / parts**2)
+        done = (highest <= most).all(axis=(1, 2))
         kept[open_[done]] = True
-        open_ = open_[~done & (worst <= most).all(axis=1)]
+        open_ = open_[~done & (measures <= most).all(axis=(1, 2))]
     return kept
+
+
+def _highest(first: NDArray[np.float64], last: NDArray[np.float64], deviation: NDArray[np.float64]) -> Any:
+    """The largest that measures can be on motions, from those of both ends; arrays of one shape.
+
+    The top of ``first + t (last - first) + 4 t (1 - t) deviation`` for t in [0, 1].
+    """
+    way = last - first
+    inner = np.abs(way) < 4.0 * deviation
+    divisor = np.where(inner, 16.0 * deviation, 1.0)
+    return np.where(inner, 0.5 * (first + last) + deviation + way * way / divisor, np.maximum(first, last))
 
 
 def _nodes(A: Matrix, B: Matrix, parts: int) -> Matrix:

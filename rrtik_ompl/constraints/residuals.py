@@ -18,8 +18,6 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import into_range, roll_pitch_yaw
 from rrtik_ompl.tip_distance import PER_RADIAN, reach_of
 
-KEPT_SHARE = 0.95  # of a tolerance, up to which configurations are left where they are
-AIMED_SHARE = 0.8  # of a tolerance, to which others are moved
 DAMPING, SHARE = 1e-9, 0.5  # added to the squares of the derivatives: a constant, and so much of the squared residual
 LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one step
 STEPS = 60  # of a projection from anywhere
@@ -68,10 +66,10 @@ def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArr
         Without unit, shape (m, 6), 0 where the region is kept; and shape (m, 6, dof).
     """
     D, measures = region.displacements(Q), region.measures(Q)
-    moves = measures > KEPT_SHARE * region.limits(slack=False)
+    moves = measures > region.kept
     J = twists(robot, region, Q)
     away = D[:, :3, 3] - np.clip(D[:, :3, 3], *region.region.bounds[:3].T)
-    share = 1.0 - AIMED_SHARE * region.region.position_tolerance / np.where(moves[:, 0], measures[:, 0], 1.0)
+    share = 1.0 - region.aimed[0] / np.where(moves[:, 0], measures[:, 0], 1.0)
     held = (moves[:, :1] & (away != 0.0)) / reach_of(robot)
     turn, felt, kept = _turn(region, D[:, :3, :3], measures[:, 1], J[:, 3:])
     weights = np.hstack([held, kept * moves[:, 1:] * PER_RADIAN])
@@ -94,7 +92,7 @@ def _turn(
     region: HeldRegion, R: NDArray[np.float64], measure: Vector, J: NDArray[np.float64]
 ) -> tuple[Matrix, NDArray[np.float64], Matrix]:
     """The turn into the region [rad], what turns change of it, and which of its numbers count."""
-    aimed, ones = AIMED_SHARE * region.region.orientation_tolerance, np.ones((len(R), 3))
+    aimed, ones = region.aimed[1], np.ones((len(R), 3))
     if region.turning == Turning.FREE:
         return 0.0 * ones, J, 0.0 * ones
     if region.turning == Turning.RANGES:

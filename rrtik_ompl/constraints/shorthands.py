@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, dimensions, finite_array, number_rows, positive
+from rrtik_ompl.arrays import Matrix, dimensions, finite_array, not_negative, number_rows, positive
 from rrtik_ompl.choices import FrameAxis
 from rrtik_ompl.constraints.held_region import ANYWHERE
 from rrtik_ompl.errors import InputError, require
@@ -17,9 +17,17 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
 
 LARGEST_TILT_DEG = 80.0
+TURN_TOLERANCE, RIM_SHARE = 1e-2, 0.5  # of ranges of angles: [rad] at most, and a share of the smallest range
 
 
-def upright(robot: Robot, axis: FrameAxis = "z", *, tolerance_deg: float = 5.0, frame: str | None = None) -> TaskRegion:
+def upright(
+    robot: Robot,
+    axis: FrameAxis = "z",
+    *,
+    tolerance_deg: float = 5.0,
+    frame: str | None = None,
+    allowance_deg: float = 0.0,
+) -> TaskRegion:
     """Keep an axis of a frame within an angle of the direction in the world that it has at the start of the path.
 
     Turning about the axis and moving anywhere are free. A cup that starts upside down stays so.
@@ -29,6 +37,8 @@ def upright(robot: Robot, axis: FrameAxis = "z", *, tolerance_deg: float = 5.0, 
         axis: "x", "y" or "z" of the frame.
         tolerance_deg: Largest angle [deg], at most 80.
         frame: A link or an attached object; the robot's tip if None.
+        allowance_deg: How far motions may leave the tolerance between the waypoints of a path [deg]: not at all unless
+            this says so.
 
     Raises:
         InputError: If there is no such axis, or the tolerance is out of range.
@@ -56,10 +66,18 @@ def upright(robot: Robot, axis: FrameAxis = "z", *, tolerance_deg: float = 5.0, 
         orientation_tolerance=tolerance,
         frame=frame,
         from_start=True,
+        orientation_allowance=np.radians(not_negative(allowance_deg, "upright: allowance_deg")),
     )
 
 
-def on_plane(point: ArrayLike, normal: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None) -> TaskRegion:
+def on_plane(
+    point: ArrayLike,
+    normal: ArrayLike,
+    *,
+    tolerance: float = 1e-3,
+    frame: str | None = None,
+    allowance: float = 0.0,
+) -> TaskRegion:
     """Keep the origin of a frame on a plane of the world, its orientation free.
 
     Args:
@@ -67,6 +85,8 @@ def on_plane(point: ArrayLike, normal: ArrayLike, *, tolerance: float = 1e-3, fr
         normal: Of length 1, shape (3,).
         tolerance: Largest distance from the plane [m].
         frame: A link or an attached object; the robot's tip if None.
+        allowance: How far motions may leave the tolerance between the waypoints of a path [m]: not at all unless
+            this says so.
 
     Raises:
         InputError: If the normal is not of length 1, or the tolerance is not positive.
@@ -77,10 +97,17 @@ def on_plane(point: ArrayLike, normal: ArrayLike, *, tolerance: float = 1e-3, fr
     bounds = _anywhere()
     bounds[2] = 0.0
     placed = _placed(point, normal, "on_plane", "normal")
-    return TaskRegion(placed, bounds, position_tolerance=tolerance, frame=frame)
+    return TaskRegion(placed, bounds, position_tolerance=tolerance, frame=frame, position_allowance=allowance)
 
 
-def on_line(point: ArrayLike, direction: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None) -> TaskRegion:
+def on_line(
+    point: ArrayLike,
+    direction: ArrayLike,
+    *,
+    tolerance: float = 1e-3,
+    frame: str | None = None,
+    allowance: float = 0.0,
+) -> TaskRegion:
     """Keep the origin of a frame on a straight line of the world, its orientation free.
 
     Args:
@@ -88,6 +115,8 @@ def on_line(point: ArrayLike, direction: ArrayLike, *, tolerance: float = 1e-3, 
         direction: Of length 1, shape (3,).
         tolerance: Largest distance from the line [m].
         frame: A link or an attached object; the robot's tip if None.
+        allowance: How far motions may leave the tolerance between the waypoints of a path [m]: not at all unless
+            this says so.
 
     Raises:
         InputError: If the direction is not of length 1, or the tolerance is not positive.
@@ -98,16 +127,21 @@ def on_line(point: ArrayLike, direction: ArrayLike, *, tolerance: float = 1e-3, 
     bounds = _anywhere()
     bounds[:2] = 0.0
     placed = _placed(point, direction, "on_line", "direction")
-    return TaskRegion(placed, bounds, position_tolerance=tolerance, frame=frame)
+    return TaskRegion(placed, bounds, position_tolerance=tolerance, frame=frame, position_allowance=allowance)
 
 
-def orientation_of(pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | None = None) -> TaskRegion:
+def orientation_of(
+    pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | None = None, allowance_deg: float = 0.0
+) -> TaskRegion:
     """Keep the orientation of a frame, its position free.
 
     Args:
         pose: ``pinocchio.SE3`` or a matrix of shape (4, 4) whose orientation is kept.
-        tolerances_deg: Largest angle from it [deg]; or three, of roll, pitch and yaw about its axes, shape (3,).
+        tolerances_deg: Largest angle from it [deg]; or three, of roll, pitch and yaw about its axes, shape (3,),
+            where 0 is as near as 0.57 degrees, or half of the smallest other one.
         frame: A link or an attached object; the robot's tip if None.
+        allowance_deg: How far motions may leave the tolerance between the waypoints of a path [deg]: not at all unless
+            this says so.
 
     Raises:
         InputError: If the pose is none, or a tolerance is negative or too large.
@@ -120,17 +154,24 @@ def orientation_of(pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | N
     bounds = _anywhere()
     bounds[3:] = 0.0
     placed = rigid(pose, "orientation_of: pose")
+    allowance = np.radians(not_negative(allowance_deg, "orientation_of: allowance_deg"))
     if dimensions(tolerances_deg) == 0:
         tolerance = _tilt(tolerances_deg, "orientation_of: tolerances_deg")
-        return TaskRegion(placed, bounds, orientation_tolerance=tolerance, frame=frame)
+        return TaskRegion(placed, bounds, orientation_tolerance=tolerance, frame=frame, orientation_allowance=allowance)
     angles = finite_array(tolerances_deg, (3,), "orientation_of: tolerances_deg")
     if (angles < 0.0).any():
         raise InputError(f"orientation_of: tolerances_deg must not be negative, got {angles.tolist()}")
-    bounds[3:] = np.radians(np.minimum(angles, 180.0))[:, None] * [-1.0, 1.0]
-    return TaskRegion(placed, bounds, frame=frame)
+    turns = np.radians(np.minimum(angles, 180.0))
+    bounded = turns[(turns > 0.0) & (turns < np.pi)]
+    rim = min(TURN_TOLERANCE, RIM_SHARE * bounded.min(initial=np.pi))  # the tolerance of the region, within the angles
+    turns = np.where((turns > 0.0) & (turns < np.pi), turns - rim, turns)
+    bounds[3:] = turns[:, None] * [-1.0, 1.0]
+    return TaskRegion(placed, bounds, orientation_tolerance=rim, frame=frame, orientation_allowance=allowance)
 
 
-def inside(pose: Any, sides: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None) -> TaskRegion:
+def inside(
+    pose: Any, sides: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None, allowance: float = 0.0
+) -> TaskRegion:
     """Keep the origin of a frame inside a box of the world, its orientation free.
 
     Args:
@@ -138,6 +179,8 @@ def inside(pose: Any, sides: ArrayLike, *, tolerance: float = 1e-3, frame: str |
         sides: Full side lengths [m], shape (3,).
         tolerance: Largest distance from the box [m].
         frame: A link or an attached object; the robot's tip if None.
+        allowance: How far motions may leave the tolerance between the waypoints of a path [m]: not at all unless
+            this says so.
 
     Raises:
         InputError: If the pose is none, a side is negative, or the tolerance is not positive.
@@ -150,7 +193,9 @@ def inside(pose: Any, sides: ArrayLike, *, tolerance: float = 1e-3, frame: str |
         raise InputError(f"inside: sides must not be negative, got {lengths.tolist()}")
     bounds = _anywhere()
     bounds[:3] = 0.5 * lengths[:, None] * [-1.0, 1.0]
-    return TaskRegion(rigid(pose, "inside: pose"), bounds, position_tolerance=tolerance, frame=frame)
+    return TaskRegion(
+        rigid(pose, "inside: pose"), bounds, position_tolerance=tolerance, frame=frame, position_allowance=allowance
+    )
 
 
 def _anywhere() -> Matrix:

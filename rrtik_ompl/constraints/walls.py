@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
-from rrtik_ompl.constraints.held_region import SLACK_ANGLE, HeldRegion, Turning
+from rrtik_ompl.constraints.held_region import HeldRegion, Turning
 from rrtik_ompl.constraints.held_regions import HeldRegions
 
 GRID = np.radians(15.0)  # between two values of a joint that are tried
@@ -144,7 +144,7 @@ def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, 
     blocked = np.zeros(len(values), dtype=bool)
     if len(others) > MOST_ANGLES or len(values) == 0:
         return blocked
-    limit = region.region.orientation_tolerance + SLACK_ANGLE + ROUNDING
+    limit = region.tolerances[1] + region.allowances[1] + ROUNDING
     if not others:  # one turn alone, as of an arm in a plane: there is nothing to divide
         blocked |= _angles(region, turns, end, values[:, None]) > limit
         return blocked

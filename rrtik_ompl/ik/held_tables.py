@@ -9,7 +9,7 @@ import numpy as np
 from rrtik_ompl.arrays import Mask, Matrix
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.constraints.residuals import AIMED_SHARE, DAMPING, KEPT_SHARE, LARGEST_STEP, STEPS, projected_rows
+from rrtik_ompl.constraints.residuals import DAMPING, LARGEST_STEP, STEPS, projected_rows
 from rrtik_ompl.fast.ik import ik_layout
 from rrtik_ompl.fast.search.constrained import layout
 from rrtik_ompl.fast.simd.library import library
@@ -19,6 +19,8 @@ from rrtik_ompl.ik.tip_columns import frame_columns
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.tip_distance import PER_RADIAN, reach_of
 
+SHORTEST_STEP = 0.01  # [unit of the configurations] of a search, unless tolerances need shorter ones
+
 
 class HeldTables:
     """The tables of path constraints for a robot.
@@ -27,6 +29,8 @@ class HeldTables:
         regions: What is held.
         held: The table of all regions.
         address: Where it is; valid as long as this object lives.
+        shortest: Step that searches along the regions take at least [unit of the configurations]: shorter ones where
+            tolerances are small.
     """
 
     def __init__(self, robot: Robot, constraints: HeldRegions, limbs: list[Table]) -> None:
@@ -52,6 +56,7 @@ class HeldTables:
             }
         )
         self.address = self.held.address
+        self.shortest = min((_shortest_step(region) for region in constraints.regions), default=SHORTEST_STEP)
 
     def project(self, rows: Matrix, steps: int = STEPS) -> tuple[Matrix, Mask]:
         """Move configurations, shape (m, dof), into all regions; where they are then, and which are there, (m,)."""
@@ -64,6 +69,16 @@ class HeldTables:
     def intact(self) -> bool:
         """Whether no kernel has written beyond an array."""
         return all(part.intact() for part in (self.held, *self._parts, *self._limbs))
+
+
+def _shortest_step(region: HeldRegion) -> float:
+    """Half the step of all joints that has room to bend inside a region, `SHORTEST_STEP` at most."""
+    dof = region.robot.dof
+    step = np.full((1, dof), SHORTEST_STEP / np.sqrt(dof))
+    room = region.limits(between=True) - region.kept
+    bent = region.deviations(np.zeros((1, dof)), step)[0]
+    share = float(np.sqrt((room[bent > 0.0] / bent[bent > 0.0]).min(initial=4.0)))
+    return SHORTEST_STEP * min(0.5 * share, 1.0)
 
 
 def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:
@@ -108,8 +123,7 @@ def _region_tables(region: HeldRegion, limb: Table) -> tuple[Table, Table]:
 
 def _record(region: HeldRegion) -> Matrix:
     """The numbers of a region."""
-    bounds, limits = region.region.bounds, region.limits(slack=False)
-    levers, turn = region.levers[region.rows], region.region.orientation_tolerance
+    bounds, levers = region.region.bounds, region.levers[region.rows]
     return record(
         layout.LEVERS + len(levers),
         {
@@ -118,9 +132,9 @@ def _record(region: HeldRegion) -> Matrix:
             layout.ANGLES_LOW: bounds[3:, 0],
             layout.ANGLES_HIGH: bounds[3:, 1],
             layout.DIRECTION: region.direction,
-            layout.KEPT: KEPT_SHARE * limits,
-            layout.AIMED: AIMED_SHARE * np.array([region.region.position_tolerance, turn]),
-            layout.MOST: region.limits(slack=True),
+            layout.KEPT: region.kept,
+            layout.AIMED: region.aimed,
+            layout.MOST: region.limits(between=True),
             layout.CURVATURE: region.curvature,
             layout.LEVERS: levers,
         },

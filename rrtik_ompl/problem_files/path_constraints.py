@@ -31,6 +31,7 @@ class UprightEntry(Section):
 
     axis: Literal["x", "y", "z"] = Field("z", description="of the frame")
     tolerance_deg: Positive = Field(5.0, description="largest angle from the direction at the start [deg]")
+    allowance_deg: NotNegative = Field(0.0, description="more, of motions between waypoints [deg]")
 
 
 class Upright(Constraint):
@@ -40,7 +41,14 @@ class Upright(Constraint):
 
     def build(self, robot: Robot) -> TaskRegion:
         """The constraint."""
-        return upright(robot, self.upright.axis, tolerance_deg=self.upright.tolerance_deg, frame=self.frame)
+        entry = self.upright
+        return upright(
+            robot,
+            entry.axis,
+            tolerance_deg=entry.tolerance_deg,
+            frame=self.frame,
+            allowance_deg=entry.allowance_deg,
+        )
 
 
 class OnPlaneEntry(Section):
@@ -49,6 +57,7 @@ class OnPlaneEntry(Section):
     point: Vector3 = Field(description="[m]")
     normal: Vector3 = Field(description="of length 1")
     tolerance: Positive = Field(1e-3, description="[m]")
+    allowance: NotNegative = Field(0.0, description="more, of motions between waypoints [m]")
 
 
 class OnPlane(Constraint):
@@ -60,7 +69,8 @@ class OnPlane(Constraint):
         """The constraint."""
         del robot
         entry = self.on_plane
-        return on_plane(entry.point, entry.normal, tolerance=entry.tolerance, frame=self.frame)
+        amounts = {"tolerance": entry.tolerance, "allowance": entry.allowance}
+        return on_plane(entry.point, entry.normal, frame=self.frame, **amounts)
 
 
 class OnLineEntry(Section):
@@ -69,6 +79,7 @@ class OnLineEntry(Section):
     point: Vector3 = Field(description="[m]")
     direction: Vector3 = Field(description="of length 1")
     tolerance: Positive = Field(1e-3, description="[m]")
+    allowance: NotNegative = Field(0.0, description="more, of motions between waypoints [m]")
 
 
 class OnLine(Constraint):
@@ -80,7 +91,8 @@ class OnLine(Constraint):
         """The constraint."""
         del robot
         entry = self.on_line
-        return on_line(entry.point, entry.direction, tolerance=entry.tolerance, frame=self.frame)
+        amounts = {"tolerance": entry.tolerance, "allowance": entry.allowance}
+        return on_line(entry.point, entry.direction, frame=self.frame, **amounts)
 
 
 class OrientationEntry(Section):
@@ -91,6 +103,7 @@ class OrientationEntry(Section):
     tolerances_deg: Annotated[list[NotNegative], Field(min_length=3, max_length=3)] | None = Field(
         None, description="in place of it, of roll, pitch and yaw about the axes of the pose [deg]"
     )
+    allowance_deg: NotNegative = Field(0.0, description="more, of motions between waypoints [deg]")
 
 
 class OrientationOf(Constraint):
@@ -104,7 +117,8 @@ class OrientationOf(Constraint):
         entry = self.orientation_of
         if entry.tolerance_deg is not None and entry.tolerances_deg is not None:
             raise InputError("give tolerance_deg or tolerances_deg, not both")
-        return orientation_of(entry.pose.build(), entry.tolerances_deg or entry.tolerance_deg or 1.0, frame=self.frame)
+        tolerances = entry.tolerances_deg or entry.tolerance_deg or 1.0
+        return orientation_of(entry.pose.build(), tolerances, frame=self.frame, allowance_deg=entry.allowance_deg)
 
 
 class InsideEntry(Section):
@@ -113,6 +127,7 @@ class InsideEntry(Section):
     pose: PoseEntry = Field(description="of its centre")
     sides: Vector3 = Field(description="full side lengths [m]")
     tolerance: Positive = Field(1e-3, description="[m]")
+    allowance: NotNegative = Field(0.0, description="more, of motions between waypoints [m]")
 
 
 class Inside(Constraint):
@@ -124,18 +139,32 @@ class Inside(Constraint):
         """The constraint."""
         del robot
         entry = self.inside
-        return inside(entry.pose.build(), entry.sides, tolerance=entry.tolerance, frame=self.frame)
+        amounts = {"tolerance": entry.tolerance, "allowance": entry.allowance}
+        return inside(entry.pose.build(), entry.sides, frame=self.frame, **amounts)
+
+
+class HeldRegionEntry(TaskRegionEntry):
+    """A task-space region, and how far motions may leave it."""
+
+    position_allowance: NotNegative = Field(0.0, description="more, of motions between waypoints [m]")
+    orientation_allowance_deg: NotNegative = Field(0.0, description="more, of motions between waypoints [deg]")
 
 
 class InTaskRegion(Constraint):
     """The frame stays in a task-space region."""
 
-    task_region: TaskRegionEntry
+    task_region: HeldRegionEntry
 
     def build(self, robot: Robot) -> TaskRegion:
         """The constraint."""
         del robot
-        return replace(self.task_region.build(), frame=self.frame)
+        entry = self.task_region
+        return replace(
+            entry.build(),
+            frame=self.frame,
+            position_allowance=entry.position_allowance,
+            orientation_allowance=np.radians(entry.orientation_allowance_deg),
+        )
 
 
 KEYS = ("upright", "on_plane", "on_line", "orientation_of", "inside", "task_region")
@@ -172,8 +201,17 @@ def constraint_data(region: TaskRegion) -> dict[str, Any]:
     Raises:
         InputError: If it is ``from_start`` and none that :func:`upright` makes: the format has no words for it.
     """
-    data = _upright_data(region) if region.from_start else goal_data(region)
+    data = _upright_data(region) if region.from_start else _region_data(region)
     return data if region.frame is None else {**data, "frame": region.frame}
+
+
+def _region_data(region: TaskRegion) -> dict[str, Any]:
+    data = goal_data(region)
+    if region.position_allowance:
+        data["task_region"]["position_allowance"] = region.position_allowance
+    if region.orientation_allowance:
+        data["task_region"]["orientation_allowance_deg"] = float(np.degrees(region.orientation_allowance))
+    return data
 
 
 def _upright_data(region: TaskRegion) -> dict[str, Any]:
@@ -186,4 +224,7 @@ def _upright_data(region: TaskRegion) -> dict[str, Any]:
     if seen[axis] < 1.0 - 1e-9 or not usual:
         raise InputError("path constraint: a file cannot say a region from_start other than upright")
     tolerance = float(np.degrees(region.orientation_tolerance))
-    return {"upright": {"axis": "xyz"[axis], "tolerance_deg": tolerance}}
+    data: dict[str, Any] = {"axis": "xyz"[axis], "tolerance_deg": tolerance}
+    if region.orientation_allowance:
+        data["allowance_deg"] = float(np.degrees(region.orientation_allowance))
+    return {"upright": data}

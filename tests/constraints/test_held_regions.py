@@ -1,11 +1,14 @@
 """Regions held along paths: what they mean, that the bound on motions is one, and what is refused."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.constraints.held_region import SLACK_ANGLE, SLACK_POSITION, Turning
+from rrtik_ompl.constraints.held_region import Turning
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows, residual
 from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
@@ -86,9 +89,20 @@ def test_the_bound_on_motions_holds_at_every_place(ur5, kind):
             assert (measures.max(axis=0) <= allowed + 1e-12).all()
 
 
+def allowing(held, position, orientation):
+    """The same regions, of which motions between waypoints may leave more."""
+    parts = [
+        replace(each.region, position_allowance=position, orientation_allowance=orientation) for each in held.regions
+    ]
+    return held_regions(held.regions[0].robot, Scene(), parts, None)
+
+
+@pytest.mark.parametrize(("position", "orientation"), [(0.0, 0.0), (5e-4, np.radians(0.2))])
 @pytest.mark.parametrize("kind", KINDS)
-def test_motions_that_are_held_leave_the_region_by_no_more_than_the_slack(ur5, kind):
-    held = prepared(ur5, START, kind)
+def test_motions_that_are_held_keep_the_tolerance_in_between_unless_more_was_asked_for(
+    ur5, kind, position, orientation
+):
+    held = allowing(prepared(ur5, START, kind), position, orientation)
     task, rng, shares = held.regions[0].region, np.random.default_rng(4), np.linspace(0.0, 1.0, 101)[:, None]
     rows, there = projected_rows(ur5, held, START + rng.normal(0.0, 0.1, (120, 6)))
     rows = rows[there]
@@ -96,9 +110,9 @@ def test_motions_that_are_held_leave_the_region_by_no_more_than_the_slack(ur5, k
     kept = np.flatnonzero(seen)
     assert len(kept) > 0
     for k in kept[:25]:
-        position, angle = task.errors(ur5, (1.0 - shares) * rows[k] + shares * rows[k + 1])
-        assert position.max() <= task.position_tolerance + SLACK_POSITION + 1e-9
-        assert angle.max() <= task.orientation_tolerance + SLACK_ANGLE + 1e-6
+        away, angle = task.errors(ur5, (1.0 - shares) * rows[k] + shares * rows[k + 1])
+        assert away.max() <= task.position_tolerance + position + 1e-9
+        assert angle.max() <= task.orientation_tolerance + orientation + 1e-6
 
 
 def test_the_way_into_a_region_is_the_derivative_of_the_displacement(ur5):
@@ -187,7 +201,7 @@ def test_what_makes_no_sense_is_refused_in_a_line(ur5):
         rrtik.Problem(world, START, START, constraints=["upright"])
     with pytest.raises(InputError, match="pitch may reach 80"):
         rrtik.Problem(world, START, START, constraints=[rrtik.orientation_of(T, [10.0, 80.0, 10.0])])
-    with pytest.raises(InputError, match="frame and from_start are for path constraints"):
+    with pytest.raises(InputError, match="frame, from_start and allowances are for path constraints"):
         rrtik.Problem(world, START, rrtik.upright(ur5))
     with pytest.raises(InputError, match="axis must be x, y or z"):
         rrtik.upright(ur5, "w")
@@ -225,3 +239,71 @@ def test_an_angle_that_cannot_be_held_is_refused_in_a_line():
     wide = rrtik.TaskRegion(robot.fk(np.zeros(6)), bounds, orientation_tolerance=np.radians(120.0))
     with pytest.raises(InputError, match="path constraint 1: orientation_tolerance is 120 degrees, and more than 90"):
         rrtik.Problem(rrtik.World(robot), np.zeros(6), np.full(6, 0.1), constraints=[wide])
+
+
+def off_the_line(robot, rows, point, direction):
+    """The largest distance of the tip from a line on the motions between waypoints, by Pinocchio alone."""
+    data, frame, worst = robot.model.createData(), robot.model.getFrameId(robot.tip), 0.0
+    shares = np.linspace(0.0, 1.0, 41)[:, None]
+    for a, b in pairwise(rows):
+        for q in robot.pinocchio_configuration((1.0 - shares) * a + shares * b):
+            pin.forwardKinematics(robot.model, data, q)
+            tip = pin.updateFramePlacement(robot.model, data, frame).translation
+            worst = max(worst, float(np.linalg.norm(np.cross(tip - point, direction))))
+    return worst
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+def test_a_proven_path_is_within_the_stated_tolerance_between_its_waypoints_too(tolerance):
+    robot = rrtik.load_robot("panda")
+    start = np.array([0.1, -0.5, 0.1, -2.0, 0.1, 1.6, 0.6])
+    point, direction = robot.fk(start).translation, np.array([0.0, 1.0, 0.0])
+    line = rrtik.on_line(point, direction, tolerance=tolerance)
+    goal = rrtik.PositionGoal(point + 0.25 * direction, tolerance=1e-3)
+    plan = rrtik.plan(rrtik.Problem(rrtik.World(robot), start, goal, constraints=[line]), seed=1)
+    assert plan.found, plan.reason
+    assert plan.proven
+    assert off_the_line(robot, plan.path.waypoints, point, direction) <= tolerance + 1e-9
+
+
+def test_more_between_waypoints_is_a_matter_of_words(ur5):
+    T = ur5.fk(START)
+    assert all(not region.position_allowance for region in regions_of(ur5, START).values())
+    wide = rrtik.on_line(T.translation, [0, 1, 0], tolerance=1e-9, allowance=5e-4)
+    assert wide.position_allowance == 5e-4
+    assert rrtik.upright(ur5, allowance_deg=0.2).orientation_allowance == np.radians(0.2)
+    with pytest.raises(InputError, match="on_plane: allowance|position_allowance must not be negative"):
+        rrtik.on_plane([0, 0, 0], [0, 0, 1], allowance=-1e-3)
+    with pytest.raises(InputError, match="allowances are for path constraints"):
+        rrtik.Problem(rrtik.World(ur5), START, wide)
+
+
+def test_a_tolerance_too_small_for_any_motion_is_refused_with_the_least_that_can_be_kept(ur5):
+    world, T = rrtik.World(ur5), ur5.fk(START)
+    with pytest.raises(InputError, match=r"path constraint 1: .* (\d\.\de-08) m is the least") as caught:
+        rrtik.Problem(world, START, START, constraints=[rrtik.on_line(T.translation, [0, 1, 0], tolerance=1e-12)])
+    least = float(str(caught.value).split(" m is the least")[0].split()[-1])
+    rrtik.Problem(world, START, START, constraints=[rrtik.on_line(T.translation, [0, 1, 0], tolerance=1.1 * least)])
+    with pytest.raises(InputError, match="degrees is the least that can"):
+        rrtik.Problem(world, START, START, constraints=[rrtik.orientation_of(T, 1e-9)])
+
+
+def test_three_angles_are_the_largest_and_no_more(ur5):
+    T, angles = ur5.fk(START), np.radians([5.0, 10.0, 30.0])
+    held = held_regions(ur5, Scene(), [rrtik.orientation_of(T, [5.0, 10.0, 30.0])], START)
+    rows = START + np.random.default_rng(9).normal(0.0, 0.1, (2000, 6))
+    turned = np.array([np.abs(pin.rpy.matrixToRpy(T.rotation.T @ ur5.fk(q).rotation)) for q in rows])
+    inside = held.held(rows)
+    assert inside.sum() > 200
+    assert (turned[inside] <= angles).all()
+    assert inside[(turned < 0.8 * angles).all(axis=1)].all()
+
+
+def test_a_motion_may_begin_at_the_very_rim_of_a_region(ur5):
+    T = ur5.fk(START)
+    rim = rrtik.on_plane(T.translation - [0.0, 0.0, 1e-3], [0.0, 0.0, 1.0], tolerance=1e-3)
+    held = held_regions(ur5, Scene(), [rim], START)
+    down = START - 1e-3 * ur5.fk_jacobian_batch(START[None], ur5.tip)[1][0, 2]
+    assert held.motions_held(START[None], down[None]).all()
+    assert not held.motions_held(START[None], (2.0 * START - down)[None]).any()

@@ -56,7 +56,8 @@ MAX_STRAIGHT_WALKS = 16
 def lacks_room(search: ConstrainedTable) -> bool:
     """Whether a tree may not have room for the vertices of one sample."""
     a, b = tree_of(search, 0), tree_of(search, 1)
-    lacks: bool = size_of(a) + layout.ROOM >= capacity_of(a) or size_of(b) + layout.ROOM >= capacity_of(b)
+    room = field(search, layout.WALK_ROOM)
+    lacks: bool = size_of(a) + room >= capacity_of(a) or size_of(b) + room >= capacity_of(b)
     return lacks
 
 

@@ -40,12 +40,12 @@ RESOLVE, LIMIT, UNCHECKED, START_ROWS, GOAL_ROWS = range(8, 13)
 # ... its state. ROW and AIM: configurations · MEETINGS: the vertices at which the trees meet · STRAIGHT_TRIED: goals
 # that were walked to straight away ...
 GROWER, ROW, ROW_VALUES, AIM, QUERY, POINT, RANDOM, START_MEETING, GOAL_MEETING, STRAIGHT_TRIED = range(13, 23)
-# ... and counts. CHECKED: motions.
-ITERATIONS, CHECKED, GOAL_COUNT, FIELD_COUNT = range(23, 27)
+# ... and counts. CHECKED: motions · WALK_ROOM: vertices that one walk adds at most
+ITERATIONS, CHECKED, GOAL_COUNT, WALK_ROOM, FIELD_COUNT = range(23, 28)
 
 # The numbers [unit of the configurations]: LONGEST and SHORTEST step, STEP in use, DOMAIN as of RRT-Connect
 LONGEST, SHORTEST, STEP, DOMAIN = range(4)
 
 SOLVED, EXHAUSTED, RUNNING, FULL = range(4)  # status
 OUTSIDE = -1  # status that a root is not in the box; less its number
-ROOM = 256  # vertices that one walk adds at most
+ROOM = 256  # WALK_ROOM of steps of usual length

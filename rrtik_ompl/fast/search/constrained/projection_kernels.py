@@ -143,14 +143,20 @@ def project(held: HeldTable, q: Configuration, steps: int) -> bool:
 
 
 @kernel
-def within(held: HeldTable, number: int, q: Configuration, origin: float, turn: float) -> bool:
-    """Whether a configuration's measures, and what is added to them, are small enough for motions."""
+def measures(held: HeldTable, number: int, q: Configuration) -> Any:
+    """The measures of a configuration: of the origin and of the turn."""
     region = region_at(held, number)
-    tip, most = place_frame(region, q), record_of(region)
-    if origin_measure(region, tip) + origin > double_at(most, layout.MOST):
-        return False
-    allowed: bool = turn_measure(region, tip) + turn <= double_at(most, layout.MOST + 1)
-    return allowed
+    tip = place_frame(region, q)
+    return origin_measure(region, tip), turn_measure(region, tip)
+
+
+@inlined
+def highest(first: float, last: float, bend: float) -> Any:
+    """The largest that a measure can be on a motion, from those of its ends and the deviation in between."""
+    way = abs(last - first)
+    if way >= 4.0 * bend:
+        return max(first, last)
+    return 0.5 * (first + last) + bend + way * way / (16.0 * bend)
 
 
 @kernel
@@ -170,19 +176,27 @@ def deviation(region: RegionTable, start: Configuration, end: Configuration) -> 
 @kernel
 def keeps_region(held: HeldTable, number: int, start: Configuration, end: Configuration) -> bool:
     """Whether a straight motion between configurations in a region keeps it: parts of it, ever smaller, are bounded."""
-    node, (origin, turn) = field(held, layout.NODE), deviation(region_at(held, number), start, end)
+    region = region_at(held, number)
+    node, (origin, turn) = field(held, layout.NODE), deviation(region, start, end)
+    most_origin = double_at(record_of(region), layout.MOST)
+    most_turn = double_at(record_of(region), layout.MOST + 1)
+    first, last = measures(held, number, start), measures(held, number, end)
     parts = 1
     for _ in range(HALVINGS + 1):
-        kept = within(held, number, start, origin, turn) and within(held, number, end, origin, turn)
-        for part in range(1, parts):
+        kept, before = True, first
+        for part in range(1, parts + 1):
+            here = last
+            if part < parts:
+                share = float(part) / float(parts)
+                for k in range(dof_of(held)):
+                    set_double(node, k, (1.0 - share) * double_at(start, k) + share * double_at(end, k))
+                here = measures(held, number, node)
+            if here[0] > most_origin or here[1] > most_turn:
+                return False
+            kept = highest(before[0], here[0], origin) <= most_origin and highest(before[1], here[1], turn) <= most_turn
             if not kept:
                 break
-            share = float(part) / float(parts)
-            for k in range(dof_of(held)):
-                set_double(node, k, (1.0 - share) * double_at(start, k) + share * double_at(end, k))
-            if not within(held, number, node, 0.0, 0.0):
-                return False
-            kept = within(held, number, node, origin, turn)
+            before = here
         if kept:
             return True
         parts, origin, turn = 2 * parts, 0.25 * origin, 0.25 * turn

@@ -22,9 +22,10 @@ from rrtik_ompl.fast.simd.processor import WIDTH
 from rrtik_ompl.fast.tables.memory import Table, aligned, is_intact, table, whole_lanes
 
 FIRST_CAPACITY = 128 * WIDTH  # vertices
+MOST_ROOM = 16_384  # vertices of one walk
 FIRST_BUDGET, MAX_BUDGET = 4, 1 << 14  # samples in one call of the kernel
 CALL_SECONDS = 1e-3  # that a call should take; the processor's own clock takes up to half of it to read
-SHORTEST_STEP = 0.01  # [unit of the box]
+SHORTEST_STEP = 0.01  # [unit of the box]; a walk of shorter ones may have more vertices
 
 
 class ConstrainedSearch:
@@ -37,13 +38,21 @@ class ConstrainedSearch:
         held: The table of the constraints (:class:`rrtik_ompl.ik.held_tables.HeldTables`), which must outlive this.
         lower, upper: The box, shape (n,), finite.
         range_: Longest step [unit of the box]; what suits the box if None.
+        shortest: Shortest step, likewise.
 
     Raises:
         InputError: If there are no kernels, or a number is out of range.
     """
 
     def __init__(
-        self, motions: FastMotions, held: int, lower: Vector, upper: Vector, *, range_: float | None = None
+        self,
+        motions: FastMotions,
+        held: int,
+        lower: Vector,
+        upper: Vector,
+        *,
+        range_: float | None = None,
+        shortest: float = SHORTEST_STEP,
     ) -> None:
         kernels = library(layout.KERNELS)
         if kernels is None:
@@ -53,10 +62,12 @@ class ConstrainedSearch:
         longest, domain = connect_lengths(lower, upper, range_, None, turning=np.ones(motions.dof, dtype=bool))
         joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(self._dof, joints, FIRST_CAPACITY) for _ in range(2)]
-        numbers = np.array([longest, min(SHORTEST_STEP, longest), longest, domain])
+        numbers = np.array([longest, min(shortest, longest), longest, domain])
         self._search = _search_table(motions, self._trees, held, (lower, upper), numbers)
         fields: Any = self._search.header
         self._fields = memoryview(fields)
+        self._room = min(round(layout.ROOM * max(SHORTEST_STEP / shortest, 1.0)), MOST_ROOM)
+        self._fields[layout.WALK_ROOM] = self._room
         self._roots: list[NDArray[np.float64]] = [np.empty(0), np.empty(0)]
         self._questions = self._rejected = 0
 
@@ -202,7 +213,7 @@ class ConstrainedSearch:
         return rows
 
     def _set_roots(self, side: int, rows: Matrix) -> None:
-        while len(rows) + layout.ROOM >= int(self._trees[0].header[tree_layout.CAPACITY]):
+        while len(rows) + self._room >= int(self._trees[0].header[tree_layout.CAPACITY]):
             for tree in self._trees:
                 grow(tree)
         self._roots[side] = aligned(np.asarray(rows, dtype=np.float64))

@@ -141,7 +141,7 @@ def step_towards(search: ConstrainedTable, here: Configuration, exact: bool) -> 
 def walk(search: ConstrainedTable, side: int, vertex: int, exact: bool) -> Any:
     """Walk from a vertex of a tree towards AIM as far as it goes; the last vertex, and whether AIM is reached."""
     tree, row, first = tree_of(search, side), row_in(search), vertex
-    for _ in range(layout.ROOM):
+    for _ in range(field(search, layout.WALK_ROOM)):
         if is_full(tree):
             break
         nearer, last = step_towards(search, row_of(tree, vertex), exact)
