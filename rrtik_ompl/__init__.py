@@ -24,8 +24,10 @@ if TYPE_CHECKING:
     from rrtik_ompl.constraints.shorthands import on_plane as on_plane
     from rrtik_ompl.constraints.shorthands import orientation_of as orientation_of
     from rrtik_ompl.constraints.shorthands import upright as upright
+    from rrtik_ompl.description.joint_ranges import narrowed as narrowed
     from rrtik_ompl.description.joint_weights import weighted as weighted
     from rrtik_ompl.description.padding import padded as padded
+    from rrtik_ompl.description.scaling import scaled as scaled
     from rrtik_ompl.errors import InputError as InputError
     from rrtik_ompl.errors import PlannerError as PlannerError
     from rrtik_ompl.errors import ProblemError as ProblemError
@@ -139,8 +141,10 @@ else:
         "certificates.certificate": ("Certificate", "load_certificate"),
         "certificates.checked": ("verify_certificate",),
         "certificates.write": ("certificate_of",),
+        "description.joint_ranges": ("narrowed",),
         "description.joint_weights": ("weighted",),
         "description.padding": ("padded",),
+        "description.scaling": ("scaled",),
         "constraints.shorthands": ("inside", "on_line", "on_plane", "orientation_of", "upright"),
         "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
         "following.follower": ("Followed", "Follower"),

@@ -24,10 +24,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from rrtik_ompl.description.joint_ranges import narrowed
 from rrtik_ompl.description.joint_weights import weighted
 from rrtik_ompl.description.padding import padded
 from rrtik_ompl.description.robot_cache import RobotCache
 from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
+from rrtik_ompl.description.scaling import scaled
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
 from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.errors import InputError, UnknownNameError
@@ -43,7 +45,12 @@ FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
 FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
 PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
 OF_CALLERS = ("trust_xacro", "xacro_limits")  # which no file may give
-OF_ALL: Mapping[str, Callable[..., Robot]] = {"padding": padded, "joint_weights": weighted}  # options of any robot
+OF_ALL: Mapping[str, Callable[..., Robot]] = {  # options of any robot
+    "scale": scaled,
+    "padding": padded,
+    "joint_ranges": narrowed,
+    "joint_weights": weighted,
+}
 MOUNTING = ("base_pose", "tip", *OF_ALL)  # keys that stand beside that group
 
 
@@ -144,12 +151,13 @@ def load_robot(
         trust_xacro: Whether the expressions of macros go to xacro's own evaluator, which can run anything, and macros
             may read files anywhere. Without it expressions that are not on a list are refused.
         xacro_limits: What the expansion of macros may take: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
-        **options: What the robot takes: any ``padding`` (see `rrtik_ompl.padded`) and ``joint_weights`` (`weighted`),
-            and ``base_pose``, ``tip`` and ``locked`` where they apply; a URDF ``srdf, group, joints, joint_limits,
-            packages, xacro_args``, a folder also ``urdf``; a shipped robot for instance ``limits="envelope"``.
-            ``base_pose`` is a ``pinocchio.SE3`` or ``{"xyz": [..], "quat_xyzw": [..]}``. With ``strict=True`` a
-            URDF, folder or MJCF is refused of which a `DescriptionWarning` would say that a name in it does not exist,
-            that a posture is outside the limits, or that something in it is not read.
+        **options: What the robot takes: any ``scale`` (see `rrtik_ompl.scaled`), ``padding`` (`padded`),
+            ``joint_ranges`` (`narrowed`) and ``joint_weights`` (`weighted`), and ``base_pose``, ``tip`` and ``locked``
+            where they apply; a URDF ``srdf, group, joints, joint_limits, packages, xacro_args``, a folder also
+            ``urdf``; a shipped robot for instance ``limits="envelope"``. ``base_pose`` is a ``pinocchio.SE3`` or
+            ``{"xyz": [..], "quat_xyzw": [..]}``. With ``strict=True`` a URDF, folder or MJCF is refused of which a
+            `DescriptionWarning` would say that a name in it does not exist, that a posture is outside the limits, or
+            that something in it is not read.
 
     Raises:
         UnknownNameError: If there is no robot of that name.

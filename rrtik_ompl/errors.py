@@ -212,6 +212,10 @@ class CloudWarning(UserWarning):
     """A cloud of points is probably not what its author meant, but work can go on."""
 
 
+class SceneWarning(UserWarning):
+    """Something that the file of a scene says is not as it says in the world that is made of it."""
+
+
 class PathWarning(UserWarning):
     """What was asked for does not apply to a path, which stays as it is."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -147,8 +146,8 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
     ``ends``: the measures of both ends, shape (2, m, 2).
     """
     deviations, most = region.deviations(A, B), region.limits(between=True) + ROUNDING
-    stored: Mask = (ends <= region.limits() + ROUNDING).all(axis=(0, 2))
-    near: Mask = (_highest(ends[0], ends[1], deviations) <= most).all(axis=1)
+    stored: Mask = np.logical_and.reduce(ends <= region.limits() + ROUNDING, axis=(0, 2))
+    near: Mask = np.logical_and.reduce(_highest(ends[0], ends[1], deviations) <= most, axis=1)
     kept = stored & near
     open_ = np.flatnonzero(stored & ~kept)
     for level in range(1, HALVINGS + 1):
@@ -164,7 +163,9 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
     return kept
 
 
-def _highest(first: NDArray[np.float64], last: NDArray[np.float64], deviation: NDArray[np.float64]) -> Any:
+def _highest(
+    first: NDArray[np.float64], last: NDArray[np.float64], deviation: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """The largest that measures can be on motions, from those of both ends; arrays of one shape.
 
     The top of ``first + t (last - first) + 4 t (1 - t) deviation`` for t in [0, 1].
@@ -172,7 +173,9 @@ def _highest(first: NDArray[np.float64], last: NDArray[np.float64], deviation: N
     way = last - first
     inner = np.abs(way) < 4.0 * deviation
     divisor = np.where(inner, 16.0 * deviation, 1.0)
-    return np.where(inner, 0.5 * (first + last) + deviation + way * way / divisor, np.maximum(first, last))
+    bent = 0.5 * (first + last) + deviation + way * way / divisor
+    highest: NDArray[np.float64] = np.where(inner, bent, np.maximum(first, last))
+    return highest
 
 
 def _nodes(A: Matrix, B: Matrix, parts: int) -> Matrix:

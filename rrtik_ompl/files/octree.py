@@ -47,7 +47,30 @@ def octree_cells(data: bytes, what: str) -> tuple[Matrix, Vector]:
     Raises:
         InputError: If it is none, or ends too early.
     """
-    places, levels, resolution = _occupied(data, what)
+    places, levels, resolution, _ = _occupied(data, what)
+    return _cells(places, levels, resolution)
+
+
+def cells_of_tree(body: bytes, resolution: float, kind: str, what: str) -> tuple[Matrix, Vector]:
+    """As :func:`octree_cells`, of the tree alone, as ROS sends it: without the header of a file.
+
+    Args:
+        body: The tree.
+        resolution: Side of the finest cells [m].
+        kind: Type of the tree, "OcTree".
+        what: Its name, for messages.
+
+    Raises:
+        InputError: If it is none, or ends too early.
+    """
+    places, levels, side, end = _cells_in(body, {"id": kind or "OcTree", "res": str(resolution)}, what)
+    if end != len(body):
+        raise InputError(f"{what}: not a tree of OctoMap: it ends after {end} of {len(body)} bytes")
+    return _cells(places, levels, side)
+
+
+def _cells(places: NDArray[np.float64], levels: NDArray[np.float64], resolution: float) -> tuple[Matrix, Vector]:
+    """Centres and side lengths of cells."""
     sides = resolution * np.exp2(DEPTH - levels)
     lows = resolution * (places - float(1 << (DEPTH - 1)))
     return lows + 0.5 * sides[:, None], sides
@@ -59,7 +82,7 @@ def octree_points(data: bytes, what: str) -> Matrix:
     Raises:
         InputError: If it is none, ends too early, or has too many.
     """
-    places, levels, resolution = _occupied(data, what)
+    places, levels, resolution, _ = _occupied(data, what)
     widths = np.exp2(DEPTH - levels)
     if (count := float((widths**3).sum())) > MOST_POINTS:
         raise InputError(f"{what}: {count:.0f} occupied cells, more than {MOST_POINTS}; take it as an octree instead")
@@ -70,13 +93,19 @@ def octree_points(data: bytes, what: str) -> Matrix:
     return resolution * (np.concatenate(found) + 0.5 - float(1 << (DEPTH - 1)))
 
 
-def _occupied(data: bytes, what: str) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Lowest corners of the occupied cells in finest cells, their levels, and the finest cells' size."""
+def _occupied(data: bytes, what: str) -> tuple[NDArray[np.float64], NDArray[np.float64], float, int]:
+    """Lowest corners of the occupied cells in finest cells, their levels, the size of the finest, the tree's end."""
     head, found, body = data.partition(b"\ndata\n")
     if not data.startswith(FIRST_LINE) or not found:
         raise InputError(f"{what}: not a map of OctoMap: expected '{FIRST_LINE.decode()}' and a line 'data'")
     lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
-    header = {line[0]: line[1] for line in lines if len(line) == 2 and line[0] != "#"}
+    return _cells_in(body, {line[0]: line[1] for line in lines if len(line) == 2 and line[0] != "#"}, what)
+
+
+def _cells_in(
+    body: bytes, header: dict[str, str], what: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float, int]:
+    """The same, of a tree and what its header says."""
     if header.get("id", "OcTree") != "OcTree":
         raise InputError(f"{what}: a tree of type '{header['id'][:20]}' is unknown; write it as OcTree")
     try:
@@ -98,4 +127,4 @@ def _occupied(data: bytes, what: str) -> tuple[NDArray[np.float64], NDArray[np.f
                 (occupied if kind == OCCUPIED else inner).append(place)
         open_ += inner[::-1]  # the first one follows first
     rows = np.array(occupied, dtype=np.float64).reshape(-1, 4)
-    return rows[:, :3], rows[:, 3], resolution
+    return rows[:, :3], rows[:, 3], resolution, at

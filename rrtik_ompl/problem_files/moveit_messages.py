@@ -1,209 +1,415 @@
-"""The parts of MoveIt's messages that MotionBenchMaker files are made of; keys that are not used are not looked at."""
+"""MoveIt's messages as MotionBenchMaker files hold them: PlanningScene, MotionPlanRequest and their parts.
+
+Every key of a message is in one of three classes: it is read; it says nothing of the problem of a path (who planned,
+for how long, colours), and is listed in ``says_nothing``; or it is refused where it holds anything. What is empty in
+ROS (nothing, no text, 0, false, and lists and groups of these) says nothing wherever it stands.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import pinocchio as pin
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
 
+from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.files.sections import Length, Name, Number, Positive, Vector3, Vector4
+from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Positive, Vector3, Vector4
 from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
-from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.shapes import SHAPES, Shape
 
 KNOWN = {key: kind for key, kind in sorted(SHAPES.items()) if kind.moveit}
+SHAPE_NUMBERS = {1: "box", 2: "sphere", 3: "cylinder", 4: "cone", 5: "prism"}  # of shape_msgs/SolidPrimitive
+OPERATION_NUMBERS = {0: "add", 1: "remove", 2: "append", 3: "move"}  # of moveit_msgs/CollisionObject
 if TYPE_CHECKING:
     PrimitiveName = str
 else:
     PrimitiveName = Literal[tuple(KNOWN)]
 
 
-class PoseMessage(BaseModel):
+def _by_number(names: dict[int, str]) -> BeforeValidator:
+    """Take the constants of a message for the words that they stand for."""
+
+    def named(value: object) -> object:
+        if isinstance(value, bool) or not isinstance(value, int):
+            return value.lower() if isinstance(value, str) else value
+        return names.get(value, value)
+
+    return BeforeValidator(named)
+
+
+def _listed(keys: str) -> BeforeValidator:
+    """Take ``{x: .., y: .., z: ..}``, as ROS prints a vector, for a list of numbers."""
+
+    def listed(value: object) -> object:
+        if not isinstance(value, dict):
+            return value
+        for key in value:
+            if key not in keys:
+                raise PydanticCustomError("unread", "'{name}' is no coordinate", {"name": str(key)})
+        return [value.get(key, 0.0) for key in keys]
+
+    return BeforeValidator(listed)
+
+
+def _row(value: object) -> object:
+    """Take ``{enabled: [..]}``, as ROS writes a row of a table, for the row."""
+    return value["enabled"] if isinstance(value, dict) and set(value) == {"enabled"} else value
+
+
+Vector = Annotated[Vector3, _listed("xyz")]
+Quaternion = Annotated[Vector4, _listed("xyzw")]
+
+
+class Message(BaseModel):
+    """A message; a key that it does not read must be empty, or be known to say nothing of a path.
+
+    Attributes:
+        says_nothing: Keys that do not bear on the problem.
+    """
+
+    says_nothing: ClassVar[tuple[str, ...]] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _all_is_read(cls, data: object) -> object:
+        for key, value in data.items() if isinstance(data, dict) else ():
+            if key in cls.model_fields or key in cls.says_nothing or is_empty(value):
+                continue
+            near = get_close_matches(str(key), cls.model_fields, n=1, cutoff=0.85)
+            raise PydanticCustomError(
+                "unread",
+                "it is not read, and a path without it may be wrong; {remedy}",
+                {
+                    "key": str(key),
+                    "remedy": f"did you mean '{near[0]}'?" if near else "take it out if the problem does not need it",
+                },
+            )
+        return data
+
+
+def is_empty(value: object) -> bool:
+    """Whether a value of a message says nothing: what ROS fills in where nobody did."""
+    if isinstance(value, dict):
+        return all(map(is_empty, value.values()))
+    if isinstance(value, list):
+        return all(map(is_empty, value))
+    return value is None or value == "" or value == 0  # false equals 0
+
+
+class PoseMessage(Message):
     """A pose."""
 
-    position: Vector3 = Field(default_factory=lambda: [0.0, 0.0, 0.0])
-    orientation: Vector4 = Field(default_factory=lambda: list(IDENTITY_QUATERNION))
+    position: Vector = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    orientation: Quaternion = Field(default_factory=lambda: list(IDENTITY_QUATERNION))
 
-    def build(self) -> Any:
-        """The pose as ``pinocchio.SE3``."""
-        return pose(self.position, self.orientation)
+    @property
+    def given(self) -> bool:
+        """Whether anybody filled it in: a quaternion of zeros is none."""
+        return bool(self.model_fields_set) and any(self.orientation)
+
+    def build(self) -> pin.SE3:
+        """The pose as ``pinocchio.SE3``; the identity if nobody filled it in."""
+        return pose(self.position, self.orientation if any(self.orientation) else IDENTITY_QUATERNION)
 
 
-class Header(BaseModel):
+class Header(Message):
     """The frame that coordinates refer to."""
+
+    says_nothing = ("seq", "stamp")
 
     frame_id: str = ""
 
 
-class Primitive(BaseModel):
+class Primitive(Message):
     """A shape: box [x, y, z], cylinder [height, radius], sphere [radius], full sizes in metres."""
 
-    type: PrimitiveName
+    type: Annotated[PrimitiveName, _by_number(SHAPE_NUMBERS)]
     dimensions: Annotated[list[Length], Field(min_length=1, max_length=3)]
 
-    def build(self) -> Shape:
-        """The shape."""
+    def build(self, factor: float = 1.0) -> Shape:
+        """The shape, so many times as large."""
         kind = KNOWN[self.type]
         sizes = {m.name: 3 if m.kind == "three lengths" else 1 for m in kind.measures}
         if len(self.dimensions) != sum(sizes.values()):
             raise InputError(f"a {self.type} has {sum(sizes.values())} dimensions, found {len(self.dimensions)}")
-        rest, values = iter(self.dimensions), {}
+        rest, values = iter([factor * size for size in self.dimensions]), {}
         for name in kind.moveit:
             values[name] = next(rest) if sizes[name] == 1 else [next(rest) for _ in range(sizes[name])]
         return kind(**values)
 
 
-class CollisionObject(BaseModel):
-    """One or several primitives under one name."""
+class CollisionObject(Message):
+    """One or several primitives under one name, and what is done with them."""
 
-    id: Name
+    says_nothing = ("type",)
+
+    id: str = ""
     header: Header = Field(default_factory=Header)  # made anew in a fifth of the time of a copy
     pose: PoseMessage = Field(default_factory=PoseMessage)
     primitives: list[Primitive] = Field(default_factory=list)
     primitive_poses: list[PoseMessage] = Field(default_factory=list)
     meshes: list[Any] = Field(default_factory=list)
+    mesh_poses: list[Any] = Field(default_factory=list)
     planes: list[Any] = Field(default_factory=list)
+    plane_poses: list[Any] = Field(default_factory=list)
+    subframe_names: list[Name] = Field(default_factory=list)
+    subframe_poses: list[PoseMessage] = Field(default_factory=list)
+    operation: Annotated[Literal["add", "remove", "append", "move"], _by_number(OPERATION_NUMBERS)] = "add"
 
-    def check_frame(self, known: tuple[str, ...]) -> None:
-        """Refuse an object whose coordinates refer to a frame other than the world's."""
-        frame = self.header.frame_id.removeprefix("/")
-        if frame and frame not in known:
-            raise InputError(f"'{self.id}' is given in frame '{frame}'; write it in the frame 'world'")
+    def check(self) -> None:
+        """Refuse geometry that is not read, and lists of different lengths.
 
-    def build(self) -> Iterator[Obstacle]:
-        """The obstacles: ``id``, then ``id_2``, ``id_3``..."""
+        Raises:
+            InputError: If there are meshes or planes, or a shape or a subframe has no pose.
+        """
         if self.meshes or self.planes:
             raise InputError(f"'{self.id}': meshes and planes are not read; write them as box, cylinder or sphere")
-        if len(self.primitive_poses) != len(self.primitives):
+        if len(self.primitive_poses) != len(self.primitives) and (self.primitive_poses or not self.pose.given):
             count = f"{len(self.primitives)} primitives, but {len(self.primitive_poses)} primitive_poses"
             raise InputError(f"'{self.id}' has {count}; give one pose for each")
-        own = self.pose.build() if "pose" in self.model_fields_set else pin.SE3.Identity()
-        for k, (solid, place) in enumerate(zip(self.primitives, self.primitive_poses, strict=True)):
-            name = self.id if k == 0 else f"{self.id}_{k + 1}"
-            yield Obstacle(name, solid.build(), own * place.build())
+        if len(self.subframe_poses) != len(self.subframe_names):
+            count = f"{len(self.subframe_names)} subframe_names, but {len(self.subframe_poses)} subframe_poses"
+            raise InputError(f"'{self.id}' has {count}; give one pose for each")
+
+    def places(self) -> list[pin.SE3]:
+        """The pose of each primitive in the frame of the object."""
+        return [each.build() for each in self.primitive_poses] or [pin.SE3.Identity()] * len(self.primitives)
 
 
-class AllowedMatrix(BaseModel):
+class AllowedMatrix(Message):
     """Which pairs of names may touch."""
 
     entry_names: list[str] = Field(default_factory=list)
-    entry_values: list[list[bool]] = Field(default_factory=list)
+    entry_values: list[Annotated[list[bool], BeforeValidator(_row)]] = Field(default_factory=list)
+    default_entry_names: list[str] = Field(default_factory=list)
+    default_entry_values: list[bool] = Field(default_factory=list)
 
-    def pairs(self) -> Iterator[tuple[str, str]]:
-        """The pairs that may touch, each once."""
-        count = len(self.entry_names)
-        if len(self.entry_values) != count or any(len(row) != count for row in self.entry_values):
+    def stated(self) -> dict[tuple[str, str], bool]:
+        """What the table says of pairs of names that differ, each pair once.
+
+        Raises:
+            InputError: If it is not square.
+        """
+        rows, count = self.entry_values, len(self.entry_names)
+        if len(rows) != count or any(len(row) != count for row in rows):
             raise InputError(f"entry_values must be a table of {count} x {count}, one row and column per entry name")
+        found = {}
         for i, first in enumerate(self.entry_names):
             for j, second in enumerate(self.entry_names[:i]):
-                if self.entry_values[i][j] or self.entry_values[j][i]:
-                    yield second, first
+                found[second, first] = rows[i][j] or rows[j][i]
+        return found
+
+    def defaults(self) -> dict[str, bool]:
+        """What is said of a name and all those with which the table has no entry for it.
+
+        Raises:
+            InputError: If there is not a value for each name.
+        """
+        names, values = self.default_entry_names, self.default_entry_values
+        if len(names) != len(values):
+            raise InputError(f"{len(names)} default_entry_names, but {len(values)} default_entry_values")
+        return dict(zip(names, values, strict=True))
 
 
-class WorldMessage(BaseModel):
+class Octomap(Message):
+    """The cells of a map of OctoMap."""
+
+    says_nothing = ("header",)
+
+    binary: bool = False
+    id: str = ""
+    resolution: Number = 0.0
+    data: list[int] = Field(default_factory=list)
+
+
+class PlacedOctomap(Message):
+    """A map of OctoMap, and where it is."""
+
+    header: Header = Header()
+    origin: PoseMessage = PoseMessage()
+    octomap: Octomap = Octomap()
+
+
+class WorldMessage(Message):
     """The obstacles."""
 
     collision_objects: list[CollisionObject] = Field(default_factory=list)
+    octomap: PlacedOctomap = PlacedOctomap()
 
 
-class SceneMessage(BaseModel):
-    """What is used of a PlanningScene."""
-
-    robot_model_name: Name
-    allowed_collision_matrix: AllowedMatrix = AllowedMatrix()
-    world: WorldMessage = WorldMessage()
-
-
-class JointState(BaseModel):
+class JointState(Message):
     """Joint values [rad or m]."""
 
-    name: list[str]
-    position: list[Number]
+    says_nothing = ("header", "velocity", "effort")
+
+    name: list[str] = Field(default_factory=list)
+    position: list[Number] = Field(default_factory=list)
 
 
-class Transform(BaseModel):
-    """Where the base stands."""
+class Transform(Message):
+    """A pose, in the words of another message."""
 
-    translation: Vector3 = Field(default=[0.0, 0.0, 0.0])
-    rotation: Vector4 = Field(default=list(IDENTITY_QUATERNION))
+    translation: Vector = Field(default=[0.0, 0.0, 0.0])
+    rotation: Quaternion = Field(default=list(IDENTITY_QUATERNION))
+
+    def build(self) -> pin.SE3:
+        """The pose as ``pinocchio.SE3``; the identity if nobody filled it in."""
+        return pose(self.translation, self.rotation if any(self.rotation) else IDENTITY_QUATERNION)
 
 
-class BaseState(BaseModel):
+class BaseState(Message):
     """State of the joint between world and base."""
 
-    transforms: list[Transform] = Field(default_factory=list)
+    says_nothing = ("joint_names", "twist", "wrench")
+
+    header: Header = Header()
+    transforms: list[Transform] = Field(default_factory=list, max_length=1)
 
 
-class RobotState(BaseModel):
-    """Joint values, and the pose of the base."""
+class AttachedMessage(Message):
+    """What a link holds."""
 
-    joint_state: JointState
+    says_nothing = ("detach_posture", "weight")
+
+    link_name: Name
+    object: CollisionObject
+    touch_links: list[str] = Field(default_factory=list)
+
+
+class RobotState(Message):
+    """Joint values, the pose of the base, and what is held."""
+
+    says_nothing = ("is_diff",)  # joints that are not named are where the scene has them
+
+    joint_state: JointState = JointState()
     multi_dof_joint_state: BaseState = BaseState()
+    attached_collision_objects: list[AttachedMessage] = Field(default_factory=list)
 
     def values(self) -> dict[str, float]:
-        """Value of each joint."""
+        """Value of each joint.
+
+        Raises:
+            InputError: If there is not a position for each name.
+        """
         names, positions = self.joint_state.name, self.joint_state.position
         if len(names) != len(positions):
             raise InputError(f"start_state: {len(names)} joint names, but {len(positions)} positions")
         return dict(zip(names, positions, strict=True))
 
-    def base_pose(self) -> Any:
-        """T_world_base."""
-        placed = self.multi_dof_joint_state.transforms
-        return pose(placed[0].translation, placed[0].rotation) if placed else pin.SE3.Identity()
+
+class FixedFrame(Message):
+    """A frame that stands still in another one."""
+
+    header: Header = Header()
+    child_frame_id: Name
+    transform: Transform = Transform()
 
 
-class JointConstraint(BaseModel):
-    """The value that a joint has to reach."""
+class LinkPadding(Message):
+    """How much thicker a link is."""
+
+    link_name: Name
+    padding: NotNegative = 0.0
+
+
+class LinkScale(Message):
+    """How many times as large a link is."""
+
+    link_name: Name
+    scale: Positive = 1.0
+
+
+class SceneMessage(Message):
+    """A PlanningScene."""
+
+    says_nothing = ("name", "object_colors")
+
+    robot_model_name: Name
+    robot_state: RobotState = RobotState()
+    fixed_frame_transforms: list[FixedFrame] = Field(default_factory=list)
+    allowed_collision_matrix: AllowedMatrix = AllowedMatrix()
+    link_padding: list[LinkPadding] = Field(default_factory=list)
+    link_scale: list[LinkScale] = Field(default_factory=list)
+    world: WorldMessage = WorldMessage()
+
+
+class JointConstraint(Message):
+    """The value that a joint has to have, and how far it may be from it [rad or m]."""
+
+    says_nothing = ("weight",)
 
     joint_name: str
     position: Number
+    tolerance_above: NotNegative = 0.0
+    tolerance_below: NotNegative = 0.0
 
 
-class Region(BaseModel):
-    """Volume that a link has to reach: only its primitives are looked at."""
+class Region(Message):
+    """Volume that a link has to reach: a union of primitives."""
 
     primitives: list[Primitive] = Field(default_factory=list)
     primitive_poses: list[PoseMessage] = Field(default_factory=list)
 
 
-class PositionConstraint(BaseModel):
-    """The link has to be inside a region."""
+class PositionConstraint(Message):
+    """A point of a link has to be inside a region."""
 
+    says_nothing = ("weight",)
+
+    header: Header = Header()
     link_name: Name
-    target_point_offset: dict[str, Number] | list[Number] = Field(default_factory=list)
+    target_point_offset: Annotated[list[Number], _listed("xyz")] = Field(default_factory=list)
     constraint_region: Region
 
-    def ball(self) -> tuple[list[float], float]:
-        """Centre and radius [m] of the region."""
+    @property
+    def offset(self) -> list[float]:
+        """The point, in the frame of the link [m]."""
+        return self.target_point_offset or [0.0, 0.0, 0.0]
+
+    def volume(self) -> tuple[Primitive, pin.SE3]:
+        """The only primitive of the region, and where it is.
+
+        Raises:
+            InputError: If there is not exactly one, or it is neither a sphere nor a box.
+        """
         solids, places = self.constraint_region.primitives, self.constraint_region.primitive_poses
-        offset = self.target_point_offset
-        shifted = any(offset.values() if isinstance(offset, dict) else offset)
-        if len(solids) != 1 or len(places) != 1 or solids[0].type != "sphere" or shifted:
-            raise InputError("position_constraints: only one sphere about the link's own origin can be read")
-        return places[0].position, solids[0].dimensions[0]
+        if len(solids) != 1 or len(places) != 1 or solids[0].type not in ("sphere", "box"):
+            raise InputError("position_constraints: only a region of one sphere or one box can be read")
+        solids[0].build()  # refuses another number of dimensions
+        return solids[0], places[0].build()
 
 
-class OrientationConstraint(BaseModel):
-    """The link has to have an orientation."""
+class OrientationConstraint(Message):
+    """The link has to have an orientation, within an angle about each of its axes; pi or more leaves one free."""
 
+    says_nothing = ("weight",)
+
+    header: Header = Header()
     link_name: Name
-    orientation: Vector4
+    orientation: Quaternion
     absolute_x_axis_tolerance: Positive = 1e-2
     absolute_y_axis_tolerance: Positive = 1e-2
     absolute_z_axis_tolerance: Positive = 1e-2
+    parameterization: Literal[0, 1] = 0  # angles about x, y and z in turn, or the axis times the angle
+
+    def build_rotation(self) -> Matrix:
+        """The orientation as a matrix, shape (3, 3)."""
+        rotation: Matrix = pose([0.0, 0.0, 0.0], self.orientation).rotation
+        return rotation
 
     @property
-    def tolerance(self) -> float:
-        """An angle [rad] inside all three tolerances."""
-        return min(self.absolute_x_axis_tolerance, self.absolute_y_axis_tolerance, self.absolute_z_axis_tolerance)
+    def tolerances(self) -> tuple[float, float, float]:
+        """About the axes of the orientation [rad]."""
+        return self.absolute_x_axis_tolerance, self.absolute_y_axis_tolerance, self.absolute_z_axis_tolerance
 
 
-class Constraints(BaseModel):
-    """What the end of the motion has to satisfy."""
+class Constraints(Message):
+    """What the end of the motion, or all of it, has to satisfy."""
+
+    says_nothing = ("name",)
 
     joint_constraints: list[JointConstraint] = Field(default_factory=list)
     position_constraints: list[PositionConstraint] = Field(default_factory=list)
@@ -216,9 +422,20 @@ class Constraints(BaseModel):
         return (*places, *(c.link_name for c in self.orientation_constraints))
 
 
-class RequestMessage(BaseModel):
-    """What is used of a MotionPlanRequest."""
+class RequestMessage(Message):
+    """A MotionPlanRequest."""
+
+    says_nothing = (
+        "allowed_planning_time",
+        "max_acceleration_scaling_factor",
+        "max_velocity_scaling_factor",
+        "num_planning_attempts",
+        "pipeline_id",
+        "planner_id",
+        "workspace_parameters",  # of a base that drives
+    )
 
     start_state: RobotState
     goal_constraints: Annotated[list[Constraints], Field(min_length=1, max_length=1)]
+    path_constraints: Constraints = Constraints()
     group_name: Name

@@ -40,6 +40,12 @@ class _Mounted(Section):
     padding: Padding | None = Field(
         None, description="how much thicker links are than their geometry [m]: by name, or one number for all"
     )
+    scale: dict[Name, Positive] | None = Field(
+        None, description="factors by which the solids of links are larger than their geometry, by name"
+    )
+    joint_ranges: dict[Name, Vector2] | None = Field(
+        None, description="lowest and highest value of joints inside their limits, by name [rad or m]"
+    )
     joint_weights: dict[Name, Positive] | None = Field(
         None, description="how much joints count in the length of a path, by name; 1 if absent"
     )

@@ -273,7 +273,7 @@ def test_more_between_waypoints_is_a_matter_of_words(ur5):
     wide = rrtik.on_line(T.translation, [0, 1, 0], tolerance=1e-9, allowance=5e-4)
     assert wide.position_allowance == 5e-4
     assert rrtik.upright(ur5, allowance_deg=0.2).orientation_allowance == np.radians(0.2)
-    with pytest.raises(InputError, match="on_plane: allowance|position_allowance must not be negative"):
+    with pytest.raises(InputError, match="position_allowance must not be negative"):
         rrtik.on_plane([0, 0, 0], [0, 0, 1], allowance=-1e-3)
     with pytest.raises(InputError, match="allowances are for path constraints"):
         rrtik.Problem(rrtik.World(ur5), START, wide)

@@ -149,7 +149,7 @@ BAD_SCENES = {
     "unknown shape": (("type: sphere", "type: cone"), r"primitives\[0\]\.type: must be 'box', 'cylinder' or 'sphere'"),
     "negative size": (("[0.2]", "[-0.2]"), "must be 1e-06 or more, found -0.2"),
     "poses missing": (("primitive_poses: [{position: [0, 9, 0]}]", "primitive_poses: []"), "'ball' has 1 primitives"),
-    "other frame": (("frame_id: world", "frame_id: camera"), "'ball' is given in frame 'camera'"),
+    "other frame": (("frame_id: world", "frame_id: camera"), r"collision_objects\[1\]: no frame 'camera'; have"),
     "mesh": (("header:", "meshes: [{}]\n      header:"), "'ball': meshes and planes are not read"),
     "name twice": (("id: ball", "id: crate"), "'crate' is used 2 times"),
     "ragged table": (("[true, false, false]]", "[true, false]]"), "entry_values must be a table of 3 x 3"),
@@ -172,8 +172,11 @@ BAD_REQUESTS = {
     "orientation alone": (f"{{{TURN}}}", "goal: give joint_constraints, or one position"),
     "joint value is text": ("{joint_constraints: [{joint_name: rail, position: one}]}", "must be a number, found text"),
     "two links": (f"{{{BALL}, {TURN.replace('claw', 'hook')}}}", "constraints on two links"),
-    "box region": (f"{{{BALL.replace('sphere, dimensions: [0.01]', 'box, dimensions: [1, 1, 1]')}}}", "one sphere"),
-    "shifted": (f"{{{BALL.replace('z: 0', 'z: 1')}}}", "only one sphere"),
+    "cylinder region": (
+        f"{{{BALL.replace('sphere, dimensions: [0.01]', 'cylinder, dimensions: [1, 1]')}}}",
+        "one sphere or one box",
+    ),
+    "shifted and turned": (f"{{{BALL.replace('z: 0', 'z: 1')}, {TURN}}}", "target_point_offset together with"),
     "unknown link": (f"{{{BALL.replace('claw', 'jaw')}}}", "jaw"),
 }
 

@@ -1,0 +1,246 @@
+"""The scene of MoveIt's messages: objects added, changed and taken away in turn, what links hold, what may touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.files.octree import cells_of_tree
+from rrtik_ompl.files.strict_yaml import Location, YamlDocument
+from rrtik_ompl.problem_files.moveit_frames import Frames
+from rrtik_ompl.problem_files.moveit_messages import (
+    AllowedMatrix,
+    AttachedMessage,
+    CollisionObject,
+    PlacedOctomap,
+    RobotState,
+    SceneMessage,
+)
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
+from rrtik_ompl.shapes import Shape
+from rrtik_ompl.shapes.octree import Octree
+
+OCTOMAP = "<octomap>"  # MoveIt's name for it
+SHOWN = 3  # pairs in a warning
+
+
+@dataclass
+class _Object:
+    """An object: where it is in the world, its shapes and where they are in it, and frames in it."""
+
+    pose: pin.SE3
+    shapes: list[tuple[Shape, pin.SE3]] = field(default_factory=list)
+    parts: dict[str, pin.SE3] = field(default_factory=dict)
+
+
+class SceneReader:
+    """What the messages of one problem say of its scene.
+
+    Args:
+        robot: The arm, padded as the scene says.
+        frames: Learns the frames of the objects.
+        message: The scene.
+    """
+
+    def __init__(self, robot: Robot, frames: Frames, message: SceneMessage) -> None:
+        self._robot, self._frames, self._message = robot, frames, message
+        self._factors = {each.link_name: each.scale for each in message.link_scale}
+        self._objects: dict[str, _Object] = {}
+        self._held: dict[str, list[AttachedObject]] = {}
+        self._map: Obstacle | None = None
+
+    def read_world(self, document: YamlDocument) -> None:
+        """Read the objects of the world and its map.
+
+        Raises:
+            InputError: If one of them cannot be read; with file, line and key.
+        """
+        for k, item in enumerate(self._message.world.collision_objects):
+            with document.at(("world", "collision_objects", k)):
+                self._do(item)
+        with document.at(("world", "octomap", "octomap")):
+            self._map = _mapped(self._message.world.octomap, self._frames)
+
+    def hold(self, document: YamlDocument, location: Location, state: RobotState) -> None:
+        """Read what a state attaches to links; one of the name of an earlier one takes its place.
+
+        Raises:
+            InputError: If one of them cannot be read; with file, line and key.
+        """
+        for k, item in enumerate(state.attached_collision_objects):
+            with document.at((*location, "attached_collision_objects", k)):
+                self._attach(item)
+
+    def scene(self, document: YamlDocument) -> Scene:
+        """The scene.
+
+        Raises:
+            InputError: If names are used twice, or the table of allowed collisions is none.
+        """
+        names: dict[str, list[str]] = {}
+        obstacles = []
+        for name, item in self._objects.items():
+            names[name] = _numbered(name, len(item.shapes))
+            for part, (shape, place) in zip(names[name], item.shapes, strict=True):
+                obstacles.append(Obstacle(part, shape, item.pose * place))
+        if self._map is not None:
+            obstacles.append(self._map)
+            names[OCTOMAP] = [OCTOMAP]
+        attached = []
+        for name, parts in self._held.items():
+            names[name] = [part.name for part in parts]
+            attached += parts
+        with document.at(("world",)):
+            scene = Scene(tuple(obstacles), tuple(attached))
+        with document.at(("allowed_collision_matrix",)):
+            allowed = _allowed(self._message.allowed_collision_matrix, self._robot, names)
+            return Scene(scene.obstacles, scene.attached, allowed)
+
+    def _do(self, item: CollisionObject) -> None:
+        """Do with an object what its message says."""
+        if item.operation == "remove":
+            for name in [item.id] if item.id else list(self._objects):
+                self._objects.pop(name, None)
+                self._frames.forget(name)
+            return
+        _named(item)
+        item.check()
+        known = self._objects.get(item.id)
+        if item.operation == "move":
+            if known is None:
+                raise UnknownNameError("object to move", item.id, self._objects)
+            self._move(item, known)
+        elif item.operation == "append" and known is not None:
+            added = self._built(item)
+            own = known.pose.actInv(added.pose)
+            known.shapes += [(shape, own * place) for shape, place in added.shapes]
+            known.parts |= {name: own * place for name, place in added.parts.items()}
+        elif known is not None:
+            raise InputError(f"scene: the name '{item.id}' is used 2 times; names must differ")
+        else:
+            self._objects[item.id] = self._built(item)
+        placed = self._objects[item.id]
+        self._frames.add(item.id, _frame_of(item, placed), placed.parts)
+
+    def _move(self, item: CollisionObject, known: _Object) -> None:
+        """Bring an object, or each of its shapes, to another place."""
+        header = self._frames.pose(item.header.frame_id)
+        if item.pose.given:
+            known.pose = header * item.pose.build()
+        elif len(item.primitive_poses) == len(known.shapes):
+            known.pose = header
+            places = [place.build() for place in item.primitive_poses]
+            known.shapes = [(shape, place) for (shape, _), place in zip(known.shapes, places, strict=True)]
+        else:
+            raise InputError(f"'{item.id}': to move it, give its pose, or a pose for each of its primitives")
+
+    def _built(self, item: CollisionObject, factor: float = 1.0) -> _Object:
+        """An object as its message says."""
+        pose = self._frames.pose(item.header.frame_id) * item.pose.build()
+        solids = [solid.build(factor) for solid in item.primitives]
+        parts = dict(zip(item.subframe_names, [each.build() for each in item.subframe_poses], strict=True))
+        return _Object(pose, list(zip(solids, item.places(), strict=True)), parts)
+
+    def _attach(self, item: AttachedMessage) -> None:
+        """Give an object to a link: one of the message, or one of the world that it names."""
+        _named(item.object)
+        item.object.check()
+        if item.object.operation != "add":
+            raise InputError(f"'{item.object.id}': an attached object is added; leave out those that are not held")
+        if not self._robot.model.existFrame(item.link_name) or item.link_name not in self._robot.link_names:
+            raise UnknownNameError(f"link of robot '{self._robot.name}'", item.link_name, self._robot.link_names)
+        name, factor = item.object.id, self._factors.get(item.link_name, 1.0)
+        if item.object.primitives:
+            taken = self._built(item.object, factor)
+        elif name in self._objects:
+            taken = self._objects[name]
+        else:
+            raise InputError(f"'{name}' has no primitives, and the world has no object of that name")
+        self._objects.pop(name, None)
+        self._frames.forget(name)
+        T_link_object = self._frames.pose(item.link_name).actInv(taken.pose)
+        allow = tuple(link for link in item.touch_links if link in self._robot.link_names and link != item.link_name)
+        thick = self._robot.padding.get(item.link_name, 0.0)
+        self._held[name] = [
+            AttachedObject(part, item.link_name, shape, T_link_object * place, allow, thick)
+            for part, (shape, place) in zip(_numbered(name, len(taken.shapes)), taken.shapes, strict=True)
+        ]
+        frame = _frame_of(item.object, taken)
+        self._frames.add(name, frame, taken.parts, moves=self._frames.moves(item.link_name))
+
+
+def passed_over(matrix: AllowedMatrix, robot: Robot) -> str:
+    """A line about links that may not touch by a scene and that the robot never compares; "" for none."""
+    never = robot.allowed_collisions
+    pairs = [pair for pair, free in matrix.stated().items() if not free and frozenset(pair) in never]
+    if not pairs:
+        return ""
+    shown = ", ".join(" and ".join(sorted(pair)) for pair in pairs[:SHOWN]) + (", ..." if len(pairs) > SHOWN else "")
+    return (
+        f"robot '{robot.name}' never compares {shown}, by its own list (SRDF); the allowed_collision_matrix of the "
+        "scene does not allow that"
+    )
+
+
+def _named(item: CollisionObject) -> None:
+    if not item.id:
+        raise InputError("id: an object needs a name")
+
+
+def _numbered(name: str, count: int) -> list[str]:
+    """Names of the parts of an object: ``id``, then ``id_2``, ``id_3``..."""
+    return [name if k == 0 else f"{name}_{k + 1}" for k in range(count)]
+
+
+def _frame_of(item: CollisionObject, placed: _Object) -> pin.SE3:
+    """The frame by which others refer to an object: that of its only shape where it has no pose of its own."""
+    alone = len(placed.shapes) == 1 and not item.pose.given
+    return placed.pose * placed.shapes[0][1] if alone else placed.pose
+
+
+def _mapped(placed: PlacedOctomap, frames: Frames) -> Obstacle | None:
+    """The occupied cells of a map; None if there is none.
+
+    Raises:
+        InputError: If it is not a binary one, or its data are none.
+    """
+    if not placed.octomap.data:
+        return None
+    tree = placed.octomap
+    if not tree.binary:
+        raise InputError("data: only binary maps are read; write it with binary: true, or as a .bt file")
+    if not all(-128 <= value <= 255 for value in tree.data):
+        raise InputError("data: must be bytes")
+    body = np.array(tree.data, dtype=np.int64).astype(np.uint8).tobytes()
+    centres, sides = cells_of_tree(body, tree.resolution, tree.id, "data")
+    pose = frames.pose(placed.header.frame_id) * placed.origin.build()
+    return Obstacle(OCTOMAP, Octree(centres, sides), pose)
+
+
+def _allowed(matrix: AllowedMatrix, robot: Robot, names: dict[str, list[str]]) -> tuple[tuple[str, str], ...]:
+    """Pairs of links and solids that may touch: by the table, or else by what is said of one name and all others."""
+    links, stated = robot.link_names, matrix.stated()
+    allowed = [pair for pair, free in stated.items() if free and {*pair} <= {*links, *names}]
+    allowed += _by_default(matrix, [*links, *names])
+    found = []
+    for first, second in allowed:
+        between_links = first in links and second in links
+        if not (between_links and robot.allowed_collisions):
+            found += [(a, b) for a in names.get(first, [first]) for b in names.get(second, [second])]
+    return tuple(found)
+
+
+def _by_default(matrix: AllowedMatrix, every: list[str]) -> list[tuple[str, str]]:
+    """Pairs that may touch by what is said of one of them, or of both, and of which the table says nothing."""
+    defaults, stated = matrix.defaults(), {frozenset(pair) for pair in matrix.stated()}
+    found = []
+    for first, second in combinations(every, 2):
+        said = [defaults[name] for name in (first, second) if name in defaults]
+        if said and all(said) and frozenset((first, second)) not in stated:
+            found.append((first, second))
+    return found
