@@ -209,7 +209,7 @@ class TipWarning(UserWarning):
 
 
 class CloudWarning(UserWarning):
-    """A cloud of points is probably not what its author meant, but work can go on."""
+    """A cloud of points, or a grid of heights, is probably not what its author meant, but work can go on."""
 
 
 class SceneWarning(UserWarning):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import positive
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.files.octree import octree_points
+from rrtik_ompl.files.octree import octree_points, octree_resolution
 from rrtik_ompl.files.pcd import pcd_points
 from rrtik_ompl.files.ply import ply_points
 from rrtik_ompl.files.point_records import AXES, npy_rows, text_rows
@@ -28,15 +28,20 @@ PLY_HEADER = "ply\nformat binary_little_endian 1.0\nelement vertex {}\n" + "".jo
 
 
 def load_cloud(
-    path: str | os.PathLike[str], radius: float = RADIUS, *, scale: float = 1.0, invalid: Invalid = "refuse"
+    path: str | os.PathLike[str],
+    radius: float | None = None,
+    *,
+    scale: float = 1.0,
+    invalid: Invalid = "refuse",
 ) -> PointCloud:
     """Read a cloud of points: ``.npy`` (an array of shape (n, 3)), ``.ply``, ``.pcd``, ``.bt``, ``.xyz`` (text).
 
-    Of a map of OctoMap (``.bt``) it has the middle of each occupied cell; balls of half its diagonal cover the cells.
+    Of a map of OctoMap (``.bt``) it has the middle of each occupied cell; unless a radius is given, balls of half the
+    diagonal of the cells cover them.
 
     Args:
         path: The file.
-        radius: Of the ball that each point is [m].
+        radius: Of the ball that each point is [m]; if None, 0.01, or what covers the cells of a map.
         scale: Metres per unit of the file; 0.001 for millimetres.
         invalid: Whether points that are not finite are refused or dropped.
 
@@ -54,9 +59,14 @@ def load_cloud(
     suffix = Path(path).suffix.lower()
     if suffix not in _READERS:
         raise InputError(f"{path}: unknown kind of cloud; have {', '.join(_READERS)}; export it as PLY")
-    points = _READERS[suffix](read_bytes(path, MAX_BYTES), str(path))
+    data = read_bytes(path, MAX_BYTES)
+    points = _READERS[suffix](data, str(path))
     if factor != 1.0:
         points = points * factor
+    if radius is None:
+        radius = factor * 0.5 * np.sqrt(3.0) * octree_resolution(data, str(path)) if suffix == ".bt" else RADIUS
+        if suffix == ".bt":  # points are kept in single precision
+            radius += float(np.finfo(np.float32).eps) * float(np.abs(points).max(initial=0.0))
     return PointCloud(points, radius, invalid=invalid, source=os.path.abspath(path), scale=factor)
 
 

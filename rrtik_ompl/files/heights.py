@@ -9,15 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import positive
+from rrtik_ompl.arrays import finite_number, positive
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.files.picture_headers import picture_header, unstretched
 from rrtik_ompl.files.point_records import npy_rows, text_rows
 from rrtik_ompl.files.text import file_name, read_bytes
 from rrtik_ompl.shapes.height_field import HeightField
-from rrtik_ompl.shapes.point_cloud import Invalid
+from rrtik_ompl.shapes.point_cloud import Invalid, known_choice
 
 TABLES = (".csv", ".txt", ".xyz")
 PICTURES = (".png", ".tif", ".tiff", ".pgm")
+USUAL = (-9999.0, -99999.0, -32768.0, -32767.0)  # numbers that stand for no data in files that do not say so
 MAX_BYTES = 256 * 1024 * 1024
 
 
@@ -28,8 +30,9 @@ def load_height_field(
     *,
     scale: float = 1.0,
     invalid: Invalid = "refuse",
+    nodata: float | None = None,
 ) -> HeightField:
-    """Read a grid of heights: ``.npy``, rows of numbers (``.csv``, ``.txt``), or a grey picture of 8, 16 or 32 bits.
+    """Read a grid of heights: ``.npy``, rows of numbers (``.csv``, ``.txt``), or a grey picture of up to 32 bits.
 
     Rows of arrays and tables go along y, the first one first; a picture lies as it is seen from above, its upper edge
     at the far end of y. A value of 0 in a picture is a height of 0.
@@ -39,10 +42,15 @@ def load_height_field(
         cell: Side of a cell [m].
         floor: Where the solid ends below [m]; one cell below the lowest height if None.
         scale: Metres per unit of the file's heights; 0.001 for millimetres.
-        invalid: Whether heights that are not finite are refused or dropped.
+        invalid: Whether heights that are not finite, or stand for no data, are refused or dropped.
+        nodata: The number of the file that stands for no data. Without it the one that a TIFF names (GDAL_NODATA)
+            counts, and the usual ones (-9999, -32768...) are refused where they lie far below all heights.
 
     Raises:
-        InputError: If the file cannot be read, is broken, or makes no height field; one line.
+        InputError: If the file cannot be read, is broken, has cells without data, or makes no height field; one line.
+
+    Warns:
+        CloudWarning: If a few heights lie far beyond the rest.
 
     Example:
         >>> seabed = load_height_field("seabed.npy", cell=0.1)  # doctest: +SKIP
@@ -52,12 +60,70 @@ def load_height_field(
         have = ", ".join((".npy", *TABLES, *PICTURES))
         raise InputError(f"{path}: unknown kind of heights; have {have}; export it as one of these")
     data = read_bytes(path, MAX_BYTES)
+    what, mark = str(path), None if nodata is None else finite_number(nodata, f"{path}: nodata")
+    known_choice(invalid, what)
+    picture = suffix in PICTURES
     if suffix == ".npy":
-        rows = npy_rows(data, str(path))
+        rows = npy_rows(data, what)
+    elif picture:
+        header = picture_header(data, what)
+        rows = unstretched(_picture(data, what), header)
+        mark = header.nodata if mark is None else mark
     else:
-        rows = text_rows(data, None, str(path)) if suffix in TABLES else _picture(data, str(path))
+        rows = text_rows(data, None, what)
+    rows = _marked(rows, mark, invalid, what, from_above=picture)
     source = os.path.abspath(path)
-    return HeightField(factor * rows, cell, floor, invalid=invalid, source=source, scale=factor)
+    return HeightField(
+        factor * rows,
+        cell,
+        floor,
+        invalid=invalid,
+        source=source,
+        scale=factor,
+        nodata=None if nodata is None else mark,
+    )
+
+
+def _marked(rows: NDArray[Any], mark: float | None, invalid: Invalid, what: str, *, from_above: bool) -> NDArray[Any]:
+    """The heights, NaN where a number stands for no data.
+
+    Args:
+        rows: The heights of the file.
+        mark: The number; one that usually does, and lies far below all heights, is refused if None.
+        invalid: Whether such heights, and those that are not finite, are refused.
+        what: The file, for messages.
+        from_above: Whether the last row is the first one of the file.
+
+    Raises:
+        InputError: If there is such a height, with the place of the first one in the file.
+    """
+    guess = next((usual for usual in USUAL if _is_mark(rows, usual)), None) if mark is None else None
+    number = guess if mark is None else mark
+    missing = ~np.isfinite(rows)
+    if number is not None:
+        missing |= rows == (rows.dtype.type(number) if rows.dtype.kind == "f" else number)
+    if not missing.any():
+        return rows
+    if invalid == "refuse" or guess is not None:
+        in_file = missing[::-1] if from_above else missing
+        row, column = np.argwhere(in_file)[0].tolist()
+        some = f"{np.count_nonzero(missing)} of {rows.size} heights are no numbers"
+        remedy = "invalid='drop' leaves out their columns"
+        if number is not None:
+            some = f"{some} or {number:g}, which stands for no data"
+        if guess is not None:
+            remedy = f"nodata={guess:g} with invalid='drop' leaves out their columns; if it is a height, state another"
+        raise InputError(f"{what}: {some}, the first in row {row}, column {column} (from 0); {remedy}")
+    return np.where(missing, np.nan, rows)
+
+
+def _is_mark(rows: NDArray[Any], usual: float) -> bool:
+    """Whether a number that usually stands for no data is in a grid, far below all heights."""
+    found = rows[np.isfinite(rows)].astype(np.float64)
+    rest = found[found != usual]
+    if len(rest) == len(found):
+        return False
+    return len(rest) == 0 or float(rest.min()) - usual > float(np.ptp(rest))
 
 
 def _picture(data: bytes, what: str) -> NDArray[Any]:

@@ -93,13 +93,36 @@ def octree_points(data: bytes, what: str) -> Matrix:
     return resolution * (np.concatenate(found) + 0.5 - float(1 << (DEPTH - 1)))
 
 
-def _occupied(data: bytes, what: str) -> tuple[NDArray[np.float64], NDArray[np.float64], float, int]:
-    """Lowest corners of the occupied cells in finest cells, their levels, the size of the finest, the tree's end."""
+def octree_resolution(data: bytes, what: str) -> float:
+    """Side of the finest cells of a ``.bt`` file [unit of the file].
+
+    Raises:
+        InputError: If it is none.
+    """
+    return _resolution(_header(data, what)[0], what)
+
+
+def _header(data: bytes, what: str) -> tuple[dict[str, str], bytes]:
+    """What the header of a file says, and the tree after it."""
     head, found, body = data.partition(b"\ndata\n")
     if not data.startswith(FIRST_LINE) or not found:
         raise InputError(f"{what}: not a map of OctoMap: expected '{FIRST_LINE.decode()}' and a line 'data'")
     lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
-    return _cells_in(body, {line[0]: line[1] for line in lines if len(line) == 2 and line[0] != "#"}, what)
+    return {line[0]: line[1] for line in lines if len(line) == 2 and line[0] != "#"}, body
+
+
+def _resolution(header: dict[str, str], what: str) -> float:
+    """Side of the finest cells [unit of the file]."""
+    try:
+        return positive(float(header["res"]), f"{what}: res")
+    except (KeyError, ValueError):
+        raise InputError(f"{what}: its header needs a line 'res' with the size of a cell") from None
+
+
+def _occupied(data: bytes, what: str) -> tuple[NDArray[np.float64], NDArray[np.float64], float, int]:
+    """Lowest corners of the occupied cells in finest cells, their levels, the size of the finest, the tree's end."""
+    header, body = _header(data, what)
+    return _cells_in(body, header, what)
 
 
 def _cells_in(
@@ -108,10 +131,7 @@ def _cells_in(
     """The same, of a tree and what its header says."""
     if header.get("id", "OcTree") != "OcTree":
         raise InputError(f"{what}: a tree of type '{header['id'][:20]}' is unknown; write it as OcTree")
-    try:
-        resolution = positive(float(header["res"]), f"{what}: res")
-    except (KeyError, ValueError):
-        raise InputError(f"{what}: its header needs a line 'res' with the size of a cell") from None
+    resolution = _resolution(header, what)
     occupied: list[tuple[int, int, int, int]] = []
     open_, at = [(0, 0, 0, 0)] if body else [], 0
     while open_:

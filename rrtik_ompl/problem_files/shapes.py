@@ -55,7 +55,9 @@ class CloudEntry(Section):
     """A cloud of points: each is a ball of one radius."""
 
     file: Name = Field(description="NPY, PLY, PCD or XYZ file, relative to the folder of this file")
-    radius: Length = Field(RADIUS, description="of each point [m]")
+    radius: Length | None = Field(
+        None, description=f"of each point [m]; {RADIUS:g} if absent, of a BT file half the diagonal of its cells"
+    )
     scale: Positive = Field(1.0, description="metres per unit of the file")
     invalid: Invalid = Field("refuse", description="what is done with points that are not finite")
 
@@ -67,7 +69,8 @@ class HeightsEntry(Section):
     cell: Length = Field(description="side of a cell [m]")
     floor: Number | None = Field(None, description="where the ground ends below [m]; a cell below the lowest if absent")
     scale: Positive = Field(1.0, description="metres per unit of the file's heights")
-    invalid: Invalid = Field("refuse", description="what is done with heights that are not finite")
+    invalid: Invalid = Field("refuse", description="what is done with heights that are not finite, or no data")
+    nodata: Number | None = Field(None, description="number of the file that stands for no data")
 
 
 class OctreeEntry(Section):
@@ -81,7 +84,7 @@ _FILES: dict[type[Shape], tuple[type[Section], Callable[[Path, Any], Shape]]] = 
     PointCloud: (CloudEntry, lambda path, e: load_cloud(path, e.radius, scale=e.scale, invalid=e.invalid)),
     HeightField: (
         HeightsEntry,
-        lambda path, e: load_height_field(path, e.cell, e.floor, scale=e.scale, invalid=e.invalid),
+        lambda path, e: load_height_field(path, e.cell, e.floor, scale=e.scale, invalid=e.invalid, nodata=e.nodata),
     ),
     Octree: (OctreeEntry, lambda path, e: load_octree(path, scale=e.scale)),
 }  # kinds whose numbers come from a file, and what reads it
@@ -196,6 +199,7 @@ def _file_data(name: str, shape: PointCloud | HeightField | Octree, folder: Path
     if isinstance(shape, HeightField):
         data |= {"cell": shape.cell, "floor": shape.floor}
         data |= {"invalid": "drop"} if np.isnan(shape.heights).any() else {}
+        data |= {} if shape.nodata is None else {"nodata": shape.nodata}
     return data
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +10,11 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import LARGEST, Matrix, finite_number, frozen, length, number_rows, positive, whole_number
 from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.errors import CloudWarning, InputError, require
 from rrtik_ompl.shapes.box_pile import BoxPile, few_enough, merged
 from rrtik_ompl.shapes.point_cloud import Invalid, known_choice
 
+FEW, FAR = 0.05, 20.0  # share of the heights that are few; how many times the rest's extent, and the grid's, is far
 COARSER = "take .coarser(2), or a part of it"
 
 
@@ -29,6 +31,7 @@ class HeightField(BoxPile):
         floor: Where they begin along z [m].
         source: Path of the file it was read from, or "" if it is not as that file has it.
         scale: Metres per unit of that file, kept for writing the scene back.
+        nodata: The number that stands for no data in that file, likewise; None if nobody stated one.
 
     Args:
         heights: See above.
@@ -37,10 +40,14 @@ class HeightField(BoxPile):
         invalid: Whether heights that are not finite are refused, or dropped: no column is there.
         source: See above.
         scale: See above.
+        nodata: See above.
 
     Raises:
         InputError: If there is no height, heights are not numbers or not finite, one is not above the floor, or they
             are more boxes than a scene can hold.
+
+    Warns:
+        CloudWarning: If a few heights lie far beyond the rest: they are rather marks of missing data.
 
     Example:
         >>> seabed = rrtik.HeightField([[0.1, 0.1, 0.3], [0.1, 0.1, 0.2]], cell=0.5)
@@ -55,6 +62,7 @@ class HeightField(BoxPile):
     floor: float
     source: str
     scale: float
+    nodata: float | None
 
     __reduce__ = as_value
 
@@ -67,8 +75,10 @@ class HeightField(BoxPile):
         invalid: Invalid = "refuse",
         source: str = "",
         scale: float = 1.0,
+        nodata: float | None = None,
     ) -> None:
         require(source, str, "source of heights")
+        require(nodata, float | None, "nodata of heights")
         what = f"heights {source}" if source else "heights"
         rows = number_rows(heights, what).astype(np.float64)
         if rows.ndim != 2 or rows.size == 0:
@@ -76,7 +86,9 @@ class HeightField(BoxPile):
         finite = np.isfinite(rows)
         known_choice(invalid, what)
         if not finite.all() and invalid == "refuse":
-            some = f"{np.count_nonzero(~finite)} of {rows.size} heights are not finite"
+            row, column = np.argwhere(~finite)[0].tolist()
+            first = f"the first in row {row}, column {column} (from 0)"
+            some = f"{np.count_nonzero(~finite)} of {rows.size} heights are not finite, {first}"
             raise InputError(f"{what}: {some}; invalid='drop' leaves out their columns")
         if not finite.any():
             raise InputError(f"{what}: none of the {rows.size} heights is finite")
@@ -92,7 +104,10 @@ class HeightField(BoxPile):
         object.__setattr__(self, "floor", bottom)
         object.__setattr__(self, "source", source)
         object.__setattr__(self, "scale", positive(scale, f"{what}: scale"))
+        object.__setattr__(self, "nodata", nodata)
         few_enough(len(merged(self.heights)), what, COARSER)
+        if far := _far_beyond(rows, side):
+            warnings.warn(f"{what}: {far}; if that stands for no data, make it NaN or say nodata=", CloudWarning, 2)
 
     def __repr__(self) -> str:
         rows, columns = self.heights.shape
@@ -134,3 +149,21 @@ class HeightField(BoxPile):
         """
         size = length(step, "step of heights")
         return HeightField(np.ceil(self.heights / size - 1e-9) * size, self.cell, self.floor, invalid="drop")
+
+
+def _far_beyond(rows: Matrix, cell: float) -> str:
+    """What lies far above or below all but a few heights, in words; "" for nothing."""
+    heights = np.sort(rows[np.isfinite(rows)])
+    few, width = max(int(FEW * len(heights)), 1), cell * max(rows.shape)
+    for ends, word in ((heights, "below"), (-heights[::-1], "above")):
+        steps = np.diff(ends[: few + 1])
+        if len(steps) == 0:
+            continue
+        k = int(np.argmax(steps))
+        rest = ends[k + 1 :]
+        if steps[k] > FAR * max(float(rest[-1] - rest[0]), width):
+            value = float(heights[0] if word == "below" else heights[-1])
+            row, column = np.argwhere(rows == value)[0].tolist()
+            count = "1 height lies" if k == 0 else f"{k + 1} heights lie"
+            return f"{count} {steps[k]:.4g} m {word} all others: {value:g} m in row {row}, column {column} (from 0)"
+    return ""

@@ -1,12 +1,16 @@
 """Height fields and octrees in files: as others write them, in scenes, and what is wrong with a file in one line."""
 
+import contextlib
 import io
+import struct
+import warnings
+import zlib
 
 import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import CloudWarning, InputError
 from rrtik_ompl.shapes import same_shape
 
 HEIGHTS = np.array([[0.0, 0.5, 1.0], [1.5, 2.0, 2.5]])
@@ -111,3 +115,174 @@ def test_ground_made_in_memory_cannot_be_written(tmp_path):
         InputError, match="'ground': a height field made in memory cannot be written; load it from a file"
     ):
         rrtik.save_scene(scene, tmp_path / "scene.yaml")
+
+
+def tiff(rows, *tags, bits=32, photometric=1, order="<"):
+    """A TIFF of floats (or of 8 bits), with text tags (number, text) beside what it needs."""
+    body = rows.astype(f"{order}f4" if bits == 32 else "u1").tobytes()
+    texts = [(number, text.encode() + b"\0") for number, text in tags]
+    entries = {256: (3, rows.shape[1]), 257: (3, rows.shape[0]), 258: (3, bits), 259: (3, 1), 262: (3, photometric)}
+    entries |= {
+        273: (4, 8),
+        277: (3, 1),
+        278: (3, rows.shape[0]),
+        279: (4, len(body)),
+        339: (3, 3 if bits == 32 else 1),
+    }
+    count = len(entries) + len(texts)
+    start = 8 + len(body)
+    free, rest = start + 2 + 12 * count + 4, b""
+    table = []
+    for number, (kind, value) in entries.items():
+        value = struct.pack(f"{order}HH", value, 0) if kind == 3 else struct.pack(f"{order}I", value)
+        table.append((number, struct.pack(f"{order}HHI", number, kind, 1) + value))
+    for number, text in texts:
+        place = struct.pack(f"{order}I", free + len(rest)) if len(text) > 4 else text.ljust(4, b"\0")
+        table.append((number, struct.pack(f"{order}HHI", number, 2, len(text)) + place))
+        rest += text if len(text) > 4 else b""
+    head = (b"II*\0" if order == "<" else b"MM\0*") + struct.pack(f"{order}I", start)
+    listed = b"".join(entry for _, entry in sorted(table))
+    return head + body + struct.pack(f"{order}H", count) + listed + struct.pack(f"{order}I", 0) + rest
+
+
+def grey_png(rows, bits):
+    """A grey PNG of so many bits a height."""
+
+    def chunk(name, data):
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    lines = b""
+    for row in rows:
+        digits = "".join(f"{value:0{bits}b}" for value in row)
+        digits = digits.ljust(-(-len(digits) // 8) * 8, "0")
+        lines += b"\0" + int(digits, 2).to_bytes(len(digits) // 8, "big")
+    head = struct.pack(">IIBBBBB", len(rows[0]), len(rows), bits, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")
+
+
+def assert_comes_back(field, folder):
+    """From a scene that was written and read again."""
+    rrtik.save_scene(rrtik.Scene([rrtik.Obstacle("ground", field)]), folder / "scene.yaml")
+    again = rrtik.load_scene(folder / "scene.yaml").obstacle("ground").shape
+    np.testing.assert_array_equal(again.heights, field.heights)
+    assert (again.cell, again.floor, again.nodata) == (field.cell, field.floor, field.nodata)
+
+
+def holed(value, shape=(5, 5)):
+    """A flat grid of zeros, of which the height in row 1, column 3 is another."""
+    rows = np.zeros(shape)
+    rows[1, 3] = value
+    return rows
+
+
+def written(rows):
+    return "\n".join(",".join(map(repr, row)) for row in rows.tolist()).encode()
+
+
+@pytest.mark.parametrize("value", [-9999.0, -99999.0, -32768.0, np.nan, -np.inf])
+@pytest.mark.parametrize("kind", ["npy", "csv", "tif"])
+def test_cells_without_data_are_refused_with_their_place_and_left_out_on_a_word(kind, value, tmp_path):
+    if kind == "tif":
+        pytest.importorskip("cv2")
+    data = {"npy": npy, "csv": written, "tif": tiff}[kind](holed(value))
+    file = saved(tmp_path, f"a.{kind}", data)
+    with pytest.raises(InputError, match=r"1 of 25 heights .*first in row 1, column 3 .*invalid='drop'") as told:
+        rrtik.load_height_field(file, 0.5)
+    assert str(file) in str(told.value)
+    stated = {"nodata": value} if np.isfinite(value) else {}
+    if stated:
+        with pytest.raises(InputError, match=rf"{value:g}, which stands for no data.*nodata="):
+            rrtik.load_height_field(file, 0.5, invalid="drop")
+    field = rrtik.load_height_field(file, 0.5, -1.0, invalid="drop", **stated)
+    assert np.isnan(field.heights).sum() == 1
+    assert np.isnan(field.heights[3 if kind == "tif" else 1, 3])  # a picture lies as seen from above
+    assert_comes_back(field, tmp_path)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_the_number_that_a_tiff_names_stands_for_no_data(order, tmp_path):
+    pytest.importorskip("cv2")
+    file = saved(tmp_path, "a.tif", tiff(holed(7.5), (42113, "7.5"), order=order))
+    with pytest.raises(InputError, match=r"or 7\.5, which stands for no data, the first in row 1, column 3"):
+        rrtik.load_height_field(file, 0.5)
+    field = rrtik.load_height_field(file, 0.5, invalid="drop")
+    assert np.isnan(field.heights).sum() == 1
+    assert_comes_back(field, tmp_path)
+    other = rrtik.load_height_field(file, 0.5, nodata=-1.0)  # whoever states another one means it
+    assert other.heights.max() == 7.5
+
+
+def test_heights_among_the_others_are_heights_whatever_their_number(tmp_path):
+    file = saved(tmp_path, "a.npy", npy(np.array([[-12000.0, -9999.0], [-5000.0, 0.0]])))
+    assert rrtik.load_height_field(file, 1000.0, scale=0.001).heights.min() == -12.0
+
+
+@pytest.mark.parametrize("value", [-500.0, 800.0])
+def test_a_height_far_beyond_the_rest_is_warned_of_with_its_place(value, tmp_path):
+    file = saved(tmp_path, "a.npy", npy(holed(value)))
+    with pytest.warns(CloudWarning, match=rf"1 height lies .*: {value:g} m in row 1, column 3"):
+        rrtik.load_height_field(file, 0.5)
+    rng = np.random.default_rng(1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rrtik.HeightField(holed(3.0), 0.5)
+        rrtik.HeightField(rng.normal(size=(20, 20)), 0.5)
+        rrtik.HeightField(np.cumsum(rng.exponential(1.0, (6, 6)), axis=1), 0.5)
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4, 8])
+def test_grey_pictures_of_few_bits_have_the_heights_of_their_numbers(bits, tmp_path):
+    pytest.importorskip("cv2")
+    rows = np.arange(16).reshape(4, 4) % 2**bits
+    field = rrtik.load_height_field(saved(tmp_path, "a.png", grey_png(rows.tolist(), bits)), 0.5)
+    np.testing.assert_array_equal(field.heights, rows[::-1])
+
+
+def test_grey_maps_in_text_have_the_heights_of_their_numbers(tmp_path):
+    pytest.importorskip("cv2")
+    rows = np.arange(16).reshape(4, 4)
+    text = "P2 # a comment\n4 4\n15\n" + " ".join(map(str, rows.ravel())) + "\n"
+    np.testing.assert_array_equal(
+        rrtik.load_height_field(saved(tmp_path, "a.pgm", text.encode()), 0.5).heights, rows[::-1]
+    )
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"P1\n2 1\n0 1\n", "a bitmap of black and white holds no heights"),
+        (tiff(np.zeros((8, 8)), bits=1), "1 bits a height are stretched"),
+        (tiff(np.ones((2, 2)), bits=8, photometric=0), "white is 0"),
+        (tiff(np.ones((2, 2)), (42112, '<Item name="SCALE" sample="0" role="scale">0.1</Item>')), "a scale of 0.1"),
+    ],
+)
+def test_pictures_whose_numbers_are_no_heights_are_refused(data, message, tmp_path):
+    file = saved(tmp_path, "a.pgm" if data.startswith(b"P") else "a.tif", data)
+    with pytest.raises(InputError, match=message) as told:
+        rrtik.load_height_field(file, 0.5)
+    assert str(file) in str(told.value)
+
+
+def test_a_damaged_tiff_is_read_or_refused_wherever_it_is_cut(tmp_path):
+    pytest.importorskip("cv2")
+    whole = tiff(holed(1.0), (42113, "-9999"))
+    for size in range(0, len(whole), 7):
+        with contextlib.suppress(InputError):
+            rrtik.load_height_field(saved(tmp_path, "a.tif", whole[:size]), 0.5)
+
+
+def test_the_balls_of_a_map_cover_its_cells_unless_a_radius_is_given(tmp_path):
+    path = b"".join(bytes([0, 0b11000000]) for _ in range(14)) + bytes([0b10, 0b10000000]) + bytes([0b10, 0])
+    file = saved(tmp_path, "map.bt", HEAD + path[:-2])
+    cloud, tree = rrtik.load_cloud(file), rrtik.load_octree(file)
+    corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
+    for centre, side in zip(tree.centres, tree.sides, strict=True):
+        for corner in centre + side * corners:
+            assert np.linalg.norm(cloud.points.astype(np.float64) - corner, axis=1).min() <= cloud.radius
+    assert cloud.radius == pytest.approx(0.05 * np.sqrt(3.0), rel=0.01)
+    half = rrtik.load_cloud(file, scale=0.5)
+    assert half.radius == pytest.approx(0.5 * cloud.radius)
+    assert rrtik.load_cloud(file, 0.02).radius == 0.02
+    scene = {"obstacles": [{"name": "map", "cloud": {"file": "map.bt"}}]}
+    (tmp_path / "scene.yaml").write_text(str({"version": 1, "scene": scene}).replace("'", ""))
+    assert rrtik.load_scene(tmp_path / "scene.yaml").obstacle("map").shape.radius == cloud.radius

@@ -58,7 +58,7 @@ def test_a_coarser_field_contains_the_finer_one():
 @pytest.mark.parametrize(
     ("heights", "cell", "options", "message"),
     [
-        ([[0.0, np.nan]], 0.1, {}, "1 of 2 heights are not finite; invalid='drop' leaves out their columns"),
+        ([[0.0, np.nan]], 0.1, {}, "1 of 2 heights are not finite, the first in row 0, column 1 .*; invalid='drop'"),
         ([[np.nan]], 0.1, {"invalid": "drop"}, "none of the 1 heights is finite"),
         ([[np.inf, 1e12]], 0.1, {"invalid": "drop"}, "too far away; check their unit"),
         (np.zeros((0, 3)), 0.1, {}, "expected rows of numbers"),

@@ -1,0 +1,113 @@
+"""What the headers of grey pictures say of their numbers: how many bits they had, and which one stands for no data."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.errors import InputError
+
+PNG, PNG_BITS, PNG_COLOUR = b"\x89PNG\r\n\x1a\n", 24, 25  # signature; places of the bits of a sample, of its kind
+BITS, PHOTOMETRIC, GDAL_METADATA, GDAL_NODATA = 258, 262, 42112, 42113  # tags of TIFF
+TIFF_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 11: 4, 12: 8, 16: 8}  # bytes of the types of values
+MOST_TAGS = 4096
+
+
+@dataclass(frozen=True)
+class PictureHeader:
+    """What a reader of pictures does not say.
+
+    Attributes:
+        most: The largest number of the file where the reader stretches it to 255; None where it does not.
+        nodata: The number that stands for no data, None if there is none.
+    """
+
+    most: int | None = None
+    nodata: float | None = None
+
+
+def picture_header(data: bytes, what: str) -> PictureHeader:
+    """What the header of a picture says.
+
+    Raises:
+        InputError: If its numbers are no heights: a bitmap, a picture whose white is 0, or scaled by what it says.
+    """
+    if data.startswith(PNG) and len(data) > PNG_COLOUR:
+        bits, grey = data[PNG_BITS], data[PNG_COLOUR] == 0
+        return PictureHeader(most=2**bits - 1 if grey and bits < 8 else None)
+    if data[:2] in (b"P1", b"P4"):
+        raise InputError(f"{what}: a bitmap of black and white holds no heights; save it as a grey PNG of 16 bits")
+    if data.startswith(b"P2"):
+        words = re.sub(rb"#[^\n]*", b" ", data[:4096]).split()
+        most = int(words[3]) if len(words) > 3 and words[3].isdigit() else 255
+        return PictureHeader(most=most if most < 255 else None)
+    if data[:2] in (b"II", b"MM"):
+        return _tiff_header(data, what)
+    return PictureHeader()
+
+
+def unstretched(rows: Matrix, header: PictureHeader) -> Matrix:
+    """The numbers of the file, from those of a reader that stretches them to 255."""
+    if header.most is None:
+        return rows
+    return np.round(rows * (header.most / 255.0))
+
+
+def _tiff_header(data: bytes, what: str) -> PictureHeader:
+    tags = dict(_tags(data))
+    bits = min(_numbers(tags.get(BITS)), default=1)
+    if bits < 8:
+        raise InputError(f"{what}: {bits} bits a height are stretched by readers; save it with 8 bits or more")
+    if _numbers(tags.get(PHOTOMETRIC))[:1] == [0]:
+        raise InputError(f"{what}: a picture whose white is 0 (WhiteIsZero); save it with black as 0")
+    for role in re.findall(rb'role="(scale|offset)"[^>]*>([^<]*)<', tags.get(GDAL_METADATA, (0, b""))[1]):
+        neutral = 1.0 if role[0] == b"scale" else 0.0
+        if (given := _number(role[1])) is not None and given != neutral:
+            said = f"{role[0].decode()} of {given:g}"
+            raise InputError(f"{what}: its heights have a {said} (GDAL's metadata); save the heights themselves")
+    return PictureHeader(nodata=_number(tags.get(GDAL_NODATA, (0, b""))[1]))
+
+
+def _tags(data: bytes) -> Iterator[tuple[int, tuple[int, bytes]]]:
+    """Number, type and bytes of each tag of the first picture of a TIFF; what is damaged ends them."""
+    order = "<" if data[:2] == b"II" else ">"
+    try:
+        (magic,) = struct.unpack_from(f"{order}H", data, 2)
+        big = magic == 43
+        (at,) = struct.unpack_from(f"{order}{'Q' if big else 'I'}", data, 8 if big else 4)
+        (count,) = struct.unpack_from(f"{order}{'Q' if big else 'H'}", data, at)
+        at += 8 if big else 2
+        for _ in range(min(count, MOST_TAGS)):
+            tag, kind, values = struct.unpack_from(f"{order}HH{'Q' if big else 'I'}", data, at)
+            inline, size = (8, 20) if big else (4, 12)
+            length, place = TIFF_SIZES.get(kind, 1) * values, at + size - inline
+            if length > inline:
+                (place,) = struct.unpack_from(f"{order}{'Q' if big else 'I'}", data, place)
+            found = data[place : place + length]
+            # numbers are kept as little-endian ones of two bytes: of those that matter there are no others
+            short = kind == 3 and order == ">"
+            yield tag, (kind, np.frombuffer(found, dtype=">u2").astype("<u2").tobytes() if short else found)
+            at += size
+    except (struct.error, ValueError):
+        return
+
+
+def _numbers(tag: tuple[int, bytes] | None) -> list[int]:
+    """The numbers of two bytes of a tag; none if it has others."""
+    if tag is None or tag[0] != 3:
+        return []
+    return [int(value) for value in np.frombuffer(tag[1][: len(tag[1]) // 2 * 2], dtype="<u2")]
+
+
+def _number(text: bytes) -> float | None:
+    """The number in a text; None if there is none, or it is not finite."""
+    try:
+        value = float(text.split(b"\0")[0].strip() or b"nan")
+    except ValueError:
+        return None
+    return value if np.isfinite(value) else None
