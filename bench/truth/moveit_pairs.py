@@ -256,7 +256,7 @@ CASES: dict[str, Case] = {
         {},
         {
             "start_state": base_at(pose(0, 0, 1)),
-            "goal_constraints": [{"position_constraints": [ball(pose(*AT_ONE), target_point_offset=[0, 0, 0])]}],
+            "goal_constraints": [{"position_constraints": [ball(pose(1, 0, 0.2), target_point_offset=[0, 0, 0])]}],
         },
         obstacles=((coal.Box(0.2, 1.0, 1.0), at(0.5, 0.0, 1.0)),),
         base=at(0, 0, 1),
@@ -299,14 +299,14 @@ CASES: dict[str, Case] = {
         goal=lambda tip: bool((np.abs(tip - [1.2, 0.0, 0.2]) <= [0.2, 0.01, 0.01]).all()),
     ),
     "a goal in a frame that does not exist": Case(
-        {}, {"goal_constraints": [{"position_constraints": [ball(pose(*AT_ONE), "nosuchframe")]}]}, "'nosuchframe'"
+        {}, {"goal_constraints": [{"position_constraints": [ball(pose(1, 0, 0.2), "nosuchframe")]}]}, "'nosuchframe'"
     ),
     "a goal free about z": Case(
         {},
         {
             "goal_constraints": [
                 {
-                    "position_constraints": [ball(pose(*AT_ONE))],
+                    "position_constraints": [ball(pose(1, 0, 0.2))],
                     "orientation_constraints": [turned([0.1, 0.1, 3.15], TWO_RADIANS)],
                 }
             ]

@@ -47,7 +47,7 @@ def _listed(keys: str) -> BeforeValidator:
         if not isinstance(value, dict):
             return value
         for key in value:
-            if key not in keys:
+            if key not in tuple(keys):
                 raise PydanticCustomError("unread", "'{name}' is no coordinate", {"name": str(key)})
         return [value.get(key, 0.0) for key in keys]
 

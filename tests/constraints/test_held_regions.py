@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from bench.truth.scenes import tolerances
 from rrtik_ompl.constraints.held_region import Turning
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows, residual
@@ -307,3 +308,21 @@ def test_a_motion_may_begin_at_the_very_rim_of_a_region(ur5):
     down = START - 1e-3 * ur5.fk_jacobian_batch(START[None], ur5.tip)[1][0, 2]
     assert held.motions_held(START[None], down[None]).all()
     assert not held.motions_held(START[None], (2.0 * START - down)[None]).any()
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize(
+    ("name", "kind", "share"),
+    [
+        ("panda", "line", 0.01),
+        ("ur5_limited", "plane", 0.05),
+        ("titan4", "upright", 0.02),
+        ("panda", "orientation", 1.0),
+    ],
+)
+def test_generated_paths_keep_small_tolerances_on_whole_motions_by_pinocchio(name, kind, share):
+    seen = tolerances(name, kind, 0, 2, share)
+    assert seen.found > 0
+    assert seen.proven == seen.found
+    assert seen.metres <= 1e-9
+    assert seen.degrees <= 1e-9
