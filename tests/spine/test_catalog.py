@@ -76,7 +76,7 @@ def test_an_unknown_name_lists_the_alternatives():
 def test_an_option_that_does_not_apply_names_those_that_do():
     with pytest.raises(
         InputError,
-        match=r"'titan4' takes no option 'group'; it takes base_pose, joint_ranges, joint_weights, lengths, limits, pad",
+        match=r"'titan4' takes no option 'group'; it takes base_pose, joint_ranges, joint_weights, lengths, limits",
     ):
         load_robot("titan4", group="arm")
 
