@@ -265,9 +265,7 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
         digest, seed, near = str(data["digest"]), data.count("seed"), data.count("near")
         rows = finite_array(data["rows"], (None, world.robot.dof), "vertices")
         edges, states = data.whole("edges"), data.whole("states")
-        wrong = edges.ndim != 2 or edges.shape[1] != 2 or states.shape != (len(edges),) or not 1 <= near <= 100
-        ends = len(edges) and not 0 <= edges.min() <= edges.max() < len(rows)
-        if wrong or ends or (len(states) and not 0 <= states.min() <= states.max() <= BLOCKED):
+        if not 1 <= near <= 100 or not _fit(edges, states, len(rows)):
             raise InputError("its edges make no sense")
         kept = finite_array(data["kept"], (2,), "kept").tolist() if "kept" in data else [0.0, NOT_PROVING]
         same_checks = positive(data["resolution"], "resolution") == world.motion_resolution and kept == _kept(world)
@@ -280,6 +278,15 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
     if moved is not True and digest != found:
         raise InputError(f"{path}: is the roadmap of another world; load it with moved=True, or make a new one")
     return _restored(world, rows, *known, seed=seed, near=near).moved_to(world)
+
+
+def _fit(edges: NDArray[np.int64], states: NDArray[np.int64], count: int) -> bool:
+    """Whether edges and what is known of each are those of a graph of so many vertices."""
+    if edges.ndim != 2 or edges.shape[1] != 2 or states.shape != (len(edges),):
+        return False
+    if not len(edges):
+        return True
+    return bool(0 <= edges.min() <= edges.max() < count and 0 <= states.min() <= states.max() <= BLOCKED)
 
 
 def _kept(world: World) -> list[float]:

@@ -131,9 +131,9 @@ def test_a_world_keeps_its_motion_table_and_makes_another_for_other_rules() -> N
     assert world.motions is motions
     careful = world.with_accuracy("conservative")
     assert careful.motions is motions  # it differs in what is asked of coal alone
-    world.motion_resolution *= 0.5
-    assert world.motions.resolution == 0.5 * motions.resolution
-    assert world.motions.fast is motions.fast
+    finer = world.with_resolution(0.5 * world.motion_resolution)
+    assert finer.motions.resolution == 0.5 * motions.resolution
+    assert finer.motions.fast is motions.fast
 
 
 def test_the_motion_table_of_a_moving_world_stays_when_obstacles_move() -> None:
