@@ -25,8 +25,9 @@ def with_trust(command: Callable[..., int]) -> Callable[..., int]:
             return command(**given)
 
     option = inspect.Parameter("trust_xacro", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=TrustXacro)
-    signature = inspect.signature(command)
+    signature = inspect.signature(command, eval_str=True)  # typer looks names up where the wrapper is, not the command
     shown = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values()]
     run.__signature__ = signature.replace(parameters=[*shown, option])  # type: ignore[attr-defined]
-    run.__annotations__ = {**command.__annotations__, "trust_xacro": TrustXacro}
+    run.__annotations__ = {each.name: each.annotation for each in (*shown, option)}
+    run.__annotations__["return"] = signature.return_annotation
     return run
