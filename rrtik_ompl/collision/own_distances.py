@@ -6,20 +6,21 @@ their angle is below 2e-14 m^4: two of a millimetre may overlap by a tenth of th
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import coal
 import numpy as np
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.cloud_solid import Ends, Nearest, cloud_gap, has_cloud, nearest_of_cloud
+from rrtik_ompl.collision.shape_table import Core, core_of
 
 Segment: TypeAlias = tuple[Vector, Vector]
 
 
 def is_ours(ends: Ends) -> bool:
     """Whether the distance of two geometries is measured here, and not by coal."""
-    return has_cloud(ends) or (isinstance(ends[0], coal.Capsule) and isinstance(ends[2], coal.Capsule))
+    return has_cloud(ends) or (_is_capsule(ends[0]) and _is_capsule(ends[2]))
 
 
 def own_gap(ends: Ends, margin: float) -> float | None:
@@ -38,7 +39,7 @@ def own_nearest(ends: Ends) -> Nearest:
     one, other = nearest_points(first, second)
     between = other - one
     apart = float(np.linalg.norm(between))
-    radii = [capsule.radius + float(capsule.getSweptSphereRadius()) for capsule in (ends[0], ends[2])]
+    radii = [_core(capsule).radius + float(capsule.getSweptSphereRadius()) for capsule in (ends[0], ends[2])]
     way = between / apart if apart > 0.0 else _across(first, second)
     return Nearest(apart - radii[0] - radii[1], one + radii[0] * way, other - radii[1] * way)
 
@@ -76,11 +77,21 @@ def _foot(point: Vector, segment: Segment) -> Vector:
     return np.asarray(segment[0] + share * along)
 
 
-def _axis(capsule: coal.Capsule, pose: coal.Transform3s) -> Segment:
+def _is_capsule(geometry: coal.CollisionGeometry) -> bool:
+    """Whether a geometry is all that is no farther than a radius from a segment."""
+    core = core_of(geometry)
+    return core is not None and core.rounded and len(core.corners) == 2
+
+
+def _core(capsule: coal.CollisionGeometry) -> Core:
+    return cast(Core, core_of(capsule))
+
+
+def _axis(capsule: coal.CollisionGeometry, pose: coal.Transform3s) -> Segment:
     """Ends of a capsule's axis in the world."""
-    middle = np.array(pose.getTranslation())
-    half = capsule.halfLength * np.array(pose.getRotation())[:, 2]
-    return middle - half, middle + half
+    rotation = np.array(pose.getRotation())
+    first, second = _core(capsule).corners @ rotation.T + np.array(pose.getTranslation())
+    return first, second
 
 
 def _across(first: Segment, second: Segment) -> Vector:
