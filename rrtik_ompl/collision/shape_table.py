@@ -259,6 +259,15 @@ def sizes_of(geometry: Any) -> Vector | None:
     return None if row is None else row.sizes(geometry)
 
 
+def resized(geometry: Any, factor: float) -> Any:
+    """A coal geometry whose sizes are a factor larger, about its own frame; None if its kind is in no row."""
+    row = _BY_GEOMETRY.get(type(geometry))
+    if row is None:
+        return None
+    shape = row.shape(*(factor * row.sizes(geometry)).tolist())
+    return pieces(shape)[0].geometry
+
+
 def has_core(geometry: coal.CollisionGeometry) -> bool:
     """Whether a coal geometry has one of the simple cores."""
     row = _BY_GEOMETRY.get(type(geometry))

@@ -10,6 +10,7 @@ import coal
 import pinocchio as pin
 
 from rrtik_ompl.arrays import positive
+from rrtik_ompl.collision.shape_table import resized
 from rrtik_ompl.collision.solids import bvh, hull, is_mesh, mesh_arrays
 from rrtik_ompl.description.named_numbers import by_name
 from rrtik_ompl.errors import InputError, require
@@ -65,14 +66,9 @@ def scaled(robot: Robot, scale: Mapping[str, float]) -> Robot:
 
 def _scaled(geometry: coal.CollisionGeometry, factor: float, what: str) -> coal.CollisionGeometry:
     """A coal solid of another size, in the same place."""
-    if isinstance(geometry, coal.Box):
-        return coal.Box(2.0 * factor * geometry.halfSide)
-    if isinstance(geometry, coal.Sphere):
-        return coal.Sphere(factor * geometry.radius)
-    if isinstance(geometry, coal.Cylinder):
-        return coal.Cylinder(factor * geometry.radius, 2.0 * factor * geometry.halfLength)
-    if isinstance(geometry, coal.Capsule):
-        return coal.Capsule(factor * geometry.radius, 2.0 * factor * geometry.halfLength)
+    known = resized(geometry, factor)
+    if known is not None:
+        return known
     if is_mesh(geometry):
         vertices, triangles = mesh_arrays(geometry)
         middle = vertices.mean(axis=0)
