@@ -8,7 +8,7 @@ from rrtik_ompl import Alternatives, Attach, Detach, Gripper, MoveTo, Straight, 
 hand = rrtik.load_robot("panda").gripper
 robot = rrtik.load_robot("panda", locked=hand.posture("open"))
 table = rrtik.Obstacle("table", rrtik.Box([0.7, 1.2, 0.04]), [0.55, 0.0, 0.18])
-cup = rrtik.Obstacle("cup", rrtik.Box([0.05, 0.05, 0.1]), [0.5, 0.25, 0.252])
+cup = rrtik.Obstacle("cup", rrtik.Box([0.05, 0.05, 0.1]), [0.5, 0.25, 0.25])  # it stands on the table
 world = rrtik.World(robot, rrtik.Scene([table, cup]))
 
 
@@ -23,6 +23,7 @@ stages = [Alternatives([grasp(0.0), grasp(np.pi / 2)]), Straight(by=[0, 0, 0.12]
 stages += [MoveTo(place), Straight(by=[0, 0, -0.12]), Detach("cup"), Gripper("open"), Straight(by=[0, 0, 0.12])]
 plan = Task(stages).plan(world, "ready", seed=1)
 assert plan.found, plan.reason
+print(*plan.notes, sep="\n")
 
 timed = rrtik.time_task(plan, pause=0.5)
 print(f"{len(plan.stages)} stages, grasp {plan.chosen[0] + 1}, {timed.trajectory.duration:.1f} s")

@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.scene import Obstacle as Obstacle
     from rrtik_ompl.scene import Scene as Scene
     from rrtik_ompl.scene import TimedPoses as TimedPoses
+    from rrtik_ompl.scene import Touching as Touching
     from rrtik_ompl.search.roadmap import Roadmap as Roadmap
     from rrtik_ompl.search.roadmap import load_roadmap as load_roadmap
     from rrtik_ompl.shapes import Box as Box
@@ -176,7 +177,7 @@ else:
         "robot": ("Robot",),
         "replanning.in_time": ("TimedPlan", "plan_in_time"),
         "replanning.scenario": ("Scenario", "load_scenario"),
-        "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses"),
+        "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses", "Touching"),
         "problem_files.scene": ("load_scene", "save_scene"),
         "search.roadmap": ("Roadmap", "load_roadmap"),
         "shapes": (

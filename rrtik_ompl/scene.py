@@ -138,7 +138,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AttachedObject:
-    """A solid held by a link. ``pose`` is T_link_object; ``allow`` names further links that it may touch.
+    """A solid held by a link. ``pose`` is T_link_object; ``allow`` names what it may touch beside that link.
 
     Both lengths are what it keeps from all that it may not touch, on top of the margins of others: ``margin`` [m] is
     its own, as that of an obstacle is, and becomes it again when it is set down; ``padding`` [m] is that of the grasp,
@@ -167,13 +167,65 @@ class AttachedObject:
             raise InputError(f"a {kind} cannot be attached to a link: '{self.name}'")
 
 
+@dataclass(frozen=True, slots=True)
+class Touching:
+    """Two things that are in contact, and how near each other they may come; margins and paddings do not add to that.
+
+    A task makes these for what touches when it is taken or set down, and they end when the two have parted.
+
+    Attributes:
+        first, second: Names; one of them at least is an obstacle or attached object.
+        distance: The least distance that they must keep [m]; negative is the depth to which they may overlap.
+
+    Example:
+        >>> print(rrtik.Touching("cup", "table", -0.001))
+        'cup' and 'table' may overlap by 1 mm
+    """
+
+    first: str
+    second: str
+    distance: float
+
+    def __post_init__(self) -> None:
+        for name in self.names:
+            name_of(name, "a thing that touches another")
+        if self.first == self.second:
+            raise InputError(f"contacts of a scene: '{self.first}' stands twice in a pair; name two things")
+        what = f"distance of '{self.first}' and '{self.second}'"
+        object.__setattr__(self, "distance", float(bounded_array(self.distance, (), what)))
+
+    def __str__(self) -> str:
+        pair = f"'{self.first}' and '{self.second}'"
+        if self.distance < 0.0:
+            return f"{pair} may overlap by {-1e3 * self.distance:.3g} mm"
+        return f"{pair} must stay {1e3 * self.distance:.3g} mm apart"
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Both names."""
+        return self.first, self.second
+
+    @property
+    def pair(self) -> frozenset[str]:
+        """Both names, in no order."""
+        return frozenset(self.names)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Obstacles, attached objects and the pairs of names that may touch. ``Scene()`` is the empty one."""
+    """Obstacles, attached objects, and the pairs of names that may touch. ``Scene()`` is the empty one.
+
+    Attributes:
+        obstacles: What stands or moves by itself.
+        attached: What links hold.
+        allowed_collisions: Pairs of names that are never checked.
+        contacts: Pairs that are in contact, and how far they may overlap.
+    """
 
     obstacles: tuple[Obstacle, ...] = ()
     attached: tuple[AttachedObject, ...] = ()
     allowed_collisions: tuple[tuple[str, str], ...] = ()
+    contacts: tuple[Touching, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "obstacles", listed(self.obstacles, "obstacles of a scene"))
@@ -189,6 +241,9 @@ class Scene:
         if any(len(pair) != 2 for pair in pairs):
             raise InputError(f"allowed_collisions of a scene must be pairs of names, got {list(pairs)}")
         object.__setattr__(self, "allowed_collisions", pairs)
+        object.__setattr__(self, "contacts", listed(self.contacts, "contacts of a scene"))
+        for contact in self.contacts:
+            require(contact, Touching, "each contact of a scene")
         names = self.names
         if len(set(names)) < len(names):
             name, times = Counter(names).most_common(1)[0]
@@ -236,6 +291,7 @@ class Scene:
             tuple(o for o in self.obstacles if o.name not in names),
             tuple(a for a in self.attached if a.name not in names),
             tuple(pair for pair in self.allowed_collisions if not set(pair) & set(names)),
+            tuple(contact for contact in self.contacts if not contact.pair & set(names)),
         )
 
     def attaching(
@@ -249,7 +305,8 @@ class Scene:
     ) -> Scene:
         """The scene in which an obstacle has become an attached object; pairs that may touch still may.
 
-        It keeps its margin; a motion that it had ends.
+        It keeps its margin; a motion that it had ends. What ``allow`` names may touch it until it is set down: a scene
+        knows no posture of the arm, so that it cannot say how deep. :class:`rrtik_ompl.Task` can, and does.
 
         Args:
             name: Of the obstacle.
@@ -265,18 +322,17 @@ class Scene:
         taken, rest = self.obstacle(name), self.without(name)
         place = pin.SE3.Identity() if pose is None else pose
         held = AttachedObject(name, link, taken.shape, place, padding=padding, margin=taken.margin)
-        beside = set(rest.names)
         names = listed(allow, f"allow of '{name}'")
         for other in names:
             require(other, str, f"each name of allow of '{name}'")
-        pairs = (*self.allowed_collisions, *((name, other) for other in names if other in beside))
-        links = tuple(other for other in names if other not in beside)
-        return Scene(rest.obstacles, (*rest.attached, replace(held, allow=links)), pairs)
+        attached = (*rest.attached, replace(held, allow=names))
+        return Scene(rest.obstacles, attached, self.allowed_collisions, self.contacts)
 
     def detaching(self, name: str, pose: ArrayLike | pin.SE3) -> Scene:
-        """The scene in which an attached object is an obstacle at T_world_object; pairs that may touch still may.
+        """The scene in which an attached object is an obstacle at T_world_object.
 
-        Its margin is the obstacle's; its padding ends with the grasp.
+        Its margin is the obstacle's. What was for the grasp ends with it: padding, what it was allowed to touch, and
+        contacts of what was held.
 
         Raises:
             UnknownNameError: If there is no attached object of that name.
@@ -288,7 +344,8 @@ class Scene:
             raise UnknownNameError("attached object", name, held)
         item = held.pop(name)
         free = Obstacle(name, item.shape, pose, margin=item.margin)
-        return Scene((*self.obstacles, free), tuple(held.values()), self.allowed_collisions)
+        contacts = tuple(contact for contact in self.contacts if name not in contact.pair)
+        return Scene((*self.obstacles, free), tuple(held.values()), self.allowed_collisions, contacts)
 
     def at(self, time: float) -> Scene:
         """The scene with ``time`` [s] as its time 0: moving obstacles are where their motion puts them, and go on.

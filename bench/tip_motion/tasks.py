@@ -50,13 +50,13 @@ def panda_case(number: int) -> Case:
     rng = np.random.default_rng([7, number])
     hand = rrtik.load_robot("panda").gripper
     robot = rrtik.load_robot("panda", locked=hand.posture("open"))
-    at, up = np.array([rng.uniform(0.4, 0.6), rng.uniform(0.1, 0.35), 0.252]), np.array([0.0, 0.0, 0.12])
+    at, up = np.array([rng.uniform(0.4, 0.6), rng.uniform(0.1, 0.35), 0.25]), np.array([0.0, 0.0, 0.12])
     things = [
         rrtik.Obstacle("table", rrtik.Box([0.7, 1.2, 0.04]), [0.55, 0.0, 0.18]),
         rrtik.Obstacle("cup", rrtik.Box([0.05, 0.05, 0.1]), at),
         rrtik.Obstacle("wall", rrtik.Box([0.4, 0.02, height := rng.uniform(0.1, 0.3)]), [0.5, 0.0, 0.2 + 0.5 * height]),
     ]
-    spots = [np.array([rng.uniform(0.4, 0.6), rng.uniform(-0.35, -0.1), 0.252]) for _ in range(2)]
+    spots = [np.array([rng.uniform(0.4, 0.6), rng.uniform(-0.35, -0.1), 0.25]) for _ in range(2)]
     things += list(_posts(rng, 3, [at, *spots], [0.3, -0.5, 0.2], [0.8, 0.5, 0.2], 0.25))
 
     def grip(place: np.ndarray, yaw: float) -> pin.SE3:
@@ -82,13 +82,13 @@ def titan4_case(number: int) -> Case:
     """A TITAN 4 that takes a tool by its handle from one side of a shelf and puts it on the other."""
     rng = np.random.default_rng([8, number])
     robot = rrtik.load_robot("titan4")
-    at = np.array([rng.uniform(1.25, 1.5), rng.uniform(0.2, 0.5), 0.002])
+    at = np.array([rng.uniform(1.25, 1.5), rng.uniform(0.2, 0.5), 0.0])
     things = [
         rrtik.Obstacle("shelf", rrtik.Box([0.8, 1.6, 0.04]), [1.4, 0.0, -0.22]),
         rrtik.Obstacle("tool", rrtik.Box([0.06, 0.06, 0.4]), at),
         rrtik.Obstacle("wall", rrtik.Box([0.4, 0.04, height := rng.uniform(0.1, 0.3)]), [1.4, 0.0, 0.5 * height - 0.2]),
     ]
-    spots = [np.array([rng.uniform(1.25, 1.5), rng.uniform(-0.5, -0.2), 0.002]) for _ in range(2)]
+    spots = [np.array([rng.uniform(1.25, 1.5), rng.uniform(-0.5, -0.2), 0.0]) for _ in range(2)]
     things += list(_posts(rng, 3, [at, *spots], [1.1, -0.8, -0.2], [1.8, 0.8, -0.2], 0.4))
     scene = rrtik.Scene(things, allowed_collisions=[("gripper", "tool")])
 

@@ -23,7 +23,7 @@ from rrtik_ompl.collision.certificate import fixed_contact
 from rrtik_ompl.collision.contacts import measured
 from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.digests import robot_digest, scene_digest
-from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart
+from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, keeps_clearance, kept_apart
 from rrtik_ompl.fast.tables.layout import CONVEX_SOLID, HALF_SPACE_SOLID
 from rrtik_ompl.fast.tables.solid_tables import UNKNOWN, ConvexSolid, convex_solids, placed_solids
 from rrtik_ompl.robot import Chain
@@ -108,7 +108,7 @@ class Motions:
         self.pairs = [(i, j) if joints[j] == base else (j, i) for i, j, base in moving]
         self.bases = np.array([base for _, _, base in moving], dtype=np.int64)
         both = [(self.bodies[i], self.bodies[j]) for i, j in self.pairs]
-        kept = [kept_apart(a, b) + (clearance if "obstacle" in (a.kind, b.kind) else 0.0) for a, b in both]
+        kept = [kept_apart(a, b) + (clearance if keeps_clearance(a, b) else 0.0) for a, b in both]
         self.margins = np.array(kept) + ROUNDING
         bounds = np.array([self._bounds(i, base) + self._bounds(j, base) for i, j, base in moving])
         self.rates, self.bends = bounds.reshape(-1, 2, len(rows) - 1).transpose(1, 0, 2)

@@ -80,7 +80,18 @@ def check(
     Motions are proven free for their whole length; where that cannot be done they are checked densely. A timed motion
     is checked along the curve between its points, and its speeds are compared with the robot's. The file of a path may
     contain a certificate. Exit code 1 if the path is not valid, or if its certificate does not hold.
+
+    In the place of a problem there may be the plan of a task (.json): each motion is checked in its own world, on the
+    contacts that it stands on and no longer.
     """
+    from rrtik_ompl.tasks.plan_file import is_task_plan, load_task_plan
+
+    if is_task_plan(problem):
+        if path is not None or proof is not None:
+            raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--proof' out.")
+        from rrtik_ompl.cli.task import checked_plan
+
+        return checked_plan(problem, load_task_plan(problem))
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
     from rrtik_ompl import JointGoal, load_path, load_problem

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -127,6 +128,24 @@ def task(
         say(f"{loaded.name}: not found: {plan.reason}")
         suggest("give it more time: --seconds")
     return 0 if plan.found else 1
+
+
+def checked_plan(name: str, plan: TaskPlan) -> int:
+    """Say of each motion of a plan how it is known to be free, and on what contacts; 1 if one is not."""
+    from rrtik_ompl.tasks.setting import world_of_motion
+
+    faults = plan.violations()
+    paths = tuple(
+        path.proved(world_of_motion(path, world, stage))
+        for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True)
+    )
+    say(*_lines(name, replace(plan, paths=paths, notes=())))
+    for number, world in enumerate(plan.worlds):
+        said = plan.contacts[number] if plan.contacts else ()
+        others = {*world.scene.contacts} - {each.touching for each in said}  # hold for the whole motion
+        say(*(f"  motion {number + 1} stands on a contact: {each}" for each in (*said, *others)))
+    say(*(f"not valid: {fault.reason}" for fault in faults))
+    return 1 if faults else 0
 
 
 def _document(plan: TaskPlan) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import chain, combinations, compress
 from operator import not_
@@ -42,6 +42,8 @@ class Body:
         padding: How much thicker a link or attached object is than its geometry [m]; of the latter with its own margin.
         within: Of an obstacle or attached object of several pieces: where this one is in the frame of the whole
             (``pinocchio.SE3``). Whoever puts an obstacle elsewhere puts this piece at ``pose * within``.
+        contacts: Names of what it is in contact with, and how near each other the two may come [m], in the place of
+            margins and paddings; negative is a depth.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Body:
     margin: float = 0.0
     padding: float = 0.0
     within: Any = field(default_factory=pin.SE3.Identity)
+    contacts: tuple[tuple[str, float], ...] = ()
 
 
 @lru_cache(maxsize=16)
@@ -91,9 +94,12 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
             for piece in _pieces(obstacle)
         ]
     for item in scene.attached:
-        for link in (item.link, *item.allow):
-            if link not in links:
-                raise UnknownNameError(f"link of robot '{robot.name}'", link, links, where=f"attached '{item.name}'")
+        if item.link not in links:
+            raise UnknownNameError(f"link of robot '{robot.name}'", item.link, links, where=f"attached '{item.name}'")
+        for name in item.allow:
+            if name not in links and name not in scene.names:
+                known = (*links, *scene.names)
+                raise UnknownNameError("link or obstacle", name, known, where=f"allow of attached '{item.name}'")
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         mount = frame.placement * item.pose
         thickness = item.margin + (robot.padding.get(item.link, 0.0) if item.padding is None else item.padding)
@@ -111,6 +117,28 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
             for piece in _pieces(item)
         ]
     return tuple(found)
+
+
+def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
+    """The bodies of a world, with the contacts of its scene.
+
+    Raises:
+        UnknownNameError: If a contact names something that does not exist.
+        InputError: If it is between two links.
+    """
+    if not scene.contacts:
+        return tuple(bodies)
+    known = {*robot.link_names, *scene.names}
+    found: dict[str, list[tuple[str, float]]] = {}
+    for contact in scene.contacts:
+        for name in contact.names:
+            if name not in known:
+                raise UnknownNameError("link or obstacle", name, known, where="contacts of a scene")
+        if not contact.pair & set(scene.names):
+            raise InputError(f"contacts of a scene: '{contact.first}' and '{contact.second}' are links; name an object")
+        for name, other in (contact.names, contact.names[::-1]):
+            found.setdefault(name, []).append((other, contact.distance))
+    return tuple(replace(body, contacts=tuple(found[body.name])) if body.name in found else body for body in bodies)
 
 
 def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:

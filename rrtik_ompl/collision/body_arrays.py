@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from weakref import WeakValueDictionary
 
 import coal
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Mask, Matrix, Vector
 from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.margins import contact_distance
 
 UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box
 
@@ -28,6 +30,8 @@ class BodyArrays:
         half_spaces, obstacles: Which are half-spaces and which obstacles, shape (n,) each.
         margins: What has to stay away from each [m], shape (n,).
         paddings: How much thicker each is than its geometry [m], shape (n,).
+        touching: Which are in contact with another body, shape (n,).
+        contacts: The least distance of two bodies that are in contact [m], by their numbers, the smaller one first.
     """
 
     joints: NDArray[np.int64]
@@ -38,13 +42,41 @@ class BodyArrays:
     obstacles: Mask
     margins: Vector
     paddings: Vector
+    touching: Mask
+    contacts: Mapping[tuple[int, int], float]
 
     def kept_apart(self, pairs: NDArray[np.int64]) -> Vector:
         """How far the bodies of pairs, shape (k, 2), must stay apart [m]; see :func:`.margins.kept_apart`."""
         first, second = pairs.T
         standing = (self.joints[first] == 0) & (self.joints[second] == 0)
         kept = self.margins[np.where(self.obstacles[second], second, first)]
-        return np.where(standing, 0.0, kept + self.paddings[first] + self.paddings[second])
+        found: Vector = np.where(standing, 0.0, kept + self.paddings[first] + self.paddings[second])
+        for row in np.flatnonzero(self.in_contact(pairs)):
+            found[row] = min(found[row], self.contacts[_ordered(pairs[row])])
+        return found
+
+    def in_contact(self, pairs: NDArray[np.int64]) -> Mask:
+        """Which of some pairs of bodies, shape (k, 2), are in contact, shape (k,)."""
+        found: Mask = np.asarray(self.touching[pairs].all(axis=1))
+        for row in np.flatnonzero(found):
+            found[row] = _ordered(pairs[row]) in self.contacts
+        return found
+
+
+def _ordered(pair: NDArray[np.int64]) -> tuple[int, int]:
+    first, second = pair.tolist()
+    return min(first, second), max(first, second)
+
+
+def _contacts(bodies: Sequence[Body]) -> dict[tuple[int, int], float]:
+    """See :attr:`BodyArrays.contacts`."""
+    found = {}
+    touching = [k for k, body in enumerate(bodies) if body.contacts]
+    for i, j in combinations(touching, 2):
+        distance = contact_distance(bodies[i], bodies[j])
+        if distance is not None:
+            found[i, j] = distance
+    return found
 
 
 # Several checks of one world ask for the same; kept for as long as one of them holds them.
@@ -74,4 +106,6 @@ def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
         obstacles=np.array([body.kind == "obstacle" for body in bodies], dtype=bool),
         margins=np.array([body.margin for body in bodies]),
         paddings=np.array([body.padding for body in bodies]),
+        touching=np.array([bool(body.contacts) for body in bodies], dtype=bool),
+        contacts=_contacts(bodies),
     )

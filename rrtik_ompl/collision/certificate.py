@@ -21,6 +21,7 @@ from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.own_distances import is_ours, own_gap
+from rrtik_ompl.collision.solids import solids_of
 from rrtik_ompl.robot import Robot
 
 MAX_PAIR_CHECKS = 1 << 16  # runs of rows times pairs checked together, to bound memory
@@ -176,7 +177,8 @@ def distance(
     None if the margin is not kept. Computed with a fresh request and result.
     """
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
-    ends, result = (first, transforms[0], second, transforms[1]), coal.CollisionResult()
+    ends, margin = solids_of((first, transforms[0], second, transforms[1]), margin)
+    result = coal.CollisionResult()
     if is_ours(ends):
         return own_gap(ends, margin)
     if coal.collide(*ends, request(margin), result):

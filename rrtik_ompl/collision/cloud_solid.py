@@ -6,7 +6,7 @@ Near is what lies close to the other body's bounding box; the cloud's tree finds
 from __future__ import annotations
 
 import weakref
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.enclosure import enclosure
+from rrtik_ompl.collision.solids import Ends as Ends
 from rrtik_ompl.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
 from rrtik_ompl.shapes import PointCloud
 
 LOOK = 0.05  # [m] beyond what was asked for; what is farther away than this is not measured further
-
-Ends: TypeAlias = tuple[Any, Any, Any, Any]  # first geometry, its coal.Transform3s, second geometry, its
 
 
 class CloudSolid(coal.Sphere):  # type: ignore[misc]

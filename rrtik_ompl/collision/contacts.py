@@ -15,7 +15,7 @@ from rrtik_ompl.collision.bodies import Body
 from rrtik_ompl.collision.cloud_solid import Ends
 from rrtik_ompl.collision.margins import kept_apart, request
 from rrtik_ompl.collision.own_distances import is_ours, own_gap, own_nearest
-from rrtik_ompl.collision.solids import is_mesh
+from rrtik_ompl.collision.solids import is_mesh, solids_of
 from rrtik_ompl.copies import as_value, in_one_line
 
 TOUCHING = 1e-6  # [m] of overlap, below which bodies only touch: coal tells no less
@@ -29,7 +29,7 @@ class Contact:
         first, second: Names of link, obstacle or attached object.
         distance: Signed distance [m]: positive is a gap, negative a penetration depth.
         point_first, point_second: Witness points in the world [m], shape (3,).
-        margin: Distance that must be kept between the two [m].
+        margin: Distance that must be kept between the two [m]; negative is a depth to which they may overlap.
     """
 
     first: str
@@ -48,6 +48,8 @@ class Contact:
 
     def __str__(self) -> str:
         pair = f"'{self.first}' and '{self.second}'"
+        if self.margin < self.distance < 0.0:
+            return f"{pair} overlap by {-1e3 * self.distance:.3g} mm, and may by {-1e3 * self.margin:.3g} mm"
         if self.distance > self.margin:
             return f"{pair} are {1e3 * self.distance:.4g} mm apart"
         if self.distance > 0.0:
@@ -83,6 +85,7 @@ def measured(
 
 def _near(ends: Ends, margin: float) -> bool:
     """Whether two geometries touch or come nearer than a margin [m]."""
+    ends, margin = solids_of(ends, margin)
     if is_ours(ends):
         return own_gap(ends, margin) is None
     return bool(coal.collide(*ends, request(margin), coal.CollisionResult()))

@@ -53,6 +53,9 @@ def _bodies(bodies: Iterable[Body]) -> Iterable[bytes]:
         yield from map(_numbers, _shape(body.geometry))
         if body.padding:
             yield _numbers(body.padding)
+        for name, distance in body.contacts:
+            yield f"in contact with {name}".encode()
+            yield _numbers(distance)
 
 
 def _shape(geometry: Any) -> Iterable[ArrayLike]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Iterable
 from functools import lru_cache, wraps
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import coal
 import numpy as np
@@ -16,6 +16,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.robot import Robot
 
 Found = TypeVar("Found")
+Ends: TypeAlias = tuple[Any, Any, Any, Any]  # first geometry, its coal.Transform3s, second geometry, its
 
 # A mesh no triangle of which lies deeper [m] below its convex hull is taken as convex: its hull stands for it. The hull
 # contains the mesh, so nothing that touches the mesh is missed. Volumes are compared first, as that is quick.
@@ -150,7 +151,9 @@ def _hull_of_mesh(mesh: coal.CollisionGeometry) -> coal.CollisionGeometry | None
     used = vertices[distinct(triangles)]
     if len(used) < 4 or not _thickness(used) >= FLATTEST * _extent(used):
         return None
-    return hull(used)
+    solid = hull(used)
+    solid.computeLocalAABB()
+    return solid
 
 
 @once_per_geometry  # coal hands out one triangle at a time
@@ -223,3 +226,15 @@ def inside_mesh(vertices: Matrix, triangles: NDArray[np.int64], point: Vector) -
     dot = np.einsum
     denominator = la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
     return bool(abs(np.arctan2(numerator, denominator).sum()) > np.pi)  # half of 4 pi, as each angle is counted halved
+
+
+def solids_of(ends: Ends, margin: float) -> tuple[Ends, float]:
+    """Two geometries at their places as coal compares them for a margin [m], and the margin that it takes.
+
+    Of hollow meshes coal knows no depth: where bodies may overlap to one, their hulls stand for them. A flat mesh has
+    none, and may not be touched.
+    """
+    if margin >= 0.0:
+        return ends, margin
+    hulls = around(ends[0]), around(ends[2])
+    return (hulls[0], ends[1], hulls[1], ends[3]), 0.0 if any(map(is_mesh, hulls)) else margin

@@ -27,7 +27,7 @@ from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, writ
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
 from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses
+from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 
 
 class PoseEntry(Section):
@@ -111,7 +111,9 @@ class AttachedEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
     """A solid that a link holds; ``pose`` is in the frame of the link."""
 
     link: Name
-    allow: list[Name] = Field(default=[], description="further links that it may touch")
+    allow: list[Name] = Field(
+        default=[], description="links, obstacles and other objects that it may touch beside that link"
+    )
     padding: NotNegative | None = Field(
         None, description="[m] kept from all that it may not touch; that of the link if absent"
     )
@@ -123,6 +125,18 @@ class AttachedEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
         return AttachedObject(self.name, self.link, shape, pose, tuple(self.allow), self.padding, self.margin)
 
 
+class ContactEntry(Section):
+    """Two things that are in contact, one of them an obstacle or attached object."""
+
+    pair: Annotated[list[Name], Field(min_length=2, max_length=2)]
+    distance: Number = Field(description="[m] that the two must keep, whatever margins say; negative is a depth")
+
+    def build(self) -> Touching:
+        """The contact."""
+        first, second = self.pair
+        return Touching(first, second, self.distance)
+
+
 class SceneEntry(Section):
     """What surrounds the arm."""
 
@@ -131,6 +145,9 @@ class SceneEntry(Section):
     attached: list[AttachedEntry] = Field(default=[])
     allowed_collisions: list[Annotated[list[Name], Field(min_length=2, max_length=2)]] = Field(
         default=[], description="pairs of names of links, obstacles or attached objects that may touch"
+    )
+    contacts: list[ContactEntry] = Field(
+        default=[], description="pairs that are in contact, and how far they may overlap"
     )
 
     def build(self, document: YamlDocument, location: Location = ("scene",)) -> Scene:
@@ -148,7 +165,9 @@ class SceneEntry(Section):
             with document.at((*location, "attached", k)):
                 attached.append(held.build(folder))
         with document.at(location):
-            return Scene(tuple(obstacles), tuple(attached), tuple((a, b) for a, b in self.allowed_collisions))
+            allowed = tuple((a, b) for a, b in self.allowed_collisions)
+            contacts = tuple(contact.build() for contact in self.contacts)
+            return Scene(tuple(obstacles), tuple(attached), allowed, contacts)
 
 
 class SceneFile(Section):
@@ -205,6 +224,8 @@ def scene_data(scene: Scene, folder: Path) -> dict[str, Any]:
         data["attached"] = [_attached_data(a, folder) for a in scene.attached]
     if scene.allowed_collisions:
         data["allowed_collisions"] = [list(pair) for pair in scene.allowed_collisions]
+    if scene.contacts:
+        data["contacts"] = [{"pair": list(each.names), "distance": each.distance} for each in scene.contacts]
     return data
 
 

@@ -16,10 +16,12 @@ from rrtik_ompl.errors import require
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import usable_configuration
 from rrtik_ompl.tasks.branches import Branch
+from rrtik_ompl.tasks.contact_life import MotionContact as MotionContact
+from rrtik_ompl.tasks.contact_life import world_from
 from rrtik_ompl.tasks.notes import notes_of
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.search import TaskSearch
-from rrtik_ompl.tasks.setting import Setting
+from rrtik_ompl.tasks.setting import Setting, world_of_motion
 from rrtik_ompl.tasks.stages import Alternatives as Alternatives
 from rrtik_ompl.tasks.stages import Attach as Attach
 from rrtik_ompl.tasks.stages import Detach as Detach
@@ -28,6 +30,7 @@ from rrtik_ompl.tasks.stages import MoveTo as MoveTo
 from rrtik_ompl.tasks.stages import Stage, checked_stages
 from rrtik_ompl.tasks.stages import Straight as Straight
 from rrtik_ompl.world import World
+from rrtik_ompl.world.route_check import Violation
 
 SECONDS = 10.0
 
@@ -44,7 +47,10 @@ class TaskPlan:
         chosen: Numbers of the alternatives that were taken, from 0, in their order.
         reason: "" if found, else which stages failed, how often and why.
         end: The world after the last stage, whatever that is; None if it is not found.
-        notes: What the author of the task may not have meant, a line each: an object attached from far away.
+        notes: What the author of the task may not have meant, and what it stands on, a line each: an object attached
+            from far away, contacts, fingers whose way is not proven.
+        contacts: Those that each motion stood on: which things touched, how deep they may overlap, and up to which
+            waypoint; from there on the motion is checked without.
 
     Example:
         >>> loaded = rrtik.load_task("titan4_drawer")
@@ -61,8 +67,29 @@ class TaskPlan:
     reason: str
     end: World | None = None
     notes: tuple[str, ...] = ()
+    contacts: tuple[tuple[MotionContact, ...], ...] = ()
 
     __repr__ = in_one_line
+
+    @property
+    def proven(self) -> bool:
+        """Whether every motion is proven in its own world, on the contacts that it is said to stand on."""
+        return self.found and all(path.proven for path in self.paths)
+
+    def violations(self) -> tuple[Violation, ...]:
+        """Check all motions again, each in its world, and without each contact once that has ended.
+
+        Returns:
+            The first violation of every edge that has one, motion after motion; empty for a valid plan.
+        """
+        found: list[Violation] = []
+        contacts = self.contacts or ((),) * len(self.paths)
+        for path, world, stage, stood_on in zip(self.paths, self.worlds, self.stages, contacts, strict=True):
+            found += path.violations(world_of_motion(path, world, stage))
+            for until in sorted({each.until for each in stood_on if each.until is not None}):
+                rest = path.with_waypoints(path.waypoints[until:])
+                found += rest.violations(world_from(world, stood_on, until))
+        return tuple(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,9 +139,10 @@ class Task:
         steps = steps_of(self.stages)
         check_program(steps, world)
         given: Any = world.robot.posture(start) if isinstance(start, str) else start
-        q = usable_configuration(world, given, "start")
+        begun = Setting.beginning(world, world.robot.configuration(given, "start"))
+        q = usable_configuration(begun.world, given, "start")
         search = TaskSearch(time.monotonic() + positive(seconds, "seconds"), whole_number(seed, "seed"))
-        done = search.run(Branch(Setting.of(world), np.array(q), steps))
+        done = search.run(Branch(begun, np.array(q), steps))
         if done is None:
             return TaskPlan(False, (), (), (), (), search.reason())
         return TaskPlan(
@@ -124,6 +152,7 @@ class Task:
             stages=tuple(branch.step.stage for branch, _ in done.motions if branch.step is not None),
             chosen=done.last.chosen,
             reason="",
-            end=done.last.setting.world,
-            notes=notes_of(done.last),
+            end=done.last.after.world,
+            notes=notes_of(done),
+            contacts=done.contacts,
         )

@@ -16,14 +16,20 @@ from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Touching
+from rrtik_ompl.tasks.contact_life import MotionContact, lived, parted
+from rrtik_ompl.tasks.finger_motion import finger_motion
+from rrtik_ompl.tasks.handling import arriving_at, handled, left_where, may_touch
 from rrtik_ompl.tasks.program import Step, options_of
 from rrtik_ompl.tasks.setting import Setting
-from rrtik_ompl.tasks.stages import Alternatives, MoveTo, Straight
+from rrtik_ompl.tasks.stages import Alternatives, Gripper, MoveTo, Straight
 from rrtik_ompl.tip_motion import DEVIATION, TURN_DEVIATION
 from rrtik_ompl.tip_motion.attempts import Attempt, Way, attempt, farthest, path_of
+from rrtik_ompl.tip_motion.following import follow
 from rrtik_ompl.tip_motion.freedom import centred
 from rrtik_ompl.tip_motion.rails import straight_rail
 from rrtik_ompl.tip_motion.values import Tolerance
+from rrtik_ompl.world import World
 
 TOLERANCE = Tolerance(DEVIATION, TURN_DEVIATION)
 THOROUGH = 1  # round of the search from which straight lines are tried in all ways that a redundant arm has
@@ -35,12 +41,16 @@ class Branch:
     """A task done up to some place.
 
     Attributes:
-        setting: What surrounds the arm there.
+        setting: What surrounds the arm there, of a motion with the contacts that it stands on.
         q: Where the arm is, shape (dof,).
         rest: What is left to do.
         before: The branch that it goes on from; None at the start.
         step: What has been done since; None at the start.
         path: Of a straight line; None elsewhere.
+        contacts: That a straight line stands on.
+        left: What a motion leaves behind: its setting without the contacts that have ended; None if that is the same.
+        arriving: Contacts of what is taken or set down where a motion ends.
+        note: What is not certain of fingers that have moved.
         done: How many stages.
         cost: Way of the joints so far, weighted [rad, metres counted alike].
         chosen: Numbers of the alternatives taken, from 0.
@@ -53,6 +63,10 @@ class Branch:
     before: Branch | None = None
     step: Step | None = None
     path: JointPath | None = None
+    contacts: tuple[MotionContact, ...] = ()
+    left: Setting | None = None
+    arriving: tuple[Touching, ...] = ()
+    note: str = ""
     done: int = 0
     cost: float = 0.0
     chosen: tuple[int, ...] = ()
@@ -68,6 +82,11 @@ class Branch:
         return links[::-1]
 
     @property
+    def after(self) -> Setting:
+        """What surrounds the arm from here on."""
+        return self.setting if self.left is None else self.left
+
+    @property
     def moves(self) -> bool:
         """Whether it is a motion whose way has to be planned."""
         return self.step is not None and isinstance(self.step.stage, MoveTo)
@@ -75,10 +94,20 @@ class Branch:
 
 @dataclass(slots=True, eq=False)
 class Choices:
-    """The configurations of a goal at one place of the search: those found, and more of them."""
+    """The configurations of a goal at one place of the search: those found, and more of them.
+
+    Attributes:
+        branch: That place.
+        search: Of configurations.
+        arrives: Whether what is taken or set down there may touch at them.
+        more: Whether there may be more of them.
+        used: How many of them have become branches.
+    """
 
     branch: Branch
     search: GoalSearch
+    arrives: bool = False
+    more: bool = True
     used: int = 0
 
 
@@ -109,8 +138,10 @@ class Expander:
                 yield from self._aims(branch, step, stage)
             elif isinstance(stage, Straight):
                 yield from self._line(branch, step, stage)
+            elif isinstance(stage, Gripper):
+                yield from self._fingers(branch, step, stage)
             else:
-                yield _next(branch, step, branch.setting.after(stage, branch.q), branch.q)
+                yield _next(branch, step, branch.after.after(stage, branch.q), branch.q)
         except (ProblemError, InputError) as error:
             self.failures.append((branch, step, str(error)))
 
@@ -123,50 +154,95 @@ class Expander:
 
     def ends(self, branch: Branch) -> bool:
         """Whether a branch with nothing left to do may end; the reason why not is noted."""
-        if branch.before is None or branch.step is None or branch.setting is branch.before.setting:
+        if branch.before is None or branch.step is None or branch.after is branch.before.after:
             return True
-        touching = branch.setting.world.explain(branch.q)
+        touching = branch.after.world.explain(branch.q)
         if touching:
             why = f"contact after it: {touching}; attach the object, open the gripper, or allow the pair"
             self.failures.append((branch.before, branch.step, why))
         return not touching
 
+    def _fingers(self, branch: Branch, step: Step, stage: Gripper) -> Iterator[Branch]:
+        setting = branch.after.after(stage, branch.q)
+        taken = [thing.name for thing in handled(branch.rest[1:], setting.robot) if thing.by is not None]
+        moved = finger_motion(branch.after, setting, branch.q, taken)
+        if moved.fault:
+            self.failures.append((branch, step, moved.fault))
+            return
+        yield replace(_next(branch, step, setting, branch.q), note=moved.note)
+
     def _aims(self, branch: Branch, step: Step, stage: MoveTo) -> Iterator[Branch]:
-        world = branch.setting.world
-        problem = Problem(world, branch.q, stage.goal, constraints=stage.constraints)
+        try:
+            choices = self._choices(branch, branch.after, stage)
+            reason = choices.search.reason
+        except ProblemError as error:
+            choices, reason = None, str(error)
+        if choices is None or not len(choices.search.rows):
+            arriving = branch.after.arriving(may_touch(branch.after.world, branch.rest[1:]))
+            if arriving is not branch.after:
+                choices = self._choices(branch, arriving, stage)
+                reason = choices.search.reason
+        if reason:
+            self.failures.append((branch, step, reason))
+        if choices is not None:
+            if choices.more:
+                self.choices.append(choices)
+            yield from self._drawn(choices)
+
+    def _choices(self, branch: Branch, setting: Setting, stage: MoveTo) -> Choices:
+        problem = Problem(setting.world, branch.q, stage.goal, constraints=stage.constraints)
         search = GoalSearch(problem, self.rng, all_turns=False)  # the plan to it may go either way round
         search.first()
-        if search.reason:
-            self.failures.append((branch, step, search.reason))
-        choices = Choices(branch, search)
-        if not isinstance(problem.goal, JointGoal):
-            self.choices.append(choices)
-        yield from self._drawn(choices)
+        return Choices(branch, search, setting is not branch.after, not isinstance(problem.goal, JointGoal))
 
     def _drawn(self, choices: Choices) -> Iterator[Branch]:
         branch, rows = choices.branch, choices.search.rows
         for q in rows[choices.used :]:
-            yield _next(branch, branch.rest[0], branch.setting, q)
+            arriving = self._arriving(branch, q) if choices.arrives else ()
+            setting = branch.after.arriving(arriving)
+            lasting = tuple(each for each in branch.after.scene.contacts if not parted(setting.world, q, each))
+            yield _next(branch, branch.rest[0], setting, q, left=setting.left_with(lasting), arriving=arriving)
         choices.used = len(rows)
 
+    def _arriving(self, branch: Branch, q: Vector) -> tuple[Touching, ...]:
+        """The contacts of what is taken or set down at a configuration, shape (dof,), to which a motion leads."""
+        return arriving_at(branch.after.world, branch.rest[1:], q)
+
     def _line(self, branch: Branch, step: Step, stage: Straight) -> Iterator[Branch]:
-        world = branch.setting.world
+        world = branch.after.world
         if touching := world.explain(branch.q):
             self.failures.append((branch, step, f"it cannot begin: {touching}; move it or allow the pair"))
             return
         way = _way(branch, stage)
         if way.leads_nowhere(world.robot):
             still = JointPath.of(world.robot, branch.q[None]).proved(world)
-            yield _next(branch, step, branch.setting, branch.q, still)
+            yield _next(branch, step, branch.after, branch.q, still)
             return
-        made = self._followed(branch, way)
+        setting = branch.after
+        arriving: tuple[Touching, ...] = ()
+        deep = ""
+        made = self._followed(branch, way, world)
+        if made.fraction < WHOLE and handled(branch.rest[1:], world.robot):
+            unchecked = follow(world.robot, way.rails[0], branch.q, way.tolerance, centred(world.robot))
+            if unchecked.complete:
+                arriving = self._arriving(branch, unchecked.rows[-1])
+                deep = left_where(world, branch.rest[1:], unchecked.rows[-1])
+            if arriving and not deep:
+                setting = branch.after.arriving(arriving)
+                made = self._followed(branch, way, setting.world)
         if made.fraction < WHOLE:
-            self.failures.append((branch, step, f"ends at {100.0 * made.fraction:.3g} %: {made.reason}"))
+            self.failures.append((branch, step, f"ends at {100.0 * made.fraction:.3g} %: {deep or made.reason}"))
             return
-        yield _next(branch, step, branch.setting, made.rows[-1], path_of(world, made))
+        path = path_of(setting.world, made)
+        assert path is not None, "it has come to its end"
+        done = lived(path, setting.world, setting.named, arriving)
+        if done.fault:
+            self.failures.append((branch, step, done.fault))
+            return
+        left = setting.left_with(done.lasting)
+        yield _next(branch, step, setting, path.end, done.path, left=left, contacts=done.contacts)
 
-    def _followed(self, branch: Branch, way: Way) -> Attempt:
-        world = branch.setting.world
+    def _followed(self, branch: Branch, way: Way, world: World) -> Attempt:
         if branch.effort >= THOROUGH:
             return farthest(world, way, branch.q[None], self.seed)
         return attempt(world, way, branch.q, centred(world.robot))
@@ -179,7 +255,7 @@ def way_of(robot: Robot, a: Vector, b: Vector) -> float:
 
 def _way(branch: Branch, stage: Straight) -> Way:
     """Of the tip on a straight line that begins where a branch has come to."""
-    tip = branch.setting.robot.fk(branch.q)
+    tip = branch.after.robot.fk(branch.q)
     return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, 0.0)
 
 
@@ -188,7 +264,31 @@ def again(branch: Branch, effort: int) -> Branch:
     return replace(branch, effort=effort)
 
 
-def _next(branch: Branch, step: Step, setting: Setting, q: Vector, path: JointPath | None = None) -> Branch:
+def _next(
+    branch: Branch,
+    step: Step,
+    setting: Setting,
+    q: Vector,
+    path: JointPath | None = None,
+    *,
+    left: Setting | None = None,
+    arriving: tuple[Touching, ...] = (),
+    contacts: tuple[MotionContact, ...] = (),
+) -> Branch:
     rows = [branch.q, q] if path is None else path.waypoints
     cost = branch.cost + sum(way_of(setting.robot, a, b) for a, b in pairwise(rows))
-    return Branch(setting, q, branch.rest[1:], branch, step, path, branch.done + 1, cost, branch.chosen, branch.effort)
+    return Branch(
+        setting,
+        q,
+        branch.rest[1:],
+        branch,
+        step,
+        path,
+        contacts,
+        left,
+        arriving,
+        done=branch.done + 1,
+        cost=cost,
+        chosen=branch.chosen,
+        effort=branch.effort,
+    )

@@ -6,20 +6,23 @@ from itertools import product
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.contacts import measured
-from rrtik_ompl.tasks.branches import Branch
+from rrtik_ompl.tasks.search import Done
 from rrtik_ompl.tasks.stages import Attach
 from rrtik_ompl.world import World
 
 FAR = 0.05  # [m] between an object and what holds it, from which on that is said
 
 
-def notes_of(last: Branch) -> tuple[str, ...]:
-    """What is odd about the way to a branch: objects attached from far away."""
+def notes_of(done: Done) -> tuple[str, ...]:
+    """What is odd about a way: objects attached from far away; and the contacts that its motions stood on."""
     notes = []
-    for branch in last.chain():
+    stood_on = {id(branch): contacts for (branch, _), contacts in zip(done.motions, done.contacts, strict=True)}
+    for branch in done.last.chain():
+        notes += [f"{branch.step}: {branch.note}"] if branch.note else []
+        notes += [f"{branch.step} stands on a contact: {each}" for each in stood_on.get(id(branch), ())]
         if branch.before is not None and branch.step is not None and isinstance(branch.step.stage, Attach):
             stage = branch.step.stage
-            away = gap(branch.before.setting.world, branch.q, stage.object, stage.link)
+            away = gap(branch.before.after.world, branch.q, stage.object, stage.link)
             if away > FAR:
                 text = f"'{stage.object}' is {1e3 * away:.0f} mm away from '{stage.link}' when it is attached"
                 notes.append(f"{branch.step}: {text}")

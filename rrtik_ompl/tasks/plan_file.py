@@ -14,14 +14,15 @@ from rrtik_ompl.arrays import finite_array
 from rrtik_ompl.catalog import robot_from_entry
 from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.files.sections import Name, Numbers, Positive, Section, Version, parse
+from rrtik_ompl.files.sections import Name, Number, Numbers, Positive, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
-from rrtik_ompl.files.text import file_name, known_ending, write_text
+from rrtik_ompl.files.text import file_name, known_ending, read_text, write_text
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
-from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
+from rrtik_ompl.problem_files.scene import ContactEntry, SceneEntry, scene_data
 from rrtik_ompl.problem_files.world import WorldKeys, world_data
 from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.tasks.contact_life import MotionContact
 from rrtik_ompl.tasks.task_file import StageEntry, stage_data
 from rrtik_ompl.world import FINEST_RESOLUTION, World
 
@@ -35,11 +36,25 @@ class WorldEntry(Section):
     scene: SceneEntry = Field(default=SceneEntry())
 
 
+class StoodOnEntry(ContactEntry):
+    """A contact that a motion stood on."""
+
+    until: Annotated[int, Field(ge=0)] | None = Field(
+        None, description="number of the waypoint at which they have parted"
+    )
+    then: Number | None = Field(None, description="[m] that they must keep from there on; as others if left out")
+
+    def stood_on(self) -> MotionContact:
+        """The contact."""
+        return MotionContact(self.build(), self.until, self.then)
+
+
 class MotionEntry(WorldEntry):
-    """One motion: what it does, where it leads, and the world that it is in."""
+    """One motion: what it does, where it leads, the world that it is in, and the contacts that it stood on."""
 
     stage: StageEntry
     waypoints: Annotated[list[Numbers], Field(min_length=1)]
+    contacts: list[StoodOnEntry] = Field(default=[], description="that the motion stood on")
 
 
 class TaskPlanFile(WorldKeys):
@@ -75,13 +90,15 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
     if plan.worlds[0].constraints is not None:
         raise InputError("task plan: its world has path constraints, which the file has no key for; give MoveTo them")
     folder = file_name(file).parent
+    stood_on = plan.contacts or ((),) * len(plan.paths)
     motions = [
         {
             "stage": stage_data(stage),
             **_world_data(world, folder),
             "waypoints": path.document()["waypoints"],
+            **_contact_data(contacts),
         }
-        for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True)
+        for path, world, stage, contacts in zip(plan.paths, plan.worlds, plan.stages, stood_on, strict=True)
     ]
     first = plan.worlds[0]
     document = {
@@ -95,6 +112,18 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
         "notes": list(plan.notes),
     }
     write_text(file, json.dumps(document, allow_nan=False))
+
+
+def is_task_plan(file: str | os.PathLike[str]) -> bool:
+    """Whether a file that is there says of itself that it holds the plan of a task."""
+    path = Path(file)
+    if path.suffix.lower() != ".json" or not path.is_file():
+        return False
+    try:
+        document = json.loads(read_text(path))
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(document, dict) and document.get("kind") == KIND
 
 
 def load_task_plan(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> TaskPlan:
@@ -131,7 +160,19 @@ def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
         paths.append(path)
     stages = tuple(motion.stage.build(world.robot) for motion, world in zip(entry.motions, worlds, strict=True))
     end = worlds[-1] if entry.end is None else _world(document, entry, entry.end, ("end",))
-    return TaskPlan(True, tuple(paths), tuple(worlds), stages, tuple(entry.chosen), "", end, tuple(entry.notes))
+    contacts = tuple(tuple(each.stood_on() for each in motion.contacts) for motion in entry.motions)
+    notes = tuple(entry.notes)
+    return TaskPlan(True, tuple(paths), tuple(worlds), stages, tuple(entry.chosen), "", end, notes, contacts)
+
+
+def _contact_data(contacts: tuple[MotionContact, ...]) -> dict[str, Any]:
+    """What a file says of the contacts that a motion stood on."""
+    found = []
+    for each in contacts:
+        entry: dict[str, Any] = {"pair": list(each.touching.names), "distance": each.touching.distance}
+        entry |= {} if each.until is None else {"until": each.until}
+        found.append(entry | ({} if each.then is None else {"then": each.then}))
+    return {"contacts": found} if found else {}
 
 
 def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[World, JointPath]:

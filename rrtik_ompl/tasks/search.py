@@ -19,6 +19,7 @@ from rrtik_ompl.path import JointPath, proved_as_clear
 from rrtik_ompl.planning import plan_counted
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.tasks.branches import Branch, Expander, again
+from rrtik_ompl.tasks.contact_life import MotionContact, lived
 from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.stages import MoveTo
@@ -33,10 +34,11 @@ MOST_WORDS = 300  # letters of one failure
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Done:
-    """The branch that has done the whole task, and the branches on its way that are motions, with their paths."""
+    """The branch that has done the whole task, and the motions on its way, with their paths and contacts."""
 
     last: Branch
     motions: tuple[tuple[Branch, JointPath], ...]
+    contacts: tuple[tuple[MotionContact, ...], ...]
 
 
 class TaskSearch:
@@ -53,6 +55,7 @@ class TaskSearch:
         self._open: list[tuple[int, float, int, Branch]] = []  # a heap: what is popped is the smallest
         self._numbers = count()
         self._ways: dict[int, JointPath] = {}  # of motions between postures, by their branches
+        self._contacts: dict[int, tuple[MotionContact, ...]] = {}  # that they stand on
         self._blocked: set[int] = set()  # motions that were not found in this round
         self._late: list[Branch] = []  # what hangs on these
 
@@ -103,7 +106,8 @@ class TaskSearch:
             elif self._expander.ends(branch):
                 motions = self._motions(branch, effort)
                 if motions is not None:
-                    return Done(branch, tuple(motions))
+                    contacts = tuple(self._contacts.get(id(link), link.contacts) for link, _ in motions)
+                    return Done(branch, tuple(motions), contacts)
         return None
 
     def _push(self, branch: Branch) -> None:
@@ -135,14 +139,41 @@ class TaskSearch:
             return False
         if problem.world.motion_proven(before.q, link.q):
             straight = JointPath.of(world.robot, np.stack([before.q, link.q]))
-            self._ways[id(link)] = proved_as_clear(straight, problem.world, CLEARANCE)
-            return True
+            if self._kept(link, proved_as_clear(straight, problem.world, CLEARANCE), effort):
+                return True
+        path = self._found(problem, link, effort)
+        return path is not None and self._kept(link, path, effort)
+
+    def _found(self, problem: Problem, link: Branch, effort: int) -> JointPath | None:
+        """A path of a problem that a motion poses; why there is none is noted."""
+        assert link.before is not None, "it comes after another"
+        assert link.step is not None, "it has done one"
         left = max(self._deadline - time.monotonic(), 1e-3)
         made = plan_counted(problem, FIRST_ITERATIONS * GROWTH**effort, seconds=left, seed=self._seed)
         if made.path is None:
-            self._expander.failures.append((before, link.step, made.reason))
-            return False
-        self._ways[id(link)] = made.path
+            self._expander.failures.append((link.before, link.step, made.reason))
+        return made.path
+
+    def _kept(self, link: Branch, path: JointPath, effort: int) -> bool:
+        """Keep the way of a motion; if what has parted on it touches again, another one is planned from there."""
+        assert link.before is not None, "it comes after another"
+        assert link.step is not None, "it has done one"
+        setting = link.setting
+        if setting.scene.contacts:
+            world = world_of_motion(path, setting.world, link.step.stage)
+            done = lived(path, world, setting.named, link.arriving)
+            if done.world is not None:
+                problem = Problem(done.world, done.path.end, path.end)
+                rest = self._found(problem, link, effort)
+                if rest is None:
+                    return False
+                whole = path.with_waypoints(np.vstack([done.path.waypoints, rest.waypoints[1:]])).proved(world)
+                done = lived(whole, world, setting.named, link.arriving)
+            if done.fault:
+                self._expander.failures.append((link.before, link.step, done.fault))
+                return False
+            path, self._contacts[id(link)] = done.path, done.contacts
+        self._ways[id(link)] = path
         return True
 
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
+
+import numpy as np
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import robot_from_entry
@@ -11,7 +15,8 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.scene import Scene, Touching
+from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, left_inside, touching_at, with_contacts
 from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, MoveTo, Stage
 from rrtik_ompl.world import World
 
@@ -21,11 +26,12 @@ class Setting:
 
     Attributes:
         robot: With its fingers as they are held.
-        scene: Obstacles, and what is held.
+        scene: Obstacles, what is held, and contacts.
+        named: Pairs of names that an :class:`Attach` allows as long as it holds something.
     """
 
-    def __init__(self, like: World, robot: Robot, scene: Scene) -> None:
-        self._like, self.robot, self.scene = like, robot, scene
+    def __init__(self, like: World, robot: Robot, scene: Scene, named: frozenset[frozenset[str]] = frozenset()) -> None:
+        self._like, self.robot, self.scene, self.named = like, robot, scene, named
 
     @classmethod
     def of(cls, world: World) -> Setting:
@@ -34,27 +40,74 @@ class Setting:
         setting.world = world
         return setting
 
+    @classmethod
+    def beginning(cls, world: World, q: Vector) -> Setting:
+        """The setting of a world at q, shape (dof,): what is held there may go on touching what it touches."""
+        touching = [near for item in world.scene.attached for near in touching_at(world, q, item.name)]
+        known = {contact.pair for contact in world.scene.contacts}
+        contacts = [near.going_on() for near in touching if near.distance >= -LITTLE and near.pair not in known]
+        return cls.of(world).with_contacts(contacts)
+
     @cached_property
     def world(self) -> World:
         """The robot in the scene, with the other settings of the first world of the task."""
         return self._like.with_settings(robot=self.robot, scene=self.scene)
 
+    def with_contacts(self, contacts: Iterable[Touching]) -> Setting:
+        """The same setting with further contacts; of a pair that has one already the new one counts."""
+        new = tuple(contacts)
+        return self.with_scene(with_contacts(self.scene, new)) if new else self
+
+    def arriving(self, contacts: Iterable[Touching]) -> Setting:
+        """The same setting with contacts of what is about to be taken or set down; deeper ones that there are stay."""
+        known = {contact.pair: contact.distance for contact in self.scene.contacts}
+        return self.with_contacts(each for each in contacts if each.distance < known.get(each.pair, np.inf))
+
+    def with_scene(self, scene: Scene) -> Setting:
+        """The same robot in another scene."""
+        return Setting(self._like, self.robot, scene, self.named)
+
+    def left_with(self, contacts: tuple[Touching, ...]) -> Setting:
+        """The same setting with these contacts and no others."""
+        return self if contacts == self.scene.contacts else self.with_scene(replace(self.scene, contacts=contacts))
+
     def after(self, stage: Attach | Detach | Gripper, q: Vector) -> Setting:
         """The setting after a stage that the arm does at a configuration, shape (dof,).
 
         Raises:
-            InputError: If the robot has no gripper joints, or does not open so far.
+            InputError: If the robot has no gripper joints, does not open so far, or would leave what it lets go deep
+                inside something.
             UnknownNameError: If there is no object or link of a name.
         """
         if isinstance(stage, Gripper):
-            return Setting(self._like, with_gripper(self.robot, stage), self.scene)
-        if isinstance(stage, Attach):
-            pose = self.robot.fk(q, stage.link).actInv(self.scene.obstacle(stage.object).pose)
-            scene = self.scene.attaching(stage.object, stage.link, stage.allow, pose=pose, padding=stage.padding)
-            return Setting(self._like, self.robot, scene)
+            return Setting(self._like, with_gripper(self.robot, stage), self.scene, self.named)
+        return self._attached(stage, q) if isinstance(stage, Attach) else self._detached(stage, q)
+
+    def _attached(self, stage: Attach, q: Vector) -> Setting:
+        pose = self.robot.fk(q, stage.link).actInv(self.scene.obstacle(stage.object).pose)
+        links = tuple(name for name in stage.allow if name in self.robot.link_names)
+        scene = self.scene.attaching(stage.object, stage.link, links, pose=pose, padding=stage.padding)
+        others = frozenset(stage.allow) - frozenset(links)
+        named = self.named | {frozenset((stage.object, other)) for other in others}
+        held = Setting(self._like, self.robot, scene, named)
+        contacts = {
+            frozenset((stage.object, other)): Touching(stage.object, other, -DEEPER) for other in sorted(others)
+        }
+        near = touching_at(held.world, q, stage.object)
+        contacts |= {each.pair: each.going_on() for each in near if each.distance >= -LITTLE or each.pair in named}
+        return held.with_contacts(contacts.values())
+
+    def _detached(self, stage: Detach, q: Vector) -> Setting:
+        standing = frozenset(self.scene.names)
+        for near in touching_at(self.world, q, stage.object):
+            if near.second in standing and near.too_deep:
+                raise InputError(left_inside(near))
         held = next(item for item in self.scene.attached if item.name == stage.object)
         pose = self.robot.fk(q, held.link) * held.pose
-        return Setting(self._like, self.robot, self.scene.detaching(stage.object, pose))
+        named = frozenset(pair for pair in self.named if stage.object not in pair)
+        free = Setting(self._like, self.robot, self.scene.detaching(stage.object, pose), named)
+        touching = touching_at(free.world, q, stage.object)
+        return free.with_contacts(each.going_on() for each in touching if each.distance >= -DEEPER)
 
 
 def world_of_motion(path: JointPath, world: World, stage: Stage) -> World:

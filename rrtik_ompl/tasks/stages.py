@@ -153,7 +153,9 @@ class Detach:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gripper:
-    """Open or close the gripper; the fingers' own way is not checked.
+    """Open or close the gripper. The fingers' way is checked as a motion is, against the scene and what is held.
+
+    They may press on what is attached before the arm moves on.
 
     Attributes:
         state: "open" or "close".

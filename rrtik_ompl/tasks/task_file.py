@@ -40,6 +40,7 @@ from rrtik_ompl.robot import Robot
 from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.program import check_program, steps_of
+from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight
 from rrtik_ompl.tasks.through import placed_constraints
 from rrtik_ompl.world import World
@@ -244,7 +245,9 @@ def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
     with document.at(("scene",)):
         world = entry.world(robot, scene)
     with document.at(("start",)):
-        start = usable_configuration(world, entry.start.configuration(robot), "start")
+        given = entry.start.configuration(robot)
+        begun = Setting.beginning(world, robot.configuration(given, "start"))
+        start = usable_configuration(begun.world, given, "start")
     task = Task(_stages(document, entry, world, start))
     for key in OF_TASKS:
         if getattr(entry, key) is not None:

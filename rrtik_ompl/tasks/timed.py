@@ -10,13 +10,18 @@ import numpy as np
 from rrtik_ompl.arrays import Vector, frozen, not_negative
 from rrtik_ompl.copies import in_one_line
 from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.path import JointPath
 from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.tasks.contact_life import MotionContact, world_from
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.trajectory import RateLimits, Trajectory, time_parameterize
+from rrtik_ompl.trajectory.motion import proof_of_pieces
 from rrtik_ompl.world import World
 
 BLEND = 0.05  # [rad] or [m]
 PAUSE = 1.0  # [s]
+ROUNDED = (1.0, 0.3, 0.1, 0.03)  # of the blend, as long as what has parted would touch again
+LOOKS = 1000  # at a motion, for the place at which two have parted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,11 +92,38 @@ def time_task(
         begins.append(now)
         if path.length == 0.0:
             continue
-        part = time_parameterize(path, used, blend=blend, world=world_of_motion(path, world, stage), **options)
+        held = world_of_motion(path, world, stage)
+        part = _timed(path, held, plan.contacts[number] if plan.contacts else (), used, blend, options)
         parts.append(part)
         gaps.append(waiting)
         waiting, now = 0.0, now + part.duration
     return TimedTask(_joined(parts, gaps), frozen(begins), frozen(np.reshape(pauses, (-1, 2))))
+
+
+def _timed(
+    path: JointPath,
+    world: World,
+    contacts: tuple[MotionContact, ...],
+    limits: RateLimits,
+    blend: float,
+    options: dict[str, Any],
+) -> Trajectory:
+    """A motion with its times, corners rounded less where what has parted would touch again."""
+    ended = sorted({contact.until for contact in contacts if contact.until is not None})
+    later = [(path.waypoints[until], world_from(world, contacts, until)) for until in ended]
+    for share in ROUNDED:
+        made = time_parameterize(path, limits, blend=share * blend, world=world, **options)
+        if all(_free_from(made, q, strict) for q, strict in later):
+            return made
+    return time_parameterize(path, limits, blend=0.0, world=world, **options)
+
+
+def _free_from(motion: Trajectory, q: Vector, world: World) -> bool:
+    """Whether a motion is proven free in a world from where it passes q, shape (dof,)."""
+    clock = np.linspace(0.0, motion.duration, LOOKS)
+    passed = clock[np.linalg.norm(motion(clock).positions - q, axis=1).argmin()]
+    first = min(int(np.searchsorted(motion.times, passed)), len(motion.times) - 2)
+    return proof_of_pieces(motion, world, 0.0, first, len(motion.times) - 1).proven
 
 
 def _changed(before: World, after: World) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import MOST_NUMBERS, Mask, Matrix, finite_array, in_blocks, not_negative, positive
 from rrtik_ompl.choices import Accuracy
-from rrtik_ompl.collision.bodies import Body, by_motion, colliding_pairs, link_bodies, scene_bodies
+from rrtik_ompl.collision.bodies import Body, by_motion, colliding_pairs, in_contact, link_bodies, scene_bodies
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
@@ -110,7 +110,8 @@ class World(Rebuilt):
         for doubt in hollow_solids(robot, settings.scene):
             warnings.warn(doubt, MeshWarning, stacklevel=2)
         own = settings.self_margin
-        self._bodies = Items(link_bodies(robot, own) + scene_bodies(robot, settings.scene.at(0.0), own))
+        solids = link_bodies(robot, own) + scene_bodies(robot, settings.scene.at(0.0), own)
+        self._bodies = Items(in_contact(robot, settings.scene, solids))
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
         self.pairs = pairs = colliding_pairs(robot, settings.scene, self.bodies)
         moving, standing = by_motion(self.bodies, pairs)
@@ -130,10 +131,13 @@ class World(Rebuilt):
 
     @property
     def fast(self) -> FastWorld | None:
-        """The world's tables, for planners that run in kernels; None without kernels or where these do not suffice."""
-        tables = self._checks.fast
-        enough = self._settings.proving is None and self.constraints is None and not self._always_colliding
-        return tables if tables.address and enough else None
+        """The world's tables, for planners that run in kernels; None without kernels or where these do not suffice.
+
+        They do not where motions have to be proven or held, nor where something is in contact: they know nothing of it.
+        """
+        tables, settings = self._checks.fast, self._settings
+        enough = settings.proving is None and self.constraints is None and not settings.scene.contacts
+        return tables if tables.address and enough and not self._always_colliding else None
 
     @property
     def motions(self) -> FastMotions | None:
@@ -142,8 +146,16 @@ class World(Rebuilt):
 
     @property
     def free_motions(self) -> FastMotions | None:
-        """How kernels check motions for collisions alone, whatever else they must be; None where they cannot."""
-        return motions_of(self.with_settings(proving=None, constraints=()), self._motions)
+        """How kernels check motions for collisions alone, whatever else they must be; None where they cannot.
+
+        Pairs that are in contact are left out: how deep they overlap is proven of what is found.
+        """
+        free = self.with_settings(proving=None, constraints=())
+        scene = free.scene
+        if not scene.contacts:
+            return motions_of(free, self._motions)
+        pairs = (*scene.allowed_collisions, *(contact.names for contact in scene.contacts))
+        return motions_of(free.with_scene(replace(scene, contacts=(), allowed_collisions=pairs)), KeptHere())
 
     @property
     def unheld(self) -> World:

@@ -26,21 +26,24 @@ from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.own_distances import is_ours, own_gap
-from rrtik_ompl.collision.solids import around
+from rrtik_ompl.collision.solids import around, solids_of
 from rrtik_ompl.copies import Items, Once, shallow_copy
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
 from rrtik_ompl.fast.taken_tables import TakenTables
 from rrtik_ompl.poses import working_memory
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, Spheres, arm_cache
+from rrtik_ompl.world.proof import Prover
 
 
 class ExactChecker:
     """Exact collision checks of configurations within the robot's limits and of straight motions between them.
 
     Attributes:
-        fast: The same pairs for the kernels.
+        fast: The same pairs for the kernels, but for those in contact.
         bodies: As given.
+        in_contact: Pairs that may overlap to some depth, of which kernels of checks know nothing: that they do not
+            overlap more is proven of every configuration and motion.
         conservative: Whether nothing falls back to coal: what kernels leave undecided then counts as colliding.
 
     Args:
@@ -54,11 +57,15 @@ class ExactChecker:
     def __init__(self, robot: Robot, bodies: Items[Body], pairs: Pairs, *, conservative: bool = False) -> None:
         self.conservative = conservative
         self._arrays = body_arrays(bodies.whole)  # held, so that all that asks for them finds them
+        touching = self._arrays.contacts
+        self.in_contact = tuple(pair for pair in pairs if pair in touching) if touching else ()
+        pairs = tuple(pair for pair in pairs if pair not in touching) if touching else pairs
         arm = arm_cache(robot)
         covers = arm.covers_of(bodies.whole)
         self._tables = TakenTables(arm.pack(bodies.whole, pairs, covers))
         self._robot, self.bodies = robot, bodies
         self._pairs, self._covers = pairs, covers
+        self._contacts = Prover(robot, bodies, self.in_contact)
         self._data = working_memory(robot.model)
         self._approaches = Once(lambda: dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True)))
         self._containment = Once(_containment_of, bodies, pairs, covers)
@@ -80,6 +87,7 @@ class ExactChecker:
         """The same checker for another thread."""
         other = copy.copy(self)
         other._tables, other._data = self._tables.for_thread(self._packed), self._robot.model.createData()
+        other._contacts = self._contacts.for_thread()
         return other
 
     def moved(self, number: int, placement: pin.SE3) -> ExactChecker | None:
@@ -93,6 +101,7 @@ class ExactChecker:
             return None
         other = copy.copy(self)
         other._tables, other.bodies = taken, self.bodies.with_(number, body)
+        other._contacts = Prover(self._robot, other.bodies, self.in_contact)
         other._containment = Once(_containment_of, other.bodies, self._pairs, self._covers)
         return other
 
@@ -101,6 +110,7 @@ class ExactChecker:
         other = copy.copy(self)
         other.bodies = bodies
         other._tables = TakenTables(other._packed())
+        other._contacts = Prover(self._robot, other.bodies, self.in_contact)
         return other
 
     def _packed(self) -> FastWorld:
@@ -116,6 +126,8 @@ class ExactChecker:
             configurations = self._robot.pinocchio_configuration(undecided)
             apart = [self._gaps(full, pairs) is not None for full, pairs in zip(configurations, doubtful, strict=True)]
             free[answers == UNDECIDED] = apart
+        if self.in_contact:
+            free[free] = self._contacts.proven(rows[free], rows[free])
         return free
 
     def motions_free(
@@ -134,6 +146,8 @@ class ExactChecker:
         elif not self.conservative:
             for k in np.flatnonzero(answers == UNDECIDED):
                 free[k] = self._motion_free_by_coal(starts[k], ends[k], int(steps[k]))
+        if self.in_contact:
+            free[free] = self._contacts.proven(starts[free], ends[free])
         return free
 
     def _motion_free_by_coal(self, start: Vector, end: Vector, steps: int) -> bool:
@@ -203,9 +217,10 @@ def distance(first: Any, first_pose: Any, second: Any, second_pose: Any, margin:
     For solids coal's answer to "do they touch" comes with the distance. Meshes take much longer, so their hulls are
     checked first: where those are apart, the meshes are.
     """
-    ends = first, first_pose, second, second_pose
+    ends, margin = solids_of((first, first_pose, second, second_pose), margin)
     if is_ours(ends):
         return own_gap(ends, margin)
+    first, _, second, _ = ends
     result = coal.CollisionResult()
     hulls = around(first), around(second)
     if not coal.collide(hulls[0], first_pose, hulls[1], second_pose, request(margin), result):

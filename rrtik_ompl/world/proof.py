@@ -28,6 +28,7 @@ from rrtik_ompl.fast.tables.solid_tables import convex_solids
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, strokes
 from rrtik_ompl.world.coal_proof import CoalProof, Told, distance_between
+from rrtik_ompl.world.contact_planes import suggest_planes
 
 LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
 PROOF_KERNELS = "proof.proof_kernels"
@@ -204,6 +205,8 @@ class Prover:
         for k in range(len(rows) - 1):
             at = (values[k].ctypes.data, values[k + 1].ctypes.data, 1, pair.ctypes.data, place.ctypes.data)
             run = partial(kernels.prove, ProofTable(packed.table.address), *at)
+            if packed.touching:
+                suggest_planes(self.robot, self.bodies, packed, rows[k : k + 2])
             told.append(coal.logged(rows[k : k + 2], pair, place, run))
             if pair[0] != PROVEN:
                 return None
@@ -282,11 +285,14 @@ class Prover:
         pairs, places = np.full(count, NOT_LOOKED_AT, dtype=np.int32), np.full(count, np.nan)
         table = ProofTable(packed.table.address)
         at, found, where = (tails.ctypes.data, heads.ctypes.data), pairs.ctypes.data, places.ctypes.data
-        for first in range(0, count, MOTIONS_AT_ONCE):
+        at_once = 1 if packed.touching else MOTIONS_AT_ONCE
+        for first in range(0, count, at_once):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
             skipped = DOUBLE * joints * first
-            number = min(MOTIONS_AT_ONCE, count - first)
+            number = min(at_once, count - first)
+            if packed.touching:
+                suggest_planes(self.robot, self.bodies, packed, np.stack([rows[0][first], rows[1][first]]))
             sinks = (found + INT * first, where + DOUBLE * first)
             open_ += kernels.prove(table, at[0] + skipped, at[1] + skipped, number, *sinks)
             looked += number

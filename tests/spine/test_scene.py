@@ -25,13 +25,36 @@ def test_an_obstacle_is_held_and_let_go():
     held = SCENE.attaching("ball", "gripper", allow=["box", "wrist"], pose=[0.0, 0.0, 0.1])
     assert [o.name for o in held.obstacles] == ["box"]
     (item,) = held.attached
-    assert (item.name, item.link, item.allow, item.shape) == ("ball", "gripper", ("wrist",), BALL.shape)
+    assert (item.name, item.link, item.allow, item.shape) == ("ball", "gripper", ("box", "wrist"), BALL.shape)
     assert np.allclose(item.pose.translation, [0.0, 0.0, 0.1])
-    assert held.allowed_collisions == (("ball", "wrist"), ("ball", "box"))
+    assert held.allowed_collisions == SCENE.allowed_collisions == (("ball", "wrist"),)
     free = held.detaching("ball", pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0])))
     assert free.attached == ()
     assert np.allclose(free.obstacle("ball").pose.translation, [1.0, 0.0, 0.0])
-    assert free.allowed_collisions == held.allowed_collisions
+    assert free.allowed_collisions == SCENE.allowed_collisions
+
+
+def test_contacts_of_what_is_held_end_with_the_grasp_and_others_stay():
+    contacts = (rrtik.Touching("ball", "box", -0.001), rrtik.Touching("wrist", "box", -0.002))
+    held = rrtik.Scene([BALL, BOX], contacts=contacts).attaching("ball", "gripper")
+    assert held.contacts == contacts
+    assert held.detaching("ball", [0.0, 0.0, 1.0]).contacts == contacts[1:]
+    assert held.without("box").contacts == ()
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: rrtik.Touching("cup", "cup", 0.0), "'cup' stands twice"),
+        (lambda: rrtik.Touching("cup", "table", np.nan), "distance of 'cup' and 'table'"),
+        (lambda: rrtik.Touching("cup", 3, 0.0), "name of a thing that touches another"),
+        (lambda: rrtik.Scene([BALL], contacts=[("ball", "box")]), "each contact of a scene"),
+    ],
+)
+def test_contacts_that_are_none_are_refused_in_a_line(make, words):
+    with pytest.raises(InputError, match=words) as caught:
+        make()
+    assert "\n" not in str(caught.value)
 
 
 def test_what_is_not_there_or_there_twice_is_refused():

@@ -42,6 +42,8 @@ class ProofPairs:
             (n, 4); part -1 is a body of several parts as a whole.
         margins: How far each must stay apart [m], shape (n,).
         beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
+        clear: Which of these are not in contact, and keep a clearance, shape (n,).
+        touching: Numbers of the pairs that are in contact.
         firsts: The first solid of each body, and the end of them.
         groups: Bodies that are one solid together; these solids come last.
         kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, nan before the first
@@ -53,6 +55,8 @@ class ProofPairs:
     sides: NDArray[np.int64]
     margins: Vector
     beside_obstacle: NDArray[np.bool_]
+    clear: NDArray[np.bool_]
+    touching: Sequence[int]
     firsts: Sequence[int]
     groups: Sequence[Members]
     kept: tuple[float, float] = (float("nan"), ROOM)
@@ -61,7 +65,7 @@ class ProofPairs:
         """Let the kernels keep a clearance from obstacles beside the margins, and a slack between all bodies [m]."""
         if (clearance, ROOM + slack) != self.kept:
             self.kept = clearance, ROOM + slack
-            self.table[layout.MARGINS][:] = self.margins + self.kept[1] + clearance * self.beside_obstacle
+            self.table[layout.MARGINS][:] = self.margins + self.kept[1] + clearance * self.clear
 
     def for_thread(self) -> ProofPairs:
         """The same pairs in a table with memory of its own to compute in."""
@@ -166,10 +170,13 @@ def proof_pairs(
     )
     arrays = body_arrays(bodies)
     beside = np.asarray(arrays.obstacles[named].any(axis=1))
+    touching = arrays.in_contact(named)
     margins = arrays.kept_apart(named)
     for number, row in enumerate(of_groups, len(whole) + len(of_parts)):
         margins[number] = margins[row[layout.PARTS_FIRST] : row[layout.PARTS_END]].max()
-    return ProofPairs(made, named, sides, margins, beside, ends, list(together))
+    return ProofPairs(
+        made, named, sides, margins, beside, beside & ~touching, np.flatnonzero(touching).tolist(), ends, list(together)
+    )
 
 
 NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)

@@ -1,0 +1,154 @@
+"""The way of a gripper's fingers, while the arm stands still: a motion like any other.
+
+Where fingers are held is part of a robot, so that no joint of it moves them. Between two robots a finger on one joint
+goes along a screw. As in [16], bodies whose distance in the middle of an interval is larger than what they come nearer
+on half of it are apart in all of it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.catalog import robot_from_entry
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.contacts import measured
+from rrtik_ompl.collision.containment import Containment
+from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart
+from rrtik_ompl.collision.solids import around
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.tasks.contact_life import DEEPER, NEAR
+from rrtik_ompl.tasks.setting import Setting
+
+DEEPEST = 12  # level of an interval: 1/4096 of the way
+SAME = 1e-7  # [m] or [rad] to which a finger's place in the middle of its way is on the screw
+REMEDY = "attach the object, move the gripper less, or allow the pair"
+
+
+@dataclass(frozen=True, slots=True)
+class FingerMotion:
+    """What is known of a motion of fingers. ``fault``: what is in their way; ``note``: what is not certain."""
+
+    fault: str = ""
+    note: str = ""
+
+
+def finger_motion(before: Setting, after: Setting, q: Vector, taken: Sequence[str]) -> FingerMotion:
+    """Check fingers on their way against the scene, and what they carry.
+
+    Args:
+        before: With the fingers as they are held.
+        after: With the fingers as they are held then.
+        q: Where the arm is, shape (dof,).
+        taken: Things that are attached before the arm moves on: fingers may press on these.
+    """
+    first, last = before.world.bodies, after.world.bodies
+    moving = {k for k in range(len(first)) if not _same(first[k].placement, last[k].placement)}
+    if not moving:
+        return FingerMotion()
+    if not _on_screws(before.robot, after.robot):
+        return FingerMotion(note="the way of the fingers is not checked: it is not about or along one axis")
+    frames = before.robot.joint_frames(q[None])[0]
+    for i, j in before.world.pairs:
+        names = {first[i].name, first[j].name}
+        if not {i, j} & moving or not names & set(before.scene.names) or names & set(taken):
+            continue
+        way = Way((first[i], first[j]), (last[i], last[j]), frames)
+        if not way.apart():
+            names_in_order = " and ".join(f"'{body.name}'" for body in (first[i], first[j]))
+            return FingerMotion(fault=f"contact of the fingers on their way: {names_in_order}; {REMEDY}")
+    return FingerMotion()
+
+
+class Way:
+    """Two bodies of which one moves at least, from their first places to their last ones.
+
+    Args:
+        first: Both at the beginning.
+        last: At the end, on the same joints.
+        frames: Of all joints, shape (joints + 1, 4, 4).
+    """
+
+    def __init__(self, first: tuple[Body, Body], last: tuple[Body, Body], frames: Vector) -> None:
+        self._first, self._frames = first, frames
+        twists = (pin.log6(a.placement.actInv(b.placement)).vector for a, b in zip(first, last, strict=True))
+        self._twists = tuple(twists)
+        self._speed = sum(_speed(body, twist) for body, twist in zip(first, self._twists, strict=True))
+        self._kept = kept_apart(*first)
+        if self._distance(0.0, hulls=False) <= NEAR:  # what fingers let go may go on touching them, no deeper
+            self._kept = min(self._kept, min(self._distance(0.0, hulls=True), 0.0) - DEEPER)
+
+    def apart(self) -> bool:
+        """Whether the two keep what they must on the whole way."""
+        places = Containment(self._at(0.0), ((0, 1),))
+        return not places.holds((0, 1), self._frames) and all(self._intervals())
+
+    def _intervals(self) -> Iterator[bool]:
+        open_ = [(0, 0)]
+        while open_:
+            level, number = open_.pop()
+            width = 0.5**level
+            spare = self._distance((number + 0.5) * width, hulls=self._kept < 0.0) - self._kept - DISTANCE_TOLERANCE
+            if spare > 0.5 * width * self._speed:
+                continue
+            if spare <= 0.0 or level == DEEPEST:
+                yield False
+                return
+            open_ += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
+        yield True
+
+    def _at(self, share: float) -> tuple[Body, Body]:
+        both = zip(self._first, self._twists, strict=True)
+        one, other = (replace(body, placement=body.placement * pin.exp6(share * twist)) for body, twist in both)
+        return one, other
+
+    def _distance(self, share: float, *, hulls: bool) -> float:
+        """Signed, at a share of the way [m]; that of their hulls where they may overlap, for coal knows no other."""
+        both = self._at(share)
+        if hulls:
+            one, other = (replace(body, geometry=around(body.geometry)) for body in both)
+            both = one, other
+        return next(measured(both, [(0, 1)], self._frames, near_only=False)).distance
+
+
+def _speed(body: Body, twist: Vector) -> float:
+    """How far a point of a body moves at most along a screw from beginning to end [m]."""
+    reach = float(np.linalg.norm(body.geometry.aabb_center)) + float(body.geometry.aabb_radius)
+    return float(np.linalg.norm(twist[:3]) + np.linalg.norm(twist[3:]) * reach)
+
+
+def _same(first: pin.SE3, second: pin.SE3) -> bool:
+    return bool(np.abs(first.homogeneous - second.homogeneous).max() <= SAME)
+
+
+def _on_screws(before: Robot, after: Robot) -> bool:
+    """Whether every finger is in the middle of the way where a single screw takes it."""
+    middle = _robot(_entry(before, after))
+    places = [
+        {(str(item.name), int(item.parentJoint)): item.placement for item in robot.collision.geometryObjects}
+        for robot in (before, middle, after)
+    ]
+    return all(
+        name in places[1]
+        and name in places[2]
+        and _same(places[1][name], place * pin.exp6(0.5 * pin.log6(place.actInv(places[2][name])).vector))
+        for name, place in places[0].items()
+    )
+
+
+def _entry(before: Robot, after: Robot) -> str:
+    """The entry of the robot with its fingers in the middle, as JSON."""
+    begin, end = (dict(robot.source.get("locked", {})) for robot in (before, after))
+    held = {name: 0.5 * (begin.get(name, 0.0) + value) for name, value in end.items()}
+    return json.dumps({**before.source, "locked": held}, sort_keys=True)
+
+
+@lru_cache(maxsize=32)
+def _robot(entry: str) -> Robot:
+    return robot_from_entry(json.loads(entry))

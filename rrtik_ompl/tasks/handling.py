@@ -1,0 +1,70 @@
+"""What is taken and set down where a motion ends: read from the stages that follow it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.robot import Robot
+from rrtik_ompl.scene import Touching
+from rrtik_ompl.tasks.contact_life import DEEPER, joined_with, left_inside, touching_at
+from rrtik_ompl.tasks.program import Step, options_of
+from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, MoveTo, Straight
+from rrtik_ompl.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class Handled:
+    """A thing that is taken or set down. ``by``: the links that may touch it then; None if all that it may meet may."""
+
+    name: str
+    by: frozenset[str] | None
+
+
+def handled(steps: Sequence[Step], robot: Robot) -> list[Handled]:
+    """What may be taken and set down before the arm moves on, whatever is chosen."""
+    found: list[Handled] = []
+    for place, step in enumerate(steps):
+        stage = step.stage
+        if isinstance(stage, MoveTo | Straight):
+            break
+        if isinstance(stage, Alternatives):
+            for row in options_of(step):
+                found += handled((*row, *steps[place + 1 :]), robot)
+            break
+        if isinstance(stage, Attach):
+            found.append(Handled(stage.object, joined_with(robot, stage.link) | frozenset(stage.allow)))
+        elif isinstance(stage, Detach):
+            found.append(Handled(stage.object, None))
+    return list(dict.fromkeys(found))
+
+
+def may_touch(world: World, steps: Sequence[Step]) -> list[Touching]:
+    """Contacts that would let what is taken or set down next touch all that it may touch there."""
+    found: dict[frozenset[str], Touching] = {}
+    for thing in handled(steps, world.robot):
+        for pair in {frozenset(world.bodies[k].name for k in numbers) for numbers in world.pairs}:
+            other = next(iter(pair - {thing.name}), None)
+            if thing.name in pair and other is not None and (thing.by is None or other in thing.by):
+                found[pair] = Touching(thing.name, other, -DEEPER)
+    return sorted(found.values(), key=lambda contact: contact.names)
+
+
+def left_where(world: World, steps: Sequence[Step], q: Vector) -> str:
+    """Why something cannot be set down at q, shape (dof,), because of its depth; "" if it can."""
+    standing = frozenset(world.scene.names)
+    for thing in handled(steps, world.robot):
+        for near in touching_at(world, q, thing.name) if thing.by is None else ():
+            if near.second in standing and near.too_deep:
+                return left_inside(near)
+    return ""
+
+
+def arriving_at(world: World, steps: Sequence[Step], q: Vector) -> tuple[Touching, ...]:
+    """The contacts of what is taken or set down at q, shape (dof,); none where it would be deeper than it may be."""
+    found: dict[frozenset[str], Touching] = {}
+    for thing in handled(steps, world.robot):
+        near = (each for each in touching_at(world, q, thing.name) if thing.by is None or each.second in thing.by)
+        found |= {each.pair: each.arriving() for each in near if not each.too_deep}
+    return tuple(found.values())

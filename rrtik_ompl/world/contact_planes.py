@@ -1,0 +1,50 @@
+"""Planes that proofs try first between bodies in contact.
+
+Between bodies that overlap there is no plane that a search for their distance would find, but a proof needs none that
+parts them: one beyond which neither reaches deeper than it may. Coal knows that one, by the normal of the contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.cloud_solid import CloudSolid
+from rrtik_ompl.collision.solids import around
+from rrtik_ompl.fast.proof import layout
+from rrtik_ompl.fast.proof.packing import ProofPairs
+from rrtik_ompl.robot import Robot
+
+
+def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, ends: Matrix) -> None:
+    """Let the kernels try the planes of contacts first, where a motion begins or ends, shape (2, dof)."""
+    frames = robot.joint_frames(ends)
+    ways = packed.table[layout.WAYS].reshape(-1, 3)
+    bases = packed.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_BASE]
+    known: dict[tuple[int, int], tuple[int, Vector]] = {}
+    for row in packed.touching:
+        one, other = packed.sides[row, ::2].tolist()
+        if (one, other) not in known:
+            known[one, other] = _normal((bodies[other], bodies[one]), frames)
+        end, normal = known[one, other]
+        ways[row] = frames[end, bases[row], :3, :3].T @ normal
+
+
+def _normal(pair: tuple[Body, Body], frames: Matrix) -> tuple[int, Vector]:
+    """Where two bodies are nearer to each other, 0 or 1, and there the unit vector from the first to the second."""
+    if any(isinstance(body.geometry, CloudSolid) for body in pair):
+        return 0, np.zeros(3)  # kernels look for their own
+    nearest, where, normal = np.inf, 0, np.zeros(3)
+    for end in range(len(frames)):
+        poses = (pin.SE3(frames[end, body.joint]) * body.placement for body in pair)
+        first, second = (coal.Transform3s(pose.rotation, pose.translation) for pose in poses)
+        ends = around(pair[0].geometry), first, around(pair[1].geometry), second
+        result = coal.DistanceResult()
+        if coal.distance(*ends, coal.DistanceRequest(), result) < nearest:
+            nearest, where, normal = result.min_distance, end, np.array(result.normal)
+    return where, normal
