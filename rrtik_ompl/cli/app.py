@@ -84,14 +84,10 @@ def check(
     In the place of a problem there may be the plan of a task (.json): each motion is checked in its own world, on the
     contacts that it stands on and no longer.
     """
-    from rrtik_ompl.tasks.plan_file import is_task_plan, load_task_plan
+    from rrtik_ompl.cli.task import task_plan_checked
 
-    if is_task_plan(problem):
-        if path is not None or proof is not None:
-            raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--proof' out.")
-        from rrtik_ompl.cli.task import checked_plan
-
-        return checked_plan(problem, load_task_plan(problem))
+    if (code := task_plan_checked(problem, beside=(path, proof) != (None, None))) is not None:
+        return code
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
     from rrtik_ompl import JointGoal, load_path, load_problem

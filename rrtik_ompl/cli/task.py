@@ -130,10 +130,21 @@ def task(
     return 0 if plan.found else 1
 
 
-def checked_plan(name: str, plan: TaskPlan) -> int:
-    """Say of each motion of a plan how it is known to be free, and on what contacts; 1 if one is not."""
+def task_plan_checked(name: str, *, beside: bool) -> int | None:
+    """Say of each motion of a saved plan how it is known to be free, and on what contacts; 1 if one is not.
+
+    Args:
+        name: Of the file; None is the answer where it holds no plan of a task.
+        beside: Whether a path or a proof is named beside it.
+    """
+    from rrtik_ompl.tasks.plan_file import is_task_plan, load_task_plan
     from rrtik_ompl.tasks.setting import world_of_motion
 
+    if not is_task_plan(name):
+        return None
+    if beside:
+        raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--proof' out.")
+    plan = load_task_plan(name)
     faults = plan.violations()
     paths = tuple(
         path.proved(world_of_motion(path, world, stage))

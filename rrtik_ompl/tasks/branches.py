@@ -198,7 +198,7 @@ class Expander:
     def _drawn(self, choices: Choices) -> Iterator[Branch]:
         branch, rows = choices.branch, choices.search.rows
         for q in rows[choices.used :]:
-            arriving = self._arriving(branch, q) if choices.arrives else ()
+            arriving = self._arriving(branch, q) if choices.arrives or branch.after.scene.contacts else ()
             setting = branch.after.arriving(arriving)
             lasting = tuple(each for each in branch.after.scene.contacts if not parted(setting.world, q, each))
             yield _next(branch, branch.rest[0], setting, q, left=setting.left_with(lasting), arriving=arriving)
@@ -218,20 +218,9 @@ class Expander:
             still = JointPath.of(world.robot, branch.q[None]).proved(world)
             yield _next(branch, step, branch.after, branch.q, still)
             return
-        setting = branch.after
-        arriving: tuple[Touching, ...] = ()
-        deep = ""
-        made = self._followed(branch, way, world)
-        if made.fraction < WHOLE and handled(branch.rest[1:], world.robot):
-            unchecked = follow(world.robot, way.rails[0], branch.q, way.tolerance, centred(world.robot))
-            if unchecked.complete:
-                arriving = self._arriving(branch, unchecked.rows[-1])
-                deep = left_where(world, branch.rest[1:], unchecked.rows[-1])
-            if arriving and not deep:
-                setting = branch.after.arriving(arriving)
-                made = self._followed(branch, way, setting.world)
+        setting, arriving, made, reason = self._along(branch, way)
         if made.fraction < WHOLE:
-            self.failures.append((branch, step, f"ends at {100.0 * made.fraction:.3g} %: {deep or made.reason}"))
+            self.failures.append((branch, step, f"ends at {100.0 * made.fraction:.3g} %: {reason}"))
             return
         path = path_of(setting.world, made)
         assert path is not None, "it has come to its end"
@@ -241,6 +230,31 @@ class Expander:
             return
         left = setting.left_with(done.lasting)
         yield _next(branch, step, setting, path.end, done.path, left=left, contacts=done.contacts)
+
+    def _along(self, branch: Branch, way: Way) -> tuple[Setting, tuple[Touching, ...], Attempt, str]:
+        """Follow a line, in contact at its end only if nothing else is possible.
+
+        Returns:
+            The setting on the way, the contacts of what is taken or set down at its end, how far it came, and why.
+        """
+        setting, steps = branch.after, branch.rest[1:]
+        world = setting.world
+        made = self._followed(branch, way, world)
+        if not handled(steps, world.robot):
+            return setting, (), made, made.reason
+        if made.fraction == WHOLE:
+            arriving = self._arriving(branch, made.rows[-1]) if setting.scene.contacts else ()
+            return setting.arriving(arriving), arriving, made, made.reason
+        unchecked = follow(world.robot, way.rails[0], branch.q, way.tolerance, centred(world.robot))
+        if not unchecked.complete:
+            return setting, (), made, made.reason
+        if deep := left_where(world, steps, unchecked.rows[-1]):
+            return setting, (), made, deep
+        arriving = self._arriving(branch, unchecked.rows[-1])
+        if arriving:
+            setting = setting.arriving(arriving)
+            made = self._followed(branch, way, setting.world)
+        return setting, arriving, made, made.reason
 
     def _followed(self, branch: Branch, way: Way, world: World) -> Attempt:
         if branch.effort >= THOROUGH:

@@ -23,6 +23,7 @@ from rrtik_ompl.tasks.contact_life import MotionContact, lived
 from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.stages import MoveTo
+from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 
 FIRST_ITERATIONS = 4_000  # of each planner for a motion between postures; four times as much in each further round
@@ -154,6 +155,16 @@ class TaskSearch:
             self._expander.failures.append((link.before, link.step, made.reason))
         return made.path
 
+    def _from_parting(self, link: Branch, world: World, q: Vector, goal: Vector, effort: int) -> JointPath | None:
+        """A way on from where two have parted to the goal of a motion, both of shape (dof,)."""
+        assert link.before is not None, "it comes after another"
+        assert link.step is not None, "it has done one"
+        try:
+            return self._found(Problem(world, q, goal), link, effort)
+        except ProblemError as error:
+            self._expander.failures.append((link.before, link.step, str(error)))
+            return None
+
     def _kept(self, link: Branch, path: JointPath, effort: int) -> bool:
         """Keep the way of a motion; if what has parted on it touches again, another one is planned from there."""
         assert link.before is not None, "it comes after another"
@@ -163,8 +174,7 @@ class TaskSearch:
             world = world_of_motion(path, setting.world, link.step.stage)
             done = lived(path, world, setting.named, link.arriving)
             if done.world is not None:
-                problem = Problem(done.world, done.path.end, path.end)
-                rest = self._found(problem, link, effort)
+                rest = self._from_parting(link, done.world, done.path.end, path.end, effort)
                 if rest is None:
                     return False
                 whole = path.with_waypoints(np.vstack([done.path.waypoints, rest.waypoints[1:]])).proved(world)
