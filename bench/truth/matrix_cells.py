@@ -7,8 +7,8 @@ An answer is right if it is that of the fresh world. It is on the safe side if i
 by a way that takes only what it can prove. It is wrong if it differs otherwise: if it says free, or proven, where a
 fresh world that is asked densely does not.
 
-A further way that is not found here, such as kernels in another language, is one more row of `WAYS`: a function of a
-`Case` that gives `Judged`.
+A further way that is not found here, such as the kernels of a page, is one more row of `WAYS`: a function of a `Case`
+that gives `Judged`.
 """
 
 from __future__ import annotations
@@ -16,12 +16,16 @@ from __future__ import annotations
 import ast
 import copy
 import inspect
+import json
 import pickle
+import shutil
+import subprocess
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -40,6 +44,7 @@ from rrtik_ompl.ompl_bridge.motion_checker import SpaceChecker, WorldChecker
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.shapes import HeightField, Mesh, PointCloud, Shape
 from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.viewer.page_planner import page_planner
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.proven_motions import ProvenMotions
 from rrtik_ompl.world.weighted_motions import WeightedMotions
@@ -52,6 +57,7 @@ TRIES = 10
 SLOTS = 4  # of time in which a moving obstacle is looked at
 SAMPLES = 80  # of a roadmap
 QUERIES = 4  # of a roadmap
+PAGE_SCRIPT = Path(__file__).with_name("page_kernels.js")
 LOOKS = 20  # of a query at whether it is time to stop
 
 
@@ -499,6 +505,34 @@ def _load_problem(case: Case) -> Judged:
         return alike(rrtik.load_problem(folder / "p.yaml").world, world, case)
 
 
+def _page(case: Case) -> Judged:
+    """The kernels of a 3-D page, run by node: as the page is made, and with the obstacle dragged there."""
+    node = shutil.which("node")
+    if node is None:
+        return Judged(refused=1)
+    there = case.after.obstacles[0].pose
+    found = _in_page(node, case, case.after, None)
+    return found + _in_page(node, case, case.before, there.homogeneous.ravel().tolist())
+
+
+def _in_page(node: str, case: Case, scene: Scene, place: list[float] | None) -> Judged:
+    """What a page of a scene calls free once its obstacle is at a place."""
+    world = World(case.robot, scene)
+    free = case.Q[world.valid_batch(case.Q)]
+    if not len(free):
+        return Judged(refused=1)
+    plan = page_planner(Problem(world, free[0], free[0]), free[0], 0.1)
+    if plan is None or (place is not None and (not plan["obstacles"] or plan["obstacles"][0]["name"] != case.name)):
+        return Judged(refused=1)  # such a page does not plan, or cannot drag the obstacle
+    given = json.dumps({"plan": plan, "place": place, "Q": case.Q.tolist()})
+    command = [node, str(PAGE_SCRIPT), str(files("rrtik_ompl.viewer").joinpath("assets"))]
+    done = subprocess.run(command, input=given, capture_output=True, text=True)
+    if done.returncode:
+        said = [line for line in done.stderr.splitlines() if "Error" in line]
+        return Judged(wrong=1, fault=f"page: {said[0] if said else done.returncode}")
+    return _sided(np.array(json.loads(done.stdout), dtype=bool), case.truth.valid_batch(case.Q), "page")
+
+
 WAYS: dict[str, Way] = {
     "fresh, by coal": _by_coal,
     "World.with_accuracy": _with_accuracy,
@@ -527,6 +561,7 @@ WAYS: dict[str, Way] = {
     "Roadmap.moved_to": _roadmap,
     "load_problem": _load_problem,
     "load_roadmap": _roadmap,
+    "page": _page,
 }
 
 ASKED = {"motion_valid_batch", "motions_proven", "valid_batch", "steps_free"}  # by these a way is known
