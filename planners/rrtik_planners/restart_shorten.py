@@ -72,7 +72,7 @@ class RestartShorten(FastRRTConnect):
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         course: list[tuple[float, float]] = []
         begun, best = time.perf_counter(), np.inf
-        found = last = self.between(starts, goals, checker, ptc)
+        found = last = self._first(starts, goals, checker, ptc)
         least = np.linalg.norm(starts[:, None] - goals[None], axis=2).min()
         plans, idle, iterations = 1, 0, int(last.statistics["iterations"])
         while found.path is not None:
@@ -82,7 +82,7 @@ class RestartShorten(FastRRTConnect):
                     course.append((time.perf_counter() - begun, best))
                 route = self._shortened(last.path, best, plans, checker, ptc)
                 length = route_length(route)
-                if length < best * (1.0 - GAIN):
+                if length < best * (1.0 - GAIN) and self.stands(route, checker):
                     idle, best, found = 0, length, replace(last, path=route)
                     course.append((time.perf_counter() - begun, length))
             if idle >= self.patience or ptc() or best <= least * (1.0 + GAIN):
@@ -108,6 +108,13 @@ class RestartShorten(FastRRTConnect):
         """
         return self.between(starts, goals, checker, ptc)
 
+    def _first(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
+        """The first path that stands; one that does not if the time is up."""
+        found = self.between(starts, goals, checker, ptc)
+        while found.path is not None and not self.stands(found.path, checker) and not ptc():
+            found = self.between(starts, goals, checker, ptc)
+        return found
+
     def _shortened(self, path: Matrix, best: float, number: int, checker: MotionChecker, ptc: Stop) -> Matrix:
         """A path after a few checks, and after more as long as they gain something, if it may become the best."""
         motions = self._world if has_kernels(self._world, SHORTCUTS) else checker
@@ -117,7 +124,7 @@ class RestartShorten(FastRRTConnect):
             task = Task(motions, checks=QUICK_CHECKS, seed=100 * number + turn, stop=ptc)
             found = best_in_time(path, task)
             checker.checked_motions += task.asked if motions is self._world else 0
-            if not checker.motion_valid_batch(found[:-1], found[1:]).all():  # parts of free motions, asked otherwise
+            if not self.stands(found, checker):  # parts of free motions, asked otherwise
                 break
             path, length = found, route_length(found)
             if length > WORTH * best or length > before * (1.0 - SETTLED) or ptc():

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Mapping
+from pathlib import Path
 from typing import IO, Any
 
 from rrtik_ompl.benchmark.run import CRASH, HANG, OUT_OF_MEMORY
 from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.ompl_bridge.ownership import PLAIN_HINT, is_plain
+from rrtik_ompl.ompl_bridge.planner_files import label_of
+from rrtik_ompl.ompl_bridge.planner_names import find_planner, is_auto
 
 COMMAND = (sys.executable, "-m", "rrtik_ompl.benchmark.child")
 MEMORY_WORDS = ("bad_alloc", "MemoryError", "Cannot allocate memory")
 TAIL = 4000  # bytes of what a lost process has said
+LINES_OF_CODE = re.compile(r'^  File "(.+)", line (\d+) in ', re.MULTILINE)
 
 
 class Closed(RrtikError):
@@ -80,6 +87,8 @@ class Guard:
         if any(word in said for word in MEMORY_WORDS):
             return {"status": OUT_OF_MEMORY, "reason": f"more than {job['memory_mb']:g} MB"}
         ended = f"exit code {code}" if code >= 0 else signal.Signals(-code).name
+        if code < 0 and (why := _why_plain_planners_crash(job["planner"], said)):
+            return {"status": CRASH, "reason": f"{ended}: {why}"}
         last = next((line.strip() for line in reversed(said.splitlines()) if line.strip()), "")
         return {"status": CRASH, "reason": f"{ended}: {last}".rstrip(": ")}
 
@@ -113,6 +122,27 @@ def _asked(process: subprocess.Popen[str], question: str) -> str:
         return process.stdout.readline()
     except OSError:
         return ""
+
+
+def _why_plain_planners_crash(name: str | None, said: str) -> str:
+    """The usual cause, in a line, of a crash in a planner that derives from OMPL's class itself; "" for any other.
+
+    Args:
+        name: Of the planner.
+        said: By the process before it was lost, perhaps its stack, by :mod:`faulthandler`.
+    """
+    if name is None or is_auto(name):
+        return ""
+    try:
+        planner = find_planner(name)
+    except RrtikError:
+        return ""
+    if not is_plain(planner):
+        return ""
+    places = [(Path(file), line) for file, line in LINES_OF_CODE.findall(said)]  # the innermost first
+    own = next((place for place in places if place[0] == Path(inspect.getfile(planner))), None)
+    where = "" if own is None else f" ({own[0].name}, line {own[1]})"
+    return f"{label_of(name)} is derived from ompl.base.Planner{where}; {PLAIN_HINT}"
 
 
 class Guards:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rrtik_ompl.benchmark.run import ERROR, INVALID, SOLVED
+from rrtik_ompl.benchmark.run import CRASH, ERROR, INVALID, SOLVED
 
 # Name of each quantity, what to call it, its unit. Lengths are Euclidean in joint values; moves are transitions.
 QUANTITIES: Mapping[str, tuple[str, str]] = MappingProxyType(
@@ -124,11 +124,11 @@ def results(records: Iterable[Mapping[str, Any]]) -> list[Result]:
 
 
 def always_refused(found: Iterable[Result]) -> list[str]:
-    """Planners of which every run ended with an error, as one does that is given a parameter it cannot use."""
+    """Planners of which every run ended with an error, as with a parameter it cannot use, or ended its process."""
     statuses: dict[str, set[str]] = {}
     for result in found:
         statuses.setdefault(result.planner, set()).update(run["status"] for run in result.runs)
-    return [planner for planner, each in statuses.items() if each == {ERROR}]
+    return [planner for planner, each in statuses.items() if each and each <= {ERROR, CRASH}]
 
 
 def by_label(found: Iterable[Result]) -> dict[str, list[Result]]:

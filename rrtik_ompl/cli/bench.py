@@ -31,7 +31,7 @@ def bench(
     """Compare planners on many problems.
 
     A run that crashes, hangs or takes too much memory counts as failed; the others go on. Exit code 1 if every run of
-    some planner ended with an error, as with a parameter that it cannot use.
+    some planner crashed or ended with an error, as with a parameter that it cannot use.
     """
     from rrtik_ompl.benchmark.campaign import Progress, run_campaign
     from rrtik_ompl.benchmark.report import write_report

@@ -30,7 +30,11 @@ from rrtik_ompl.ompl_bridge.spaces.coordinates import coordinates_of
 from rrtik_ompl.ompl_bridge.spaces.unrolled import Unrolled
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.transitions import route_length
+from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, turning_joints
+from rrtik_ompl.world.route_check import route_violations, verification_resolution
+
+SEARCHES = 20  # until a world's second check takes a path
 
 
 class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
@@ -103,6 +107,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.graph_wanted = False
         self._graph: PlannerGraph | None = None
         self._world = world
+        self._judge: World | None = None  # whose second check a path has to stand
         self._states: StateIO | None = None
         self._bounds: tuple[Vector, Vector] | None = None
 
@@ -262,14 +267,47 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         line = Unrolled(*ends, self._io.turning) if self._io.turns else None
         if line is not None:
             ends, self._bounds = (line.starts, line.goals), line.bounds(*self._bounds)
-        found = self._between(*ends, ptc)
+        found = self._judged_search(*ends, ptc, line)
         if found.path is None and isinstance(pdef.getGoal(), GoalSampler):
             pdef.getGoal().more()  # for the next attempt
         found = self._kept(found, ends[1], time.perf_counter() - begun)
+        if found.difference > 0.0 and _refusal(self._world, found.path, line):
+            found = replace(found, path=None)
         if found.path is not None:
             path = self._io.path(si, found.path if line is None else line.path(found.path))
             pdef.addSolutionPath(path, found.difference > 0.0, float(found.difference), self.getName())
         return found
+
+    def _judged_search(self, starts: Matrix, goals: Matrix, stop: Stop, line: Unrolled | None) -> SearchResult:
+        """A search, begun anew as long as the second check of a given world refuses its path.
+
+        From the second one on, and for planners that improve, motions are checked as densely as by the second check.
+        """
+        world = self._world
+        if not isinstance(world, World):  # the space information has the last word
+            return self._between(starts, goals, stop)
+        dense = world.with_resolution(verification_resolution(world))
+        self._judge = world
+        try:
+            for number in range(SEARCHES):
+                self._world = dense if self.anytime or number > 0 else world
+                found = self._between(starts, goals, stop)
+                refusal = _refusal(world, found.path, line)
+                if not refusal or stop():
+                    break
+        finally:
+            self._world, self._judge = world, None
+        if not refusal:
+            return found
+        self.reason = f"no path stood: {refusal}"
+        return replace(found, path=None, difference=0.0, reason=self.reason)
+
+    def stands(self, rows: Matrix, checker: MotionChecker) -> bool:
+        """Whether a path, shape (k, n), is free, to the second check of a world too. For subclasses that improve one.
+
+        `plan()` makes that check itself, of the last path.
+        """
+        return bool(checker.motion_valid_batch(rows[:-1], rows[1:]).all()) and not _refusal(self._judge, rows)
 
     def _kept(self, found: SearchResult, goals: Matrix, seconds: float) -> SearchResult:
         """What was found, or the nearest approach to it; graph and progress are kept."""
@@ -298,3 +336,12 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             return usable(starts, None, checker.valid_batch(starts))
         free = self.ends_free(np.concatenate([starts, goals]), checker)  # all at once: a call costs more than a check
         return usable(starts, goals, free)
+
+
+def _refusal(world: object, rows: Matrix | None, line: Unrolled | None = None) -> str:
+    """Why a world's second check refuses a path, shape (k, n), in a line; "" if it does not, or there is no path."""
+    if rows is None or not isinstance(world, World):
+        return ""
+    rows = rows if line is None else line.divided(rows)
+    found = route_violations(world, rows if len(rows) > 1 else rows.repeat(2, axis=0), verification_resolution(world))
+    return found[0].reason if found else ""

@@ -136,9 +136,16 @@ def _kept_space(lower: bytes, upper: bytes) -> ob.SpaceInformation:
 atexit.register(_kept_space.cache_clear)  # the bindings complain of objects that outlive the interpreter
 
 
+class PythonsStates(ob.SpaceInformation):  # type: ignore[misc]  # OMPL has no types
+    """A SpaceInformation for planners that are written in Python too."""
+
+    def freeState(self, state: ob.State) -> None:
+        """Do nothing: the bindings free a state of ``allocState`` themselves, once Python has no more use for it."""
+
+
 def bounded_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
     """A SpaceInformation whose space has bounds, shapes (n,)."""
-    return ob.SpaceInformation(_real_space(lower, upper))
+    return PythonsStates(_real_space(lower, upper))
 
 
 def circular_space(lower: Vector, upper: Vector, turning: Mask) -> ob.SpaceInformation:
@@ -160,7 +167,7 @@ def circular_space(lower: Vector, upper: Vector, turning: Mask) -> ob.SpaceInfor
         for part in parts:
             space.addSubspace(part, 1.0)
         begin = end
-    return ob.SpaceInformation(space)
+    return PythonsStates(space)
 
 
 def _real_space(lower: Vector, upper: Vector) -> ob.RealVectorStateSpace:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from functools import partial
+from typing import Any
 
 import numpy as np
 from ompl import base as ob
@@ -12,6 +16,8 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
+from rrtik_ompl.ompl_bridge.ownership import foreign_code, is_plain
+from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, traits_of
 from rrtik_ompl.ompl_bridge.region_constraint import projected_space
 from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, circular_space, planning_bounds
 from rrtik_ompl.ompl_bridge.spaces.coordinates import Coordinates, coordinates_of
@@ -19,6 +25,7 @@ from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.world import World
+from rrtik_ompl.world.route_check import motion_taken
 
 FAR = 1e3  # [m] the clearance that OMPL is told where nothing can collide; its reports cannot hold an infinite one
 
@@ -66,14 +73,67 @@ class TipProjection(ob.ProjectionEvaluator):  # type: ignore[misc]  # OMPL has n
         projection[:] = self._robot.fk_batch([self._coordinates.read(state)])[0, :3, 3]
 
 
+class ProblemSetup(og.SimpleSetup):  # type: ignore[misc]  # OMPL has no types
+    """A SimpleSetup that knows what OMPL's planners and its bindings cannot bear."""
+
+    def solve(self, *limit: Any, **named: Any) -> ob.PlannerStatus:
+        """Solve as OMPL's own method does, within seconds or until a termination condition.
+
+        PRM, PRMstar and AORRTC get the first goal configuration alone, as in `plan()`: PRM takes up others in a thread
+        of its own, which waits for Python for ever; AORRTC gives up. Planners that are written in Python and derived
+        from ``ompl.base.Planner`` cannot have states freed twice.
+
+        Raises:
+            InputError: If PRM is to minimise an objective that is written in Python, for which it would wait as well.
+        """
+        self.setup()  # which makes the planner if nobody has
+        planner, definition = self.getPlanner(), self.getProblemDefinition()
+        if isinstance(planner, og.PRM):
+            _refuse_python(planner.getName(), definition.getOptimizationObjective())
+        one_goal = type(planner) in OMPL_TRAITS and traits_of(type(planner)).one_goal
+        aim = first_goal_alone(definition) if one_goal else nullcontext()
+        guard = foreign_code(definition) if is_plain(type(planner)) else nullcontext()
+        with aim, guard:
+            return super().solve(*limit, **named)
+
+
+def _refuse_python(name: str, objective: ob.OptimizationObjective | None) -> None:
+    if objective is not None and type(objective).__module__.partition(".")[0] != "ompl":
+        raise InputError(
+            f"{name}: its second thread would wait for ever for {type(objective).__name__}, which is written in "
+            "Python; use an objective of OMPL's, or another planner, such as BITstar"
+        )
+
+
+@contextmanager
+def first_goal_alone(definition: ob.ProblemDefinition) -> Iterator[None]:
+    """The goal of a problem is its first configuration, meanwhile; as it is where it cannot be sampled."""
+    goal, si = definition.getGoal(), definition.getSpaceInformation()
+    inputs = ob.PlannerInputStates()
+    inputs.use(definition)
+    state = inputs.nextGoal() if isinstance(goal, ob.GoalSampleableRegion) else None
+    if state is None:
+        yield
+        return
+    first = ob.GoalStates(si)
+    first.addState(state)  # copied
+    del state
+    definition.setGoal(first)
+    try:
+        yield
+    finally:
+        definition.setGoal(goal)
+
+
 def space_information(world_or_problem: World | Problem, *, so2: bool = False) -> ob.SpaceInformation:
     """A set-up ``ompl.base.SpaceInformation`` over the joints of an arm, whose questions a world answers.
 
     Its space is a RealVectorStateSpace within the joint limits [rad; m]; a joint without limits gets a turn on both
     sides of the start of a problem, or half a turn on both sides of 0 for a world. States and motions are checked by
-    the world, exactly as in `plan()`; the validity checker knows the clearance, so that OMPL's reports of it are right.
-    Beside OMPL's own projection the space has "tip", the position of the tip. For a problem with path constraints it
-    is a ConstrainedSpaceInformation of a ProjectedStateSpace, for planners of OMPL.
+    the world, exactly as in `plan()`: a motion counts as free only if :meth:`JointPath.violations` has nothing against
+    it. The validity checker knows the clearance, so that OMPL's reports of it are right. Beside OMPL's own projection
+    the space has "tip", the position of the tip. For a problem with path constraints it is a
+    ConstrainedSpaceInformation of a ProjectedStateSpace, for planners of OMPL.
 
     Args:
         world_or_problem: A `World`, or a `Problem`, whose world it is then.
@@ -107,8 +167,8 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
 def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.SimpleSetup:
     """A problem as ``ompl.geometric.SimpleSetup``: space, checks, start and goal; only the planner is missing.
 
-    A goal in joint values is a GoalState, any other one a :class:`~rrtik_ompl.ompl_bridge.GoalSampler`; its docstring
-    says which planners of OMPL cannot take that.
+    A goal in joint values is a GoalState, any other one a :class:`~rrtik_ompl.ompl_bridge.GoalSampler`. Its ``solve``
+    gives planners that cannot bear several goals the first one (:meth:`ProblemSetup.solve`).
 
     Args:
         problem: What is to be planned.
@@ -127,7 +187,7 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
     if not isinstance(problem, Problem):
         raise InputError(f"simple_setup: expected a Problem, got {type(problem).__name__}")
     si = space_information(problem, so2=so2)
-    setup, states, state = og.SimpleSetup(si), StateIO(si), si.allocState()
+    setup, states, state = ProblemSetup(si), StateIO(si), si.allocState()
     states.write(state, problem.start)
     setup.addStartState(state)
     goal: ob.Goal
@@ -144,7 +204,7 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
 def _information(world: World, lower: Vector, upper: Vector, so2: bool) -> ob.SpaceInformation:
     endless = world.robot.continuous
     si = circular_space(lower, upper, endless) if so2 and endless.any() else bounded_space(lower, upper)
-    si.setMotionValidator(CheckedMotions(si, world.motion_valid))
+    si.setMotionValidator(CheckedMotions(si, partial(motion_taken, world)))
     return _judged(si, world)
 
 

@@ -40,6 +40,13 @@ def verification_resolution(world: World) -> float:
     return max(world.motion_resolution / VERIFICATION_DENSITY, FINEST_RESOLUTION)
 
 
+def motion_taken(world: World, a: Vector, b: Vector) -> bool:
+    """Whether a motion is free in the world's own steps, and the second check takes it as part of a path."""
+    if not world.motion_valid(a, b):
+        return False
+    return not route_violations(world, np.stack([a, b]), verification_resolution(world))
+
+
 def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
     """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
     proof = known if known is not None and known.proven else world.prove(rows)

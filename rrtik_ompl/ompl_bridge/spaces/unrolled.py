@@ -71,11 +71,14 @@ class Unrolled:
 
     def path(self, rows: Matrix) -> Matrix:
         """A path on the line, shape (k, n), as one whose angles turn the short way; its ends are those given."""
-        points = [rows[:1], *(pieces(a, b, self._turning)[1:] for a, b in pairwise(rows))]
-        path = np.vstack(points)
+        path = self.divided(rows)
         for end in (0, -1):
             path[end] = self._given.get(path[end].tobytes(), path[end])
         return path
+
+    def divided(self, rows: Matrix) -> Matrix:
+        """A path on the line, shape (k, n), in pieces in which no angle turns far."""
+        return np.vstack([rows[:1], *(pieces(a, b, self._turning)[1:] for a, b in pairwise(rows))])
 
     def _known(self, image: Vector, given: Vector) -> Vector:
         self._given[image.tobytes()] = given
