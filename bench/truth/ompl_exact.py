@@ -13,7 +13,6 @@ from itertools import pairwise
 import coal
 import numpy as np
 import pinocchio as pin
-from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 

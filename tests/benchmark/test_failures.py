@@ -54,9 +54,9 @@ class Raiser(Bad):
 RAISING = 1 + BAD_PLANNERS.splitlines().index('        raise ValueError("no idea")')
 CRASHING = 1 + BAD_PLANNERS.splitlines().index("        ctypes.string_at(0)")
 CRASHED = (
-    f"SIGSEGV: crasher is derived from ompl.base.Planner (bad_planners.py, line {CRASHING}); OMPL 2.0.1's bindings free "
-    "states twice that such a class keeps or frees; derive it from rrtik_ompl.ompl_bridge.SafePlanner, which searches "
-    "on arrays"
+    f"SIGSEGV: crasher is derived from ompl.base.Planner (bad_planners.py, line {CRASHING}); OMPL 2.0.1's bindings "
+    "free states twice that such a class keeps or frees; derive it from rrtik_ompl.ompl_bridge.SafePlanner, which "
+    "searches on arrays"
 )
 
 
@@ -107,7 +107,9 @@ def test_planners_that_crash_hang_quit_or_eat_the_memory_do_not_end_a_campaign(t
 def test_a_planner_that_crashes_each_time_is_named_and_the_exit_code_is_1(tmp_path, capsys):
     (tmp_path / "bad_planners.py").write_text(BAD_PLANNERS)
     suite = tmp_path / "bad.yaml"
-    suite.write_text('version: 1\nproblems: [planar3_a]\nplanners: ["bad_planners.py:Crasher", bicrdt]\nruns: 2\n')
+    suite.write_text(
+        'version: 1\nproblems: [planar3_a]\nplanners: ["bad_planners.py:Crasher", bicrdt]\nruns: 2\nseconds: 2\n'
+    )
     assert run(["bench", str(suite), "--out", str(tmp_path / "out"), "--views", "0"]) == 1
     said = capsys.readouterr().out
     assert f"planar3_a, Crasher: 2 x crash: {CRASHED.replace('crasher', 'Crasher')}" in said.splitlines()

@@ -152,16 +152,14 @@ def test_an_objective_in_python_is_refused_where_it_would_be_waited_for(problem,
     si = setup.getSpaceInformation()
     setup.setOptimizationObjective(rrtik.objectives.clearance(si, problem.world, weight=0.1))
     setup.setPlanner(make(si))
-    with pytest.raises(
-        InputError, match="second thread would wait for ever for .* written in Python; use an objective"
-    ):
+    with pytest.raises(InputError, match=r"thread would wait for ever for \w+, which is written in Python; use"):
         setup.solve(SECONDS)
 
 
 def test_planners_that_start_threads_are_those_of_prm():
     """Another wheel may offer more of them (CForest, pRRT, pSBL, AnytimePathShortening): look at each new one."""
-    known = "AORRTC BFMT BITstar BKPIECE1 FMT InformedRRTstar KPIECE1 LBKPIECE1 PRM PRMstar RRT RRTConnect RRTstar SORRTstar"
-    assert sorted(ompl_planners()) == known.split()
+    alone = "AORRTC BFMT BITstar BKPIECE1 FMT InformedRRTstar KPIECE1 LBKPIECE1 RRT RRTConnect RRTstar SORRTstar"
+    assert set(ompl_planners()) == {*alone.split(), "PRM", "PRMstar"}
     assert issubclass(og.PRMstar, og.PRM)
 
 
