@@ -9,13 +9,14 @@ objects of these states that own nothing, as other methods return them.
 from __future__ import annotations
 
 import faulthandler
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from ompl import base as ob
 
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
+
+STANDARD_ERROR = 2  # its file; sys.stderr may be none, as in a notebook
 
 # Why a planner that is_plain() may end the process.
 PLAIN_HINT = (
@@ -38,9 +39,9 @@ def foreign_code(definition: ob.ProblemDefinition) -> Iterator[None]:
     Should its code end the process all the same, the line of Python that did so is written to standard error.
     """
     states = borrowed_states(definition)
-    silent = sys.__stderr__ is not None and not faulthandler.is_enabled()
+    silent = not faulthandler.is_enabled()
     if silent:
-        faulthandler.enable(sys.__stderr__)
+        faulthandler.enable(STANDARD_ERROR)
     try:
         yield
     finally:

@@ -17,7 +17,7 @@ from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.ownership import foreign_code, is_plain
-from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, traits_of
+from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerTraits
 from rrtik_ompl.ompl_bridge.region_constraint import projected_space
 from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, circular_space, planning_bounds
 from rrtik_ompl.ompl_bridge.spaces.coordinates import Coordinates, coordinates_of
@@ -90,7 +90,7 @@ class ProblemSetup(og.SimpleSetup):  # type: ignore[misc]  # OMPL has no types
         planner, definition = self.getPlanner(), self.getProblemDefinition()
         if isinstance(planner, og.PRM):
             _refuse_python(planner.getName(), definition.getOptimizationObjective())
-        one_goal = type(planner) in OMPL_TRAITS and traits_of(type(planner)).one_goal
+        one_goal = OMPL_TRAITS.get(type(planner), PlannerTraits()).one_goal
         aim = first_goal_alone(definition) if one_goal else nullcontext()
         guard = foreign_code(definition) if is_plain(type(planner)) else nullcontext()
         with aim, guard:
