@@ -173,8 +173,9 @@ def print_several_goals(name: str, most: int) -> None:
     begun = time.perf_counter()
     status = setup.solve(2.0)
     print(status, time.perf_counter() - begun, sep="\n")
-    if setup.haveExactSolutionPath():
-        print(*faults(problem, StateIO(si).rows(setup.getSolutionPath())), sep="\n")
+    exact = setup.haveExactSolutionPath()
+    for fault in faults(problem, StateIO(si).rows(setup.getSolutionPath())) if exact else ():
+        print(fault)
 
 
 def _several_goals(report: Report, parts: Parts) -> None:
