@@ -10,7 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from ompl import util as ou
 
 from rrtik_ompl.arrays import Matrix
 from rrtik_ompl.errors import PlannerError, RrtikError
-from rrtik_ompl.ompl_bridge.ownership import foreign_code, is_plain
+from rrtik_ompl.ompl_bridge.ownership import foreign_code
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, other_planner, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
@@ -114,8 +114,7 @@ def attempt(
             straight = _straight_motion(problem, goals) if traits.straight_first else None
             if straight is not None:
                 return Attempt(straight, "Exact solution", {})
-            guard = foreign_code(definition) if is_plain(type(planner)) else nullcontext()
-            with interrupt_ends(condition), guard:
+            with interrupt_ends(condition), foreign_code(planner, definition):
                 status = _status(planner.solve(condition))
         _raise_failure(planner, name, status, validity.error)
         rows = exact_path(definition, si)

@@ -16,7 +16,7 @@ from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
-from rrtik_ompl.ompl_bridge.ownership import foreign_code, is_plain
+from rrtik_ompl.ompl_bridge.ownership import foreign_code
 from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerTraits
 from rrtik_ompl.ompl_bridge.region_constraint import projected_space
 from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, circular_space, planning_bounds
@@ -92,8 +92,7 @@ class ProblemSetup(og.SimpleSetup):  # type: ignore[misc]  # OMPL has no types
             _refuse_python(planner.getName(), definition.getOptimizationObjective())
         one_goal = OMPL_TRAITS.get(type(planner), PlannerTraits()).one_goal
         aim = first_goal_alone(definition) if one_goal else nullcontext()
-        guard = foreign_code(definition) if is_plain(type(planner)) else nullcontext()
-        with aim, guard:
+        with aim, foreign_code(planner, definition):
             return super().solve(*limit, **named)
 
 
