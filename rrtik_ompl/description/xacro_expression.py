@@ -205,7 +205,8 @@ class Evaluator:
         if isinstance(function, BuiltinMethodType):
             kind = next((kind for kind in METHODS if isinstance(function.__self__, kind)), None)
             if kind is not None:
-                return function.__name__ in METHODS[kind]
+                called: str = function.__name__
+                return called in METHODS[kind]
         return id(function) in self._known
 
     # --- one method for each kind of node; there are no others --------------------------------------------------
