@@ -361,3 +361,9 @@ class Scene:
             for o in self.obstacles
         )
         return replace(self, obstacles=tuple(moved))
+
+
+def pairs_that_may_touch(scene: Scene) -> frozenset[tuple[frozenset[str], float | None]]:
+    """The pairs of names that a scene allows to touch, and how near those in contact may come [m]."""
+    allowed = ((frozenset(pair), None) for pair in scene.allowed_collisions)
+    return frozenset([*allowed, *((each.pair, each.distance) for each in scene.contacts)])

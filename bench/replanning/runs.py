@@ -15,6 +15,7 @@ from rrtik_ompl.replanning import ReplanRun, replan
 from rrtik_ompl.replanning.connecting import PythonConnect
 from rrtik_ompl.replanning.contact_check import ContactReport, check_contacts
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
+from rrtik_ompl.replanning.feed import feed_of
 from rrtik_ompl.replanning.generate import moving_problem
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.loop import Loop
@@ -136,7 +137,7 @@ def paired(name: str, seeds: range, slow_every: int = 8) -> tuple[Moments, Momen
 
 def _loop(name: str, seed: int) -> Loop:
     problem = arm_problem(name, seed)
-    return Loop(problem, problem.world.scene.at, ReplanSettings(seed=seed, **arm_options(name)), None)
+    return Loop(problem, feed_of(problem.world.scene), ReplanSettings(seed=seed, **arm_options(name)), None)
 
 
 def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 from enum import Enum
 from pathlib import Path
@@ -75,11 +75,12 @@ def check(
     path: PathFile = None,
     proof: Annotated[Path | None, typer.Option(help="Verify this certificate of the path, and nothing else.")] = None,
 ) -> int:
-    """Check a problem, and a path or a timed motion for it.
+    """Check a problem, and a path, a timed motion or a record of `rrtik replan` for it.
 
     Motions are proven free for their whole length; where that cannot be done they are checked densely. A timed motion
     is checked along the curve between its points, and its speeds are compared with the robot's. The file of a path may
-    contain a certificate. Exit code 1 if the path is not valid, or if its certificate does not hold.
+    contain a certificate. A record is judged against the scene at each time, between the ticks too. Exit code 1 if the
+    path is not valid, if its certificate does not hold, or if something touches in the record.
 
     In the place of a problem there may be the plan of a task (.json): each motion is checked in its own world, on the
     contacts that it stands on and no longer.
@@ -90,9 +91,10 @@ def check(
         return code
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
-    from rrtik_ompl import JointGoal, load_path, load_problem
+    from rrtik_ompl import load_path, load_problem
     from rrtik_ompl.certificates.certificate import load_certificate
     from rrtik_ompl.cli.plan_report import faults_of_motion, faults_of_path, how_proven, path_lines
+    from rrtik_ompl.cli.run_report import is_record, judged
     from rrtik_ompl.trajectory import Trajectory
     from rrtik_ompl.trajectory.load import load_motion_or_path
 
@@ -100,11 +102,11 @@ def check(
     world = question.world
     if path is not None and proof is not None:
         return _certified(question, load_path(path, world.robot), load_certificate(proof), f"{proof}")
+    if is_record(path):
+        return _said(path, *judged(question, path))
     route = None if path is None else load_motion_or_path(path, world.robot)  # a bad file is refused at once
     kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
-    ends = {"start": question.start} | ({"goal": question.goal.q} if isinstance(question.goal, JointGoal) else {})
-    for end, q in ends.items():
-        say(f"{question.name}: {end} is free, clearance {_millimetres(world.clearance(q))}{kept}")
+    _say_ends(question, kept)
     if path is None or route is None:
         suggest(command("plan", problem), command("show", problem))
         return FOUND
@@ -122,6 +124,21 @@ def check(
     code = _beside(question, route, path)
     suggest(see, f"time it: {command('time', problem, path)}")
     return code
+
+
+def _say_ends(problem: Problem, kept: str) -> None:
+    """Say how much room start and goal have."""
+    from rrtik_ompl import JointGoal
+
+    ends = {"start": problem.start} | ({"goal": problem.goal.q} if isinstance(problem.goal, JointGoal) else {})
+    for end, q in ends.items():
+        say(f"{problem.name}: {end} is free, clearance {_millimetres(problem.world.clearance(q))}{kept}")
+
+
+def _said(file: Path, lines: Sequence[str], holds: bool) -> int:
+    """Say what was found of a file; the exit code."""
+    say(*(f"{file}: {line}" for line in lines))
+    return FOUND if holds else NOT_FOUND
 
 
 def _beside(problem: Problem, route: JointPath, path: Path) -> int:

@@ -14,16 +14,27 @@ from rrtik_ompl.errors import called, require
 from rrtik_ompl.files.text import check_target, file_name
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.drrt_con import DrrtCon
-from rrtik_ompl.replanning.feed import Source, SpeedWarning, feed_of
+from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Source, SpeedWarning, Watch, feed_of
 from rrtik_ompl.replanning.loop import Clock, Loop
 from rrtik_ompl.replanning.patient import PATIENCE_SECONDS, PatientFeed
-from rrtik_ompl.replanning.record import ReplanRun, Tick, load_run
+from rrtik_ompl.replanning.record import ReplanRun, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, ReplanSettings, refuse_renamed
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, refuse_constraints
+from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory.limits import RateLimits
 
-__all__ = ["PLANNERS", "ReplanRun", "ReplanSettings", "SpeedWarning", "Tick", "load_run", "replan", "replan_with"]
+__all__ = [
+    "PLANNERS",
+    "ReplanRun",
+    "ReplanSettings",
+    "Snapshot",
+    "SpeedWarning",
+    "Tick",
+    "load_run",
+    "replan",
+    "replan_with",
+]
 
 
 def replan(  # noqa: D417 - the settings are described in one place
@@ -45,7 +56,7 @@ def replan(  # noqa: D417 - the settings are described in one place
     goal_feed: GoalFeed | None = None,
     record: str | os.PathLike[str] | None = None,
     clock: Clock = time.perf_counter,
-    feed_patience: float = PATIENCE_SECONDS,
+    feed_patience: float | None = None,
     **renamed: NoReturn,
 ) -> ReplanRun:
     """Move a robot to its goal while obstacles move: DRRT-Con [1, ch. 5.2, algorithms 6 to 8].
@@ -56,34 +67,38 @@ def replan(  # noqa: D417 - the settings are described in one place
     comes nearer than allowed the robot evades it. Nobody can predict the motion of a cloud of points: it is evaded as
     soon as it closes in.
 
-    Steps are proven: whatever obstacles do in the tick, as long as none is faster than ``speed_bound``, the arm keeps
-    ``margin`` and ``clearance`` in all of it. The record says which steps are not (:attr:`Tick.proven`).
+    What was seen has an age: the robot keeps a distance of ``margin``, and to what moves also the distance that it can
+    have travelled since it was seen and can travel in the tick. An obstacle moves if it states a motion or was seen to
+    move. While the last scene is older than a tick, only steps that are proven are made.
 
-    No contact can happen in a step along the path if no obstacle is faster than ``speed_bound``: the robot keeps a
-    distance of ``margin``, and to moving obstacles also the distance that they can travel in a tick. An obstacle moves
-    if it states a motion or was seen to move; an obstacle of a feed that begins to move beside the robot comes
-    unannounced. Contact cannot be avoided where every escape is blocked or an obstacle reaches the fixed base.
+    Steps are proven: whatever obstacles did since they were seen and do in the tick, also if they begin to move just
+    now, as long as none is faster than ``speed_bound``, the arm keeps ``margin`` and ``clearance`` in all of it. The
+    record says which steps are not (:attr:`Tick.proven`); without a ``speed_bound`` none is, beside what may move and
+    does not state how.
+    Contact cannot be avoided where the arm waits or evades and every escape is blocked, or where an obstacle reaches
+    the fixed base. :meth:`ReplanRun.violations` judges a record.
 
     Args:
         problem: Robot, scene at the begin, start and goal. Of a pose, position or region all configurations are goals:
             if one is blocked another one is tried.
         scene_feed: The scene over time: a scene whose obstacles state their motion, a function of time [s], or
-            pairs of a time and a scene; the problem's scene if None. The obstacles' names and shapes stay the
-            same, and so do attached objects, which are those of the problem.
-            A feed with fewer scenes than ticks makes obstacles jump; their speed is that of the jump in one tick.
+            pairs of a time and a scene (or a :class:`Snapshot`); the problem's scene if None. The obstacles' names and
+            shapes stay the same, and so do attached objects, which are those of the problem; the pairs that may touch
+            are those of each scene. Times of pairs are counted from the first one [s].
         step: This and all arguments that are not explained here: see :class:`ReplanSettings`.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
             It is reached when the robot is where it was at the begin of the last tick.
         record: A ``.json`` file for the record; it is written on Ctrl-C and errors too, once there is a tick.
         clock: Measures the times of the ticks and the ``repair_budget`` [s]; ``time.process_time`` counts the
             processor's, on a machine that does other things too.
-        feed_patience: How long a feed that is a function or gives pairs may take for an answer [s]; then the run ends
-            with an error, and the record has what was before.
+        feed_patience: How long pairs may have nothing new, by the time of the run [s]: then it ends with the outcome
+            "no scene"; and how long a feed may take for an answer, by the clock: then it ends with an error, and the
+            record has what was before. 2 s and 30 s if None.
         renamed: None; an old name is answered with the new one.
 
     Raises:
-        InputError: If a number is out of range, times go backwards, an obstacle begins in contact with the robot, no
-            configuration reaches the goal, a feed does not answer, or the problem has path constraints.
+        InputError: If a number is out of range, times cannot be, a half-space turns, an obstacle begins in contact with
+            the robot, no configuration reaches the goal, a feed does not answer, or the problem has path constraints.
         UnknownNameError: If there is no planner of that name.
 
     Example:
@@ -111,7 +126,7 @@ def replan_with(
     goal_feed: GoalFeed | None = None,
     record: str | os.PathLike[str] | None = None,
     clock: Clock = time.perf_counter,
-    feed_patience: float = PATIENCE_SECONDS,
+    feed_patience: float | None = None,
 ) -> ReplanRun:
     """As :func:`replan`, with settings that were made before.
 
@@ -127,13 +142,19 @@ def replan_with(
     if record is not None:
         check_target(file_name(record), (".json",))
     source = problem.world.scene if scene_feed is None else scene_feed
-    patience = positive(feed_patience, "feed_patience")
+    answer, silence = (
+        seconds if feed_patience is None else positive(feed_patience, "feed_patience")
+        for seconds in (PATIENCE_SECONDS, SILENCE_SECONDS)
+    )
     with ExitStack() as open_feeds:
-        if not isinstance(source, Scene):
-            source = open_feeds.enter_context(PatientFeed(partial(feed_of, source), patience, "scene feed"))
+        if isinstance(source, Scene):
+            watch: Watch = feed_of(source)
+        else:
+            made = partial(feed_of, source, silence)
+            watch = open_feeds.enter_context(PatientFeed(made, answer, "scene feed"))
         if (given := goal_feed) is not None:
-            goal_feed = open_feeds.enter_context(PatientFeed(lambda: given, patience, "goal feed"))
-        return _run(Loop(problem, feed_of(source), settings, goal_feed, clock), settings, record)
+            goal_feed = open_feeds.enter_context(PatientFeed(lambda: given, answer, "goal feed"))
+        return _run(Loop(problem, watch, settings, goal_feed, clock, silence), settings, record)
 
 
 def _run(loop: Loop, settings: ReplanSettings, record: str | os.PathLike[str] | None) -> ReplanRun:
@@ -141,7 +162,6 @@ def _run(loop: Loop, settings: ReplanSettings, record: str | os.PathLike[str] | 
     try:
         for number in range(int(settings.seconds * settings.rate) + 1):
             if not loop.tick(number):
-                loop.run.outcome = "arrived"
                 return loop.run
         loop.run.outcome, loop.run.reason = "out of time", loop.run.ticks[-1].reason or "still on its way"
         return loop.run

@@ -98,11 +98,14 @@ def _gaps(
     pairs = [(a, o) for a in arm for o in moving if frozenset((a.name, o.name)) not in allowed and a.joint > 0]
     frames = robot.joint_frames(rows)
     arm_poses = {id(a): frames[:, a.joint] @ a.placement.homogeneous for a in arm}
+    back = {o.name: o.pose.inverse() for o in scene.obstacles}
+    own_poses = {id(o): own[o.name] @ (back[o.name] * o.placement).homogeneous for o in moving}  # of each piece
     gaps = np.full((len(rows), len(pairs)), np.inf)
     for k, (a, o) in enumerate(pairs):
-        near = np.flatnonzero(_sphere_distances(a, arm_poses[id(a)], o, own[o.name]) < MAX_DISTANCE)
+        arm_pose, own_pose = arm_poses[id(a)], own_poses[id(o)]
+        near = np.flatnonzero(_sphere_distances(a, arm_pose, o, own_pose) < MAX_DISTANCE)
         for sample in near:
-            gaps[sample, k] = _distance(a.geometry, arm_poses[id(a)][sample], o.geometry, own[o.name][sample])
+            gaps[sample, k] = _distance(a.geometry, arm_pose[sample], o.geometry, own_pose[sample])
     return gaps, [(a.name, o.name) for a, o in pairs]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,22 @@ from rrtik_ompl.goal import JOINT_TOLERANCE
 from rrtik_ompl.poses import pose_row
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.evading import evasion
-from rrtik_ompl.replanning.feed import Feed, MotionTracker, required_distances
-from rrtik_ompl.replanning.record import ReplanRun, Tick
+from rrtik_ompl.replanning.feed import (
+    SILENCE_SECONDS,
+    MotionTracker,
+    Snapshot,
+    Travels,
+    Watch,
+    refuse_endless_turns,
+    required_distances,
+)
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs
+from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.scene import Scene, pairs_that_may_touch
+from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld, check_held
@@ -41,23 +52,26 @@ class Loop:
     def __init__(
         self,
         problem: Problem,
-        feed: Feed,
+        feed: Watch,
         settings: ReplanSettings,
         goal_feed: GoalFeed | None,
         clock: Clock = time.perf_counter,
+        patience: float = SILENCE_SECONDS,
     ) -> None:
         self._clock: Clock = lambda: finite_number(clock(), "clock: what it gives")
         self._problem, self._feed, self._settings, self._goal_feed = problem, feed, settings, goal_feed
-        robot, scene = problem.robot, self._seen(0.0)
+        self._patience = patience
+        robot = problem.robot
+        self._seen = self._watched(0.0)
+        scene = self._seen.scene
+        refuse_endless_turns(scene)
         first = problem.world.with_accuracy("exact").with_scene(scene)
-        self._world = MovingWorld(first, copies=PREDICTED_PLACES if settings.lookahead_ticks else 1)
-        self._near = MovingWorld(first, self_collision=False)
-        empty = Scene((), scene.attached, held_pairs(scene))
-        self._alone = first.with_accuracy("conservative").with_scene(empty)
+        self._make_worlds(first)
         between = 0.5 * first.motion_resolution  # the margin holds between two checked configurations too
         self._kept = min(CLEARANCE, between) if settings.clearance is None else settings.clearance
         self._searched = between + (settings.clearance or 0.0)
         self._tracker = MotionTracker(scene, settings.speed_bound)
+        self._travels = Travels(settings.tick, settings.speed_bound, self._tracker.speeds)
         self._max_change = settings.max_change(robot)
         self._rng = np.random.default_rng(settings.seed)
         self.q = problem.start
@@ -66,28 +80,43 @@ class Loop:
         )
         self._first = {o.name: o.pose for o in scene.obstacles}
         self._left = np.nan
+        self._distances: dict[str, float] = {}
+        self.run = ReplanRun(
+            problem.name, robot.name, robot.joint_names, settings.planner, settings.seed, settings.step, settings.rate,
+            settings.margin, settings.speed_bound, clearance=self._kept,
+        )  # fmt: skip
         self._read_scene(0.0)
         self._world.move(scene, inflation=self._distances)  # a start may be where an obstacle is only predicted
         check_start(self.q, scene, first, self._world)
         ends = np.vstack([self.q, self._goals])
         lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
         upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
+        self._box = lower, upper
         self._planner = make_planner(settings, self._world, lower, upper)
-        self.run = ReplanRun(
-            problem.name, robot.name, robot.joint_names, settings.planner, settings.seed, settings.step, settings.rate,
-            settings.margin, settings.speed_bound,
-        )  # fmt: skip
+        self._distances = {}  # so that the first tick puts the predicted places in
+
+    def _make_worlds(self, first: World) -> None:
+        """The worlds of a run, in which obstacles are moved from then on."""
+        scene = first.scene
+        copies = PREDICTED_PLACES if self._settings.lookahead_ticks else 1
+        self._world = MovingWorld(first, copies=copies)
+        self._near = MovingWorld(first, self_collision=False)
+        empty = Scene((), scene.attached, held_pairs(scene))
+        self._alone = first.with_accuracy("conservative").with_scene(empty)
 
     def tick(self, number: int) -> bool:
-        """Do one tick and add it to the record; False when the goal is reached."""
+        """Do one tick and add it to the record; False when the run is over."""
         now, begin = number * self._settings.tick, self._clock()
         if self._arrived():
             self._record(now, self.q, "arrive", {}, 0, "")
+            self.run.outcome = "arrived"
             return False
         if self._goal_feed is not None:
             self._goals = goal_now(self._problem.robot, self._goal_feed, now)
         spent: dict[str, float] = {}
         changed = self._measured(spent, "sense", self._read_scene, now)
+        if now - self._seen.time > self._patience:
+            return self._give_up(now)
         self._measured(spent, "retarget", self._follow_goal)
         checked = self._world.checked
         free = self._measured(spent, "look", self._check) if changed or not self._planner.free else True
@@ -101,28 +130,66 @@ class Loop:
         event, reason, place = self._early_evasion() or (self._go(event) if free else self._wait_or_evade())
         self._left, path = self._distance_left(place), self._planner.path
         moves = (place != here).any()
-        proven = self._measured(spent, "prove", self._proven, here[None], place[None]) if moves else None
+        proven = self._measured(spent, "prove", self._surely_free, here, place) if moves else None
         self._record(now, here, event, {**spent, "all": self._clock() - begin}, checked, reason, path, proven)
         self.q = place
         return True
 
-    def _seen(self, now: float) -> Scene:
+    def _give_up(self, now: float) -> bool:
+        """End the run, since the feed has nothing new."""
+        silent = f"no scene since {self._seen.time:.3g} s: the scene feed has ended, or has been silent for longer"
+        reason = f"{silent} than feed_patience ({self._patience:g} s)"
+        self._record(now, self.q, "wait", {}, 0, reason)
+        self.run.outcome, self.run.reason = "no scene", reason
+        return False
+
+    def _watched(self, now: float) -> Snapshot:
         """What the feed has, in which the arm must hold what it holds in the problem."""
-        scene = self._feed(now)
-        check_held(scene, self._problem.world.scene)
-        return scene
+        seen = self._feed(now)
+        check_held(seen.scene, self._problem.world.scene)
+        return seen
 
     def _read_scene(self, now: float) -> bool:
-        """Read the scene; whether anything has moved."""
-        scene = self._seen(now)
-        if not self._tracker.update(now, scene):
+        """Read the scene; whether anything has moved, or may have since it was seen."""
+        seen = self._watched(now)
+        scene, ages = seen.scene, seen.ages(now)
+        allows = self._allow(scene)
+        changed = self._tracker.update(seen) or allows
+        self._doubt_moves_since(self._tracker.faster_since)
+        self._seen = seen
+        self.run.see(seen)
+        self._blind = self._settings.speed_bound is not None and max(ages.values(), default=0.0) > self._settings.tick
+        self._aged = self._travels.since_seen(scene, ages)
+        clear = self._settings.margin + self._searched
+        in_tick = self._travels.in_tick(scene)
+        self._at_once = required_distances(scene, clear, in_tick)
+        distances = required_distances(scene, clear, {name: way + self._aged[name] for name, way in in_tick.items()})
+        self._ways = self._travels.possible(seen, ages)
+        self._possible = None if self._ways is None else required_distances(scene, clear, self._ways)
+        if not changed and distances == self._distances:
             return False
-        settings = self._settings
-        clear = settings.margin + self._searched
-        self._distances = required_distances(scene, clear, settings.tick, settings.speed_bound, self._tracker.speeds)
-        predicted = (self._tracker.later(scene, seconds) for seconds in self._lookahead())
-        self._world.move(scene, *predicted, inflation=self._distances)
+        self._distances = distances
+        predicted = (self._tracker.later(scene, seconds, ages) for seconds in self._lookahead())
+        self._world.move(scene, *predicted, inflation=distances)
         return True
+
+    def _allow(self, scene: Scene) -> bool:
+        """Make new worlds if other pairs may touch than before; whether that was so."""
+        before = self._world.scene
+        if pairs_that_may_touch(scene) == pairs_that_may_touch(before):
+            return False
+        self._make_worlds(self._problem.world.with_accuracy("exact").with_scene(scene))
+        self._planner = make_planner(self._settings, self._world, *self._box)
+        return True
+
+    def _doubt_moves_since(self, time: float) -> None:
+        """No move is proven in which an obstacle was faster than stated."""
+        ticks = self.run.ticks
+        for k in range(len(ticks) - 1, -1, -1):
+            if ticks[k].time + self._settings.tick <= time:
+                break
+            if ticks[k].proven:
+                ticks[k] = replace(ticks[k], proven=False)
 
     def _lookahead(self) -> list[float]:
         """Times from now at which obstacles are avoided where they are predicted to be [s]."""
@@ -169,6 +236,17 @@ class Loop:
         """Whether motions, shapes (m, n), keep margin and clearance, whatever obstacles do within a tick."""
         return bool(self._world.motions_proven(starts, ends, less=self._searched - self._kept).all())
 
+    def _surely_free(self, a: Vector, b: Vector) -> bool:
+        """Whether a motion keeps margin and clearance, whatever obstacles did since they were seen and do in the tick.
+
+        Other than in the search for a path, what was at rest so far may begin to move, and nothing may reach the base.
+        """
+        if self._ways is None or self._possible is None or not self._world.base_apart(self._ways):
+            return False
+        room = None if self._possible == self._distances else self._possible
+        less = self._searched - self._kept
+        return bool(self._world.motions_proven(a[None], b[None], less=less, inflation=room)[0])
+
     def _new_path(self, stop: Stop) -> bool:
         planner = self._planner
         if planner.path is None:
@@ -188,7 +266,9 @@ class Loop:
     def _go(self, event: TickEvent) -> tuple[TickEvent, str, Vector]:
         """Go along the free path. Event, reason, configuration."""
         place = self._step()
-        return (event, "", place) if place is not self.q else ("wait", "the goal is not free", place)
+        if place is not self.q:
+            return event, "", place
+        return "wait", "what was seen is too old to go on" if self._blind else "the goal is not free", place
 
     def _step(self) -> Vector:
         """Go a step along the path, round corners if that is free; the configuration of the robot then."""
@@ -199,6 +279,8 @@ class Loop:
         round_corner = bool(passed) and self._world.motion_valid(self.q, place)
         if passed and not (round_corner and self._proven(self.q[None], place[None])):
             place, passed = to_first_corner(path, settings.step, self._max_change)
+        if self._blind and not self._surely_free(self.q, place):
+            return self.q
         self._planner.advance(place, passed, self._world)
         return place
 
@@ -211,7 +293,7 @@ class Loop:
         """The distance of a configuration to obstacles beyond what has to be kept [m]; NaN where all is predicted."""
         if not self._tracker.unforeseen(0.0):
             return np.nan
-        return float(self._ahead(0).clearance(q[None])[0]) - max(self._distances.values())
+        return float(self._ahead(0).clearance(q[None])[0]) - max(self._at_once.values())
 
     def _wait_or_evade(self) -> tuple[TickEvent, str, Vector]:
         """Without a free path: wait, or evade an obstacle that is too near. Event, reason, configuration."""
@@ -231,7 +313,7 @@ class Loop:
         """The configuration after an evasive tick, from which the path goes on; None to stand still."""
         place = evasion(
             self.q, self._planner.path, step=self._settings.step, max_change=self._max_change,
-            distance=max(self._distances.values()), ahead=self._ahead, alone=self._alone, rng=self._rng,
+            distance=max(self._at_once.values()), ahead=self._ahead, alone=self._alone, rng=self._rng,
         )  # fmt: skip
         if place is not None:
             self._planner.rejoin(place)
@@ -241,7 +323,9 @@ class Loop:
         """The world without self-collision so many ticks ahead; what cannot be predicted may have come nearer."""
         seconds, now = ticks * self._settings.tick, self._world.scene
         scene = self._tracker.later(now, seconds) if ticks else now
-        self._near.move(scene, inflation=self._tracker.unforeseen(seconds))
+        unforeseen = self._tracker.unforeseen(seconds)
+        room = {name: way + unforeseen.get(name, 0.0) for name, way in self._aged.items()}
+        self._near.move(scene, inflation=room)
         return self._near
 
     def _arrived(self) -> bool:

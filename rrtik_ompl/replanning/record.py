@@ -14,50 +14,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
 from rrtik_ompl.choices import RunOutcome, TickEvent, one_of
-from rrtik_ompl.copies import as_value, in_one_line
+from rrtik_ompl.copies import in_one_line
 from rrtik_ompl.errors import InputError, in_file, require
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.poses import pose
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.replanning.feed import Feed, Snapshot
+from rrtik_ompl.replanning.judge import RunViolation, run_violations
+from rrtik_ompl.replanning.scenes_file import scenes_data, scenes_of
+from rrtik_ompl.replanning.tick import Tick
+from rrtik_ompl.scene import Scene
+from rrtik_ompl.shapes import PointCloud
 from rrtik_ompl.transitions import route_length
 
 KIND = "replan_run"
+MOST_POINTS = 2_000_000  # of all clouds that a record keeps
 MAX_RECORD_BYTES = 512 * 1024 * 1024  # bytes of a record, half an hour of 20 obstacles at 50 Hz
 EVENTS: tuple[TickEvent, ...] = get_args(TickEvent)
 OUTCOMES: tuple[RunOutcome, ...] = get_args(RunOutcome)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Tick:
-    """What happened in one tick.
-
-    Attributes:
-        time: Of its begin [s].
-        q: The robot's configuration then, shape (n,).
-        event: "plan" or "repair": move along a path found just now, the first one or another one; "walk": along the old
-            one; "wait"; "evade"; "arrive": the last configuration.
-        path: The path after the tick's work, shape (k, n), free or blocked; None before the first one was found and in
-            the last tick.
-        poses: Of the obstacles that have moved since the first tick: x, y, z and quaternion x, y, z, w.
-        seconds: Wall time of its parts [s]: "sense", "retarget", "look" (check of the path), "plan" or
-            "repair" (search and shortening), "prove" (of the step), "all".
-        checked: Number of configurations that were checked along the path.
-        reason: Why the robot waits or evades, or "".
-        proven: Whether the motion to the next tick's configuration is proven to keep margin and clearance, as long as
-            no obstacle is faster than stated; None if there is no motion.
-    """
-
-    time: float
-    q: Vector
-    event: TickEvent
-    path: Matrix | None
-    poses: Mapping[str, Vector]
-    seconds: Mapping[str, float]
-    checked: int = 0
-    reason: str = ""
-    proven: bool | None = None
-
-    __reduce__ = as_value
 
 
 @dataclass(slots=True, eq=False)
@@ -68,7 +43,10 @@ class ReplanRun:
         problem, robot, joint_names, planner, seed: What ran.
         step, rate, margin, speed_bound: As given to :func:`replan` [unit of the space, Hz, m, m/s].
         ticks: One after the other.
-        outcome: One of ``OUTCOMES``.
+        clearance: What moves that are proven keep from obstacles beside ``margin`` [m]; None in old records.
+        scenes: What was seen, in the order of time; a scene that states its motions stands for all times.
+        scenes_end: From when on scenes are not kept, since their clouds of points were too large [s]; inf if all are.
+        outcome: One of ``OUTCOMES``; "no scene": the feed had nothing new for too long.
         reason: Why the robot has not arrived, or "".
 
     Example:
@@ -88,10 +66,59 @@ class ReplanRun:
     margin: float
     speed_bound: float | None
     ticks: list[Tick] = field(default_factory=list)
+    clearance: float | None = None
+    scenes: list[Snapshot] = field(default_factory=list)
+    scenes_end: float = float("inf")
+    _points: int = field(default=0, repr=False)
 
     __repr__ = in_one_line
     outcome: RunOutcome = "interrupted"
     reason: str = ""
+
+    def see(self, seen: Snapshot) -> None:
+        """Keep what was seen, if it is new."""
+        scenes = self.scenes
+        if seen.time >= self.scenes_end or (scenes and (scenes[0].stated or seen.time <= scenes[-1].time)):
+            return
+        self._points += _new_points(seen, scenes[-1] if scenes else None)
+        if self._points > MOST_POINTS and scenes:
+            self.scenes_end = seen.time
+        elif len(scenes) > 1 and scenes[-2].scene is scenes[-1].scene is seen.scene and not seen.unseen:
+            scenes[-1] = seen  # all has stayed where it was
+        else:
+            scenes.append(seen)
+
+    def violations(self, problem: Problem, truth: Scene | Feed | None = None) -> tuple[RunViolation, ...]:
+        """What touches in the run, judged anew: at every time, not in steps, by coal and a bound on the motion.
+
+        In a tick the arm goes straight from one configuration to the next. Obstacles go as their scene states, or
+        straight from where they were seen to where they were seen next; after the last time they stay. Moves that
+        are called proven have to keep margins and the clearance, all else must not touch. Nothing of
+        :class:`MovingWorld` is used.
+
+        Args:
+            problem: That was run: its robot, and the scene of a record that has none.
+            truth: Where obstacles really were, if that is known: a scene that states their motion, or a function of
+                time [s]; what was seen if None.
+
+        Returns:
+            For each tick and pair the place where most is lacking, in the order of time.
+
+        Raises:
+            InputError: If the run is another robot's, or its scenes were too large to be kept.
+
+        Example:
+            >>> scenario = rrtik.load_scenario("replan_walls")
+            >>> scenario.run(seconds=1.0, seed=1).violations(scenario.problem)
+            ()
+        """
+        if problem.robot.joint_names != self.joint_names:
+            named = f"run of robot '{self.robot}' with other joints than '{problem.robot.name}'"
+            raise InputError(f"{named}; give the problem that was run")
+        if truth is None and self.ticks and self.scenes_end <= self.ticks[-1].time:
+            raise InputError(f"run: its clouds were too large to be kept after {self.scenes_end:g} s; give the truth")
+        beside = self.margin + (self.clearance or 0.0)
+        return run_violations(self.ticks, self.scenes, problem, beside=beside, truth=truth)
 
     @property
     def arrived(self) -> bool:
@@ -162,8 +189,12 @@ class ReplanRun:
             InputError: If the file cannot be written.
         """
         heads = {name: getattr(self, name) for name in _HEADS}
+        if self.scenes_end < float("inf"):
+            heads["scenes_end"] = self.scenes_end
         ticks = [_tick_data(tick) for tick in self.ticks]
-        write_text(path, json.dumps({"version": 1, "kind": KIND, **heads, "ticks": ticks}) + "\n")
+        scenes = scenes_data(self.scenes) if self.scenes else {}
+        document = {"version": 1, "kind": KIND, **heads, "clearance": self.clearance, **scenes, "ticks": ticks}
+        write_text(path, json.dumps(document) + "\n")
 
 
 _HEADS: tuple[str, ...] = ("problem", "robot", "joint_names", "planner", "seed", "step", "rate", "margin")
@@ -187,7 +218,7 @@ def load_run(path: str | os.PathLike[str]) -> ReplanRun:
         heads = _heads(document)
         ticks = [_tick(entry, len(heads["joint_names"])) for entry in document["ticks"]]
         _check_times(ticks)
-        return ReplanRun(**heads, ticks=ticks)
+        return ReplanRun(**heads, ticks=ticks, scenes=scenes_of(document))
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
     except InputError as error:
@@ -207,6 +238,10 @@ def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
     if given["speed_bound"] is not None:
         positive(given["speed_bound"], "speed_bound")
     outcome = one_of(OUTCOMES, given["outcome"], "outcome")
+    clearance = document.get("clearance")  # older records have none
+    given["clearance"] = None if clearance is None else not_negative(clearance, "clearance")
+    if "scenes_end" in document:
+        given["scenes_end"] = finite_number(document["scenes_end"], "scenes_end")
     return {**given, "outcome": outcome, "joint_names": tuple(given["joint_names"])}
 
 
@@ -247,3 +282,10 @@ def _placed(values: ArrayLike, what: str) -> Vector:
     row = finite_array(values, (7,), what)
     pose(row[:3], row[3:], what)
     return row
+
+
+def _new_points(seen: Snapshot, before: Snapshot | None) -> int:
+    """How many points the clouds of a scene have that were not in the one before it."""
+    known = set[int]() if before is None else {id(o.shape) for o in before.scene.obstacles}
+    clouds = (o.shape for o in seen.scene.obstacles if isinstance(o.shape, PointCloud))
+    return sum(len(cloud.points) for cloud in clouds if id(cloud) not in known)

@@ -48,14 +48,16 @@ class Scenario:
         *,
         record: str | os.PathLike[str] | None = None,
         clock: Clock = time.perf_counter,
+        feed_patience: float | None = None,
         **changes: object,
     ) -> ReplanRun:
         """Replan, with some settings changed; see :func:`rrtik_ompl.replanning.replan`.
 
         Args:
-            scene_feed: This and the next two: see :func:`rrtik_ompl.replanning.replan`.
+            scene_feed: This and the next three: see :func:`rrtik_ompl.replanning.replan`.
             record: The same.
             clock: The same.
+            feed_patience: The same.
             changes: Attributes of :class:`rrtik_ompl.replanning.ReplanSettings` that differ from the scenario's.
 
         Raises:
@@ -63,7 +65,10 @@ class Scenario:
         """
         refuse_renamed({name: value for name, value in changes.items() if name not in SETTINGS})
         settings = replace(self.settings, **changes)  # type: ignore[arg-type]
-        return replan_with(settings, self.problem, scene_feed, goal_feed=self.goal_feed, record=record, clock=clock)
+        return replan_with(
+            settings, self.problem, scene_feed, goal_feed=self.goal_feed, record=record, clock=clock,
+            feed_patience=feed_patience,
+        )  # fmt: skip
 
 
 def load_scenario(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = False) -> Scenario:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.replanning.feed import Snapshot
+from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.sensor import Sensor
@@ -13,13 +15,12 @@ from rrtik_ompl.sensing.sensor import Sensor
 REMEDY = "show every object of the marker map, or give the scene that holds it"
 
 
-def scene_feed(
-    pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None = None
-) -> Iterator[tuple[float, Scene]]:
+def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None = None) -> Iterator[Snapshot]:
     """Pairs of a time and a scene, as :func:`rrtik_ompl.replan` takes them; a live camera sets the pace of the run.
 
     Pictures are passed over until every object of the marker map has been seen once, for nobody knows where the others
-    are. From then on an object that is out of view, or cannot be placed, stays where it was seen last.
+    are. From then on an object that is out of view, or cannot be placed, stays where it was seen last, and the snapshot
+    says for how long it has been unseen. Obstacles that no camera looks for are at rest.
 
     Args:
         pictures: In the order of time, such as ``pictures_from(source)``. The first that is used has the time 0.
@@ -30,20 +31,31 @@ def scene_feed(
     Raises:
         InputError: If the pictures end before everything was seen; it names what was not. If a picture cannot be used.
     """
-    around = Scene(()) if scene is None else scene
+    given_scene = Scene(()) if scene is None else scene
     solids = [
         name for each in sensor.marker_map.objects if each.role not in ("base", "arm") for name in each.solid_names
     ]
-    given, seen = {obstacle.name for obstacle in around.obstacles}, dict[str, Obstacle]()
+    given, seen = {obstacle.name for obstacle in given_scene.obstacles}, dict[str, Obstacle]()
+    around = replace(given_scene, obstacles=tuple(_at_rest(o, solids) for o in given_scene.obstacles))
     begin, why = None, ""
+    last = dict[str, float]()  # when each was seen
     for picture in pictures:
         view = sensor.view(picture)
-        seen |= {solid.name: solid for each in view.placed for solid in each.solids()}
+        now = {solid.name: solid for each in view.placed for solid in each.solids()}
+        seen |= now
+        last |= dict.fromkeys(now, picture.time)
         if (given | seen.keys()).issuperset(solids):
             begin = picture.time if begin is None else begin
-            yield picture.time - begin, scene_with(around, seen.values())
+            unseen = {name: picture.time - last.get(name, begin) for name in solids if name not in now}
+            yield Snapshot(picture.time - begin, scene_with(around, seen.values()), unseen)
         why = view.why_not_placed
     if begin is None:
         lacking = [name for name in solids if name not in given | seen.keys()]
         what = ", ".join(lacking) or "any picture"
         raise InputError(f"scene feed: the pictures ended before this was seen: {what}; {why or REMEDY}")
+
+
+def _at_rest(obstacle: Obstacle, seen: list[str]) -> Obstacle:
+    """An obstacle that states to be at rest if no camera looks for it and it states no motion."""
+    known = obstacle.name in seen or obstacle.motion is not None
+    return obstacle if known else replace(obstacle, motion=ConstantVelocity([0.0, 0.0, 0.0]))

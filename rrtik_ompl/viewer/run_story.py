@@ -10,7 +10,8 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.poses import pose_row
-from rrtik_ompl.replanning.record import ReplanRun, Tick
+from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.framing import Frame

@@ -11,7 +11,8 @@ from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import pose_row
-from rrtik_ompl.replanning.record import ReplanRun, Tick
+from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.timed import time_task
 from rrtik_ompl.viewer.fingers import fingers_of

@@ -9,23 +9,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import coal
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Vector, finite_array, not_negative
 from rrtik_ompl.choices import Accuracy
 from rrtik_ompl.collision.bodies import Body, Pairs
-from rrtik_ompl.collision.certificate import fixed_contact
+from rrtik_ompl.collision.certificate import distance, fixed_contact
 from rrtik_ompl.collision.cloud_solid import cloud_solid
 from rrtik_ompl.errors import InputError, UnknownNameError, require
 from rrtik_ompl.fast import FREE, FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene, pairs_that_may_touch
 from rrtik_ompl.shapes import PointCloud, same_shape
 from rrtik_ompl.world import World
 from rrtik_ompl.world.arm_cache import arm_cache
 from rrtik_ompl.world.moving_proof import MovingProver
+
+SAME_PLACE = 1e-6  # [m] and of directions: of what a link holds, by which two scenes may differ
 
 
 class MovingWorld:
@@ -109,14 +112,16 @@ class MovingWorld:
                 its own.
 
         Raises:
-            InputError: If a scene has other obstacles or attached objects than the world began with, or an inflation is
-                not 0 or more.
+            InputError: If a scene has other obstacles, attached objects or allowed pairs than the world began with, or
+                an inflation is not 0 or more.
             UnknownNameError: If an inflation is given for what is no obstacle.
         """
         places = [{o.name: o for o in scene.obstacles} for scene in scenes]
         for scene in scenes:
             _check_obstacles(scene, self._known)
             check_held(scene, self.scene)
+            if pairs_that_may_touch(scene) != pairs_that_may_touch(self.scene):
+                raise InputError("scene: other pairs may touch than before; make a new world")
         for name, metres in (inflation or {}).items():
             if name not in self._known:
                 raise UnknownNameError("obstacle", name, self._known, where="inflation")
@@ -168,24 +173,55 @@ class MovingWorld:
             free[free] = self._prover.proven(starts[free], ends[free], clearance=self._proving - self._room)
         return free
 
-    def motions_proven(self, A: ArrayLike, B: ArrayLike, *, less: float = 0.0) -> Mask:
+    def motions_proven(
+        self, A: ArrayLike, B: ArrayLike, *, less: float = 0.0, inflation: Mapping[str, float] | None = None
+    ) -> Mask:
         """Which straight motions A[k] -> B[k], shapes (m, dof), are proven free as a whole. Shape (m,).
 
         They keep margins and ``inflation``, ``less`` [m] less of these, from where obstacles are now. Copies, which
-        stand where obstacles will be, do not count.
+        stand where obstacles will be, do not count. ``inflation`` [m] stands for that of :meth:`move` here alone.
         """
         starts, ends = (finite_array(Q, (None, self.robot.dof), "ends of motions") for Q in (A, B))
-        return self._prover.proven(starts, ends, clearance=-less)
+        if inflation is None:
+            return self._prover.proven(starts, ends, clearance=-less)
+        room = [inflation.get(b.name, own) for b, own in zip(self._bodies, self._inflation, strict=True)]
+        blocked = bool(self.blocked)
+        self._prover.place(self._bodies, room, always_colliding=blocked)
+        proven = self._prover.proven(starts, ends, clearance=-less)
+        self._prover.place(self._bodies, self._inflation, always_colliding=blocked)
+        return proven
 
     def _roomy(self, body: Body, margin: float) -> Body:
         """A body that has a margin [m]; an obstacle with the clearance of the world on top of it."""
         kept = margin + self._room
         return body if body.kind != "obstacle" or kept == body.margin else replace(body, margin=kept)
 
+    def base_apart(self, ways: Mapping[str, float]) -> bool:
+        """Whether obstacles are apart from what never moves, and stay so even if they go as far as is said [m]."""
+        for pair in self._fixed:
+            part, solid = sorted((self._bodies[k] for k in pair), key=lambda body: body.kind == "obstacle")
+            way = ways.get(solid.name, 0.0)
+            if way > 0.0 and _may_meet(part, solid, way):
+                places = part.placement.homogeneous, solid.placement.homogeneous
+                if distance(part.geometry, places[0], solid.geometry, places[1], way) is None:
+                    return False
+        return not self.blocked
+
     def _contact_of_base(self) -> str:
         """See ``blocked``; predicted places do not count, for nothing can be done about them."""
         found = fixed_contact(self.robot, tuple(self._bodies), self._fixed)
         return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
+
+
+def _may_meet(first: Body, second: Body, way: float) -> bool:
+    """Whether balls around two standing bodies are no farther apart than a way [m]."""
+    solids = first.geometry, second.geometry
+    if any(isinstance(solid, coal.Halfspace) for solid in solids):
+        return True
+    centres = [
+        body.placement.act(np.asarray(solid.aabb_center)) for body, solid in zip((first, second), solids, strict=True)
+    ]
+    return float(np.linalg.norm(centres[0] - centres[1])) <= way + sum(float(solid.aabb_radius) for solid in solids)
 
 
 def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
@@ -205,10 +241,23 @@ def check_held(scene: Scene, before: Scene) -> None:
     Raises:
         InputError: It names what is held.
     """
-    now, held = ({a.name for a in each.attached} for each in (scene, before))
-    if now != held:
+    now, held = ({a.name: a for a in each.attached} for each in (scene, before))
+    if now.keys() != held.keys():
         given, wanted = (", ".join(sorted(names)) or "nothing" for names in (now, held))
         raise InputError(f"scene: the arm held {wanted}, and now {given}; give scenes with the same attached objects")
+    for name, item in now.items():
+        if not _held_alike(item, held[name]):
+            raise InputError(
+                f"scene: '{name}' is held otherwise than before; give scenes with the same attached objects"
+            )
+
+
+def _held_alike(first: AttachedObject, second: AttachedObject) -> bool:
+    """Whether the arm holds the same in the same way."""
+    numbers = ((each.link, set(each.allow), each.padding, each.margin) for each in (first, second))
+    same = next(numbers) == next(numbers)
+    placed = np.allclose(first.pose.homogeneous, second.pose.homogeneous, rtol=0.0, atol=SAME_PLACE)
+    return same and placed and same_shape(first.shape, second.shape)
 
 
 def _with_copies(

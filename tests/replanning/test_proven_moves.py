@@ -7,7 +7,7 @@ import pytest
 from rrtik_ompl.catalog import load_robot
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.replanning import load_run, replan
-from rrtik_ompl.replanning.feed import MotionTracker
+from rrtik_ompl.replanning.feed import MotionTracker, Snapshot
 from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, PointCloud, Prism, Sphere
 from rrtik_ompl.world import World
@@ -135,5 +135,5 @@ def test_a_cloud_that_has_grown_and_turns_is_as_fast_as_its_farthest_point():
 
     tracker = MotionTracker(seen(0.1, 0.0), None)
     for number, (reach, angle) in enumerate([(0.1, 0.0), (2.0, 0.0), (2.0, 0.3)]):
-        tracker.update(0.1 * number, seen(reach, angle))
+        tracker.update(Snapshot(0.1 * number, seen(reach, angle)))
     assert tracker.speeds["seen"] >= 2.0 * 0.3 / 0.1

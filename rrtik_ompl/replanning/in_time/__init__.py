@@ -15,11 +15,13 @@ from rrtik_ompl.fast.simd.library import library
 from rrtik_ompl.poses import pose_row
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.drrt_con import without_points_between
+from rrtik_ompl.replanning.feed import Snapshot, refuse_endless_turns
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.search import Ends, TimeSearch
 from rrtik_ompl.replanning.in_time.tree import Pace
-from rrtik_ompl.replanning.record import ReplanRun, Tick
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints
+from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.world.kept_clearance import CLEARANCE
@@ -121,6 +123,7 @@ def plan_in_time(
     """
     require(problem, Problem, "problem to plan in time", "use Problem(world, start, goal) or load_scenario(name)")
     refuse_constraints(problem, "plan in time")
+    refuse_endless_turns(problem.world.scene)
     options = _Options(
         slot=1.0 / positive(rate, "rate", "give slots a second, such as 10"),
         horizon=positive(horizon, "horizon", "give the latest arrival [s]"),
@@ -203,8 +206,10 @@ def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Option
     robot, slot = problem.robot, options.slot
     step = min(search.pace.step, float(np.linalg.norm(search.pace.change)))
     run = ReplanRun(
-        problem.name, robot.name, robot.joint_names, NAME, options.seed, step, 1.0 / slot, options.margin, None
-    )
+        problem.name, robot.name, robot.joint_names, NAME, options.seed, step, 1.0 / slot, options.margin, None,
+        clearance=options.clearance,
+    )  # fmt: skip
+    run.see(Snapshot(0.0, search.worlds.scene_at(0.0), stated=True))
     first = {o.name: o.pose for o in search.worlds.scene_at(0.0).obstacles}  # stated poses may be others
     for number, q in enumerate(rows):
         left = rows[number:]
