@@ -45,7 +45,12 @@ class Rebuilt:
 
     @classmethod
     def of(cls: type[Kind], settings: WorldSettings) -> Kind:
-        """A world made from settings: all of them are arguments of its class."""
+        """A world made from settings: all of them are arguments of its class.
+
+        Raises:
+            InputError: If they are none.
+        """
+        require(settings, WorldSettings, "settings of a world", "use world.settings, or dataclasses.replace of them")
         return cls(**{each.name: getattr(settings, each.name) for each in fields(settings)})
 
     @property

@@ -20,7 +20,7 @@ MIXED = """<robot name="mixed"><link name="base"><collision><geometry><box size=
 <joint name="bend" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.5 0 0"/><axis xyz="0 1 0"/>
   <limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
 <joint name="follow" type="revolute"><parent link="c"/><child link="d"/><origin xyz="0.5 0 0"/><axis xyz="0 1 0"/>
-  <limit lower="-2" upper="2" velocity="1" effort="1"/><mimic joint="bend" multiplier="-1.5" offset="0.2"/></joint>
+  <limit lower="-4" upper="4" velocity="1.5" effort="1"/><mimic joint="bend" multiplier="-1.5" offset="0.2"/></joint>
 </robot>"""
 
 T_BASE = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([1.0, 2.0, 3.0]))
