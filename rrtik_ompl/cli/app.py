@@ -75,7 +75,7 @@ def check(
     path: PathFile = None,
     proof: Annotated[Path | None, typer.Option(help="Verify this certificate of the path, and nothing else.")] = None,
 ) -> int:
-    """Check a problem, and a path, a timed motion or a record of `rrtik replan` for it.
+    """Check a problem, and a path, a motion or a run for it.
 
     Motions are proven free for their whole length; where that cannot be done they are checked densely. A timed motion
     is checked along the curve between its points, and its speeds are compared with the robot's. The file of a path may
