@@ -328,9 +328,12 @@ class World(Rebuilt):
     def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
         """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
         rows = self._rows(q, 1)
-        found = list(measured(self.bodies, self.pairs, self.robot.joint_frames(rows)[0], near_only=True))
+        kept = self._checks.contacts_of_meshes_kept(rows)
+        pairs = tuple(pair for pair in self.pairs if pair not in kept) if kept else self.pairs
+        found = list(measured(self.bodies, pairs, self.robot.joint_frames(rows)[0], near_only=True))
         if not found:
-            found = [inside(*names) for names in self._certificate().first_pairs(rows) if names is not None]
+            certificate = Certificate(self.robot, self.bodies, pairs) if kept else self._certificate()
+            found = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
         return tuple(sorted(found, key=lambda c: c.clearance))
 
     def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:

@@ -26,7 +26,7 @@ from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.own_distances import is_ours, own_gap
-from rrtik_ompl.collision.solids import around, solids_of
+from rrtik_ompl.collision.solids import around, is_mesh, solids_of
 from rrtik_ompl.copies import Items, Once, shallow_copy
 from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
 from rrtik_ompl.fast.taken_tables import TakenTables
@@ -129,6 +129,14 @@ class ExactChecker:
         if self.in_contact:
             free[free] = self._contacts.proven(rows[free], rows[free])
         return free
+
+    def contacts_of_meshes_kept(self, row: Matrix) -> frozenset[tuple[int, int]]:
+        """The pairs in contact with a hollow mesh that are proven no deeper than they may be at a row, shape (1, dof).
+
+        Of these coal knows the depth of their hulls only, which are filled.
+        """
+        doubtful = [pair for pair in self.in_contact if any(is_mesh(self.bodies[k].geometry) for k in pair)]
+        return frozenset(pair for pair in doubtful if Prover(self._robot, self.bodies, (pair,)).proven(row, row).all())
 
     def motions_free(
         self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64], *, to_be_proven: bool = False

@@ -326,7 +326,7 @@ def test_certificates_stand_on_contacts_and_no_deeper(panda):
     found = rrtik.certificate_of(world, lift)
     assert rrtik.verify_certificate(found, world, lift.waypoints) == ""
     (contact,) = world.scene.contacts
-    for other in ((), (dataclasses.replace(contact, distance=1e-6),)):
+    for other in ((), (dataclasses.replace(contact, distance=0.0),)):
         strict = world.with_scene(dataclasses.replace(world.scene, contacts=other))
         assert rrtik.verify_certificate(found, strict, lift.waypoints) == "it is for another scene"
         assert rrtik.certificate_of(strict, lift) is None
@@ -415,3 +415,39 @@ def test_every_pair_of_shapes_overlaps_by_a_millimetre_at_most(ur5, held, under)
     assert plan.proven
     assert plan.contacts[0][0].until is not None
     assert not Task(sink).plan(world, STRETCHED, seconds=0.3, seed=1).found
+
+
+def tray():
+    """A hollow tray, 80 mm high and 20 mm thick, whose bottom is at z = 0: a mesh that is not convex."""
+    profile = [
+        (-0.1, -0.02),
+        (0.1, -0.02),
+        (0.1, 0.06),
+        (0.08, 0.06),
+        (0.08, 0),
+        (-0.08, 0),
+        (-0.08, 0.06),
+        (-0.1, 0.06),
+    ]
+    count = len(profile)
+    points = [(x, y, z) for y in (-0.15, 0.15) for x, z in profile]
+    front = [(0, 1, 4), (1, 2, 4), (2, 3, 4), (0, 4, 5), (0, 5, 7), (5, 6, 7)]
+    faces = front + [(a + count, c + count, b + count) for a, b, c in front]
+    for k in range(count):
+        j = (k + 1) % count
+        faces += [(k, k + count, j), (j, k + count, j + count)]
+    return rrtik.Mesh(points, faces)
+
+
+def test_a_cup_is_taken_out_of_a_hollow_tray(panda):
+    around = rrtik.Scene([rrtik.Obstacle("tray", tray(), [*PLACE[:2], TOP]), rrtik.Obstacle("cup", CUP, PLACE)])
+    plan = planned(panda, around, [*taken(), Straight(by=UP)])
+    assert plan.found, plan.reason
+    assert plan.proven
+    assert plan.violations() == ()
+    path, world = plan.paths[2], plan.worlds[2]
+    assert world.explain(path.start) == ""
+    (contact,) = world.scene.contacts
+    shallow = world.with_scene(dataclasses.replace(world.scene, contacts=(), allowed_collisions=()))
+    assert "'tray' and 'cup'" in shallow.explain(path.start)
+    assert contact.pair == {"tray", "cup"}
