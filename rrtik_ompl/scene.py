@@ -175,7 +175,8 @@ class Touching:
 
     Attributes:
         first, second: Names; one of them at least is an obstacle or attached object.
-        distance: The least distance that they must keep [m]; negative is the depth to which they may overlap.
+        distance: The least distance that they must keep [m], not above 0; negative is the depth to which they may
+            overlap.
 
     Example:
         >>> print(rrtik.Touching("cup", "table", -0.001))
@@ -193,12 +194,12 @@ class Touching:
             raise InputError(f"contacts of a scene: '{self.first}' stands twice in a pair; name two things")
         what = f"distance of '{self.first}' and '{self.second}'"
         object.__setattr__(self, "distance", float(bounded_array(self.distance, (), what)))
+        if self.distance > 0.0:
+            raise InputError(f"{what} must not be above 0, got {self.distance:g}; a margin keeps things apart")
 
     def __str__(self) -> str:
         pair = f"'{self.first}' and '{self.second}'"
-        if self.distance < 0.0:
-            return f"{pair} may overlap by {-1e3 * self.distance:.3g} mm"
-        return f"{pair} must stay {1e3 * self.distance:.3g} mm apart"
+        return f"{pair} may overlap by {-1e3 * self.distance:.3g} mm" if self.distance < 0.0 else f"{pair} may touch"
 
     @property
     def names(self) -> tuple[str, str]:
@@ -244,6 +245,11 @@ class Scene:
         object.__setattr__(self, "contacts", listed(self.contacts, "contacts of a scene"))
         for contact in self.contacts:
             require(contact, Touching, "each contact of a scene")
+        in_contact = Counter(contact.pair for contact in self.contacts)
+        for contact in self.contacts:
+            if in_contact[contact.pair] > 1:
+                both = f"'{contact.first}' and '{contact.second}'"
+                raise InputError(f"contacts of a scene: {both} stand there {in_contact[contact.pair]} times; keep one")
         names = self.names
         if len(set(names)) < len(names):
             name, times = Counter(names).most_common(1)[0]

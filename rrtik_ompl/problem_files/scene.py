@@ -129,7 +129,9 @@ class ContactEntry(Section):
     """Two things that are in contact, one of them an obstacle or attached object."""
 
     pair: Annotated[list[Name], Field(min_length=2, max_length=2)]
-    distance: Number = Field(description="[m] that the two must keep, whatever margins say; negative is a depth")
+    distance: Number = Field(
+        le=0.0, description="[m] that the two must keep, whatever margins say: 0, or negative for a depth"
+    )
 
     def build(self) -> Touching:
         """The contact."""

@@ -99,10 +99,9 @@ def left_inside(near: Nearness) -> str:
 
 
 def with_contacts(scene: Scene, contacts: Iterable[Touching]) -> Scene:
-    """A scene with further contacts; of a pair that has one already the new one counts."""
-    new = tuple(contacts)
-    pairs = {contact.pair for contact in new}
-    return replace(scene, contacts=(*(old for old in scene.contacts if old.pair not in pairs), *new))
+    """A scene with further contacts; of a pair that has one already the new one counts, of two new ones the last."""
+    new = {contact.pair: contact for contact in contacts}
+    return replace(scene, contacts=(*(old for old in scene.contacts if old.pair not in new), *new.values()))
 
 
 def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
@@ -217,8 +216,8 @@ def contacts_from(contacts: Iterable[MotionContact], number: int) -> tuple[Touch
 def world_from(world: World, contacts: Iterable[MotionContact], number: int) -> World:
     """The world of a motion from a waypoint on, by its number: without the contacts that have ended there."""
     stood_on = tuple(contacts)
-    own = {each.touching for each in stood_on}
-    others = tuple(contact for contact in world.scene.contacts if contact not in own)
+    own = {each.touching.pair for each in stood_on}
+    others = tuple(contact for contact in world.scene.contacts if contact.pair not in own)
     return world.with_scene(replace(world.scene, contacts=(*others, *contacts_from(stood_on, number))))
 
 

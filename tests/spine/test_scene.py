@@ -47,7 +47,12 @@ def test_contacts_of_what_is_held_end_with_the_grasp_and_others_stay():
     [
         (lambda: rrtik.Touching("cup", "cup", 0.0), "'cup' stands twice"),
         (lambda: rrtik.Touching("cup", "table", np.nan), "distance of 'cup' and 'table'"),
+        (lambda: rrtik.Touching("cup", "table", 0.02), "distance of 'cup' and 'table' must not be above 0, got 0.02"),
         (lambda: rrtik.Touching("cup", 3, 0.0), "name of a thing that touches another"),
+        (
+            lambda: rrtik.Scene(contacts=[rrtik.Touching("a", "b", 0.0), rrtik.Touching("b", "a", -0.001)]),
+            "'a' and 'b' stand there 2 times; keep one",
+        ),
         (lambda: rrtik.Scene([BALL], contacts=[("ball", "box")]), "each contact of a scene"),
     ],
 )
