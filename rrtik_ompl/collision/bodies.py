@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.collision.shape_table import Piece, pieces
 from rrtik_ompl.collision.solids import robot_solids
+from rrtik_ompl.collision.thickness import deepest_contact
 from rrtik_ompl.errors import DescriptionWarning, InputError, UnknownNameError, few
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 
 ALWAYS_COLLIDING_SAMPLES = 64
+DEPTH_TOLERANCE = 1e-9  # [m] of rounding, of depths that files hold
 
 Pairs: TypeAlias = tuple[tuple[int, int], ...]
 
@@ -124,7 +126,7 @@ def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body
 
     Raises:
         UnknownNameError: If a contact names something that does not exist.
-        InputError: If it is between two links.
+        InputError: If it is between two links, or lets two overlap so deep that they could pass through each other.
     """
     if not scene.contacts:
         return tuple(bodies)
@@ -136,6 +138,12 @@ def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body
                 raise UnknownNameError("link or obstacle", name, known, where="contacts of a scene")
         if not contact.pair & set(scene.names):
             raise InputError(f"contacts of a scene: '{contact.first}' and '{contact.second}' are links; name an object")
+        deepest = deepest_contact(bodies, *contact.names)
+        if contact.distance < -deepest - DEPTH_TOLERANCE:
+            raise InputError(
+                f"contacts of a scene: {contact}, and could pass through each other: they are too thin for more than "
+                f"{1e3 * deepest:.3g} mm"
+            )
         for name, other in (contact.names, contact.names[::-1]):
             found.setdefault(name, []).append((other, contact.distance))
     return tuple(replace(body, contacts=tuple(found[body.name])) if body.name in found else body for body in bodies)

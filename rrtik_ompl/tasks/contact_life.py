@@ -2,7 +2,8 @@
 
 What touches when it is attached may go on touching, a millimetre deeper than then at most, until the two are apart;
 from there on the pair is checked as any other. Before something is taken or set down it may touch, a millimetre deep at
-most, on the motion that leads there. All of it is a distance that a pair of things must keep, negative for a depth
+most, on the motion that leads there. Never may thin things be so deep in each other that they could pass through
+(:mod:`rrtik_ompl.collision.thickness`). All of it is a distance that a pair of things must keep, negative for a depth
 (:class:`rrtik_ompl.Touching`), so that proofs and certificates hold as they do for margins.
 """
 
@@ -22,6 +23,7 @@ from rrtik_ompl.collision.contacts import measured
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, usually_apart
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.solids import is_mesh
+from rrtik_ompl.collision.thickness import deepest_contact
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene, Touching
@@ -67,11 +69,12 @@ class MotionContact:
 
 @dataclass(frozen=True, slots=True)
 class Nearness:
-    """Two things that touch: their names and their signed distance [m]."""
+    """Two things that touch: their names, their signed distance [m], and how deep they may overlap at most [m]."""
 
     first: str
     second: str
     distance: float
+    deepest: float
 
     @property
     def pair(self) -> frozenset[str]:
@@ -85,11 +88,16 @@ class Nearness:
 
     def going_on(self) -> Touching:
         """The contact of two that touch now, until they part."""
-        return Touching(self.first, self.second, min(self.distance, 0.0) - DEEPER)
+        return Touching(self.first, self.second, max(min(self.distance, 0.0) - DEEPER, -self.deepest))
 
     def arriving(self) -> Touching:
         """The contact of two of which one is about to be taken or set down here."""
-        return Touching(self.first, self.second, -DEEPER)
+        return Touching(self.first, self.second, -min(DEEPER, self.deepest))
+
+
+def allowed(bodies: Iterable[Body], first: str, second: str) -> Touching:
+    """The contact of two things that may touch, whether or not they do."""
+    return Touching(first, second, -min(DEEPER, deepest_contact(bodies, first, second)))
 
 
 def left_inside(near: Nearness) -> str:
@@ -114,7 +122,7 @@ def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
             away = _distance(world.robot, (first, second), q, frames)
             other = second.name if first.name == name else first.name
             if away <= NEAR and ((name, other) not in found or away < found[name, other].distance):
-                found[name, other] = Nearness(name, other, away)
+                found[name, other] = Nearness(name, other, away, deepest_contact(bodies, name, other))
     return sorted(found.values(), key=lambda near: near.distance)
 
 
@@ -223,7 +231,7 @@ def world_from(world: World, contacts: Iterable[MotionContact], number: int) -> 
 
 def again(contact: Touching) -> Touching:
     """The contact of a pair that was allowed for a grasp, once the two have parted: it may touch again, no deeper."""
-    return Touching(contact.first, contact.second, -DEEPER)
+    return replace(contact, distance=max(contact.distance, -DEEPER))
 
 
 def parted(world: World, q: Vector, contact: Touching) -> bool:

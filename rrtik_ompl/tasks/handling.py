@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Touching
-from rrtik_ompl.tasks.contact_life import DEEPER, joined_with, left_inside, touching_at
+from rrtik_ompl.tasks.contact_life import allowed, joined_with, left_inside, touching_at
 from rrtik_ompl.tasks.program import Step, options_of
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, MoveTo, Straight
 from rrtik_ompl.world import World
@@ -47,7 +47,7 @@ def may_touch(world: World, steps: Sequence[Step]) -> list[Touching]:
         for pair in {frozenset(world.bodies[k].name for k in numbers) for numbers in world.pairs}:
             other = next(iter(pair - {thing.name}), None)
             if thing.name in pair and other is not None and (thing.by is None or other in thing.by):
-                found[pair] = Touching(thing.name, other, -DEEPER)
+                found[pair] = allowed(world.bodies, thing.name, other)
     return sorted(found.values(), key=lambda contact: contact.names)
 
 

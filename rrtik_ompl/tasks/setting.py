@@ -16,7 +16,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene, Touching
-from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, left_inside, touching_at, with_contacts
+from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, allowed, left_inside, touching_at, with_contacts
 from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, MoveTo, Stage
 from rrtik_ompl.world import World
 
@@ -90,9 +90,8 @@ class Setting:
         others = frozenset(stage.allow) - frozenset(links)
         named = self.named | {frozenset((stage.object, other)) for other in others}
         held = Setting(self._like, self.robot, scene, named)
-        contacts = {
-            frozenset((stage.object, other)): Touching(stage.object, other, -DEEPER) for other in sorted(others)
-        }
+        bodies = held.world.bodies
+        contacts = {frozenset((stage.object, other)): allowed(bodies, stage.object, other) for other in sorted(others)}
         near = touching_at(held.world, q, stage.object)
         contacts |= {each.pair: each.going_on() for each in near if each.distance >= -LITTLE or each.pair in named}
         return held.with_contacts(contacts.values())

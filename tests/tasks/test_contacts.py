@@ -417,6 +417,34 @@ def test_every_pair_of_shapes_overlaps_by_a_millimetre_at_most(ur5, held, under)
     assert not Task(sink).plan(world, STRETCHED, seconds=0.3, seed=1).found
 
 
+SHEET = rrtik.Obstacle("sheet", rrtik.Box([0.3, 0.3, 0.0005]), [0.5, 0.45, 0.29975])
+
+
+@pytest.mark.parametrize("inside", [0.0, 0.0003])
+def test_a_thin_card_does_not_pass_through_a_thin_sheet(panda, inside):
+    """In the middle of the way the two are 0.4 mm deep in each other: half of both thicknesses together."""
+    card = rrtik.Obstacle("card", rrtik.Box([0.06, 0.4, 0.0003]), [0.5, 0.35, 0.30015 - inside])
+    reach = [MoveTo(above(0.5, 0.18, height=0.17)), Straight(by=[0.0, 0.0, -0.016]), Attach("card", "panda_hand")]
+    around = rrtik.Scene([SHEET, card])
+    through = planned(panda, around, [*reach, Straight(by=[0.0, 0.0, -0.05])], seconds=1.0)
+    assert not through.found
+    assert "'sheet' and 'card' overlap by 0.3" in through.reason
+    lifted = planned(panda, around, [*reach, Straight(by=[0.0, 0.0, 0.05])], seconds=1.0)
+    assert lifted.found == (inside == 0.0), lifted.reason
+    if lifted.found:
+        assert lifted.proven
+        assert lifted.contacts[2][0].touching.distance == pytest.approx(-0.0002)
+
+
+def test_a_contact_may_not_be_so_deep_that_two_could_pass_through_each_other(panda):
+    card = rrtik.Obstacle("card", rrtik.Box([0.06, 0.4, 0.0003]), [0.5, 0.35, 0.30015])
+    for depth in (0.001, 0.00021):
+        around = rrtik.Scene([SHEET, card], contacts=[rrtik.Touching("card", "sheet", -depth)])
+        with pytest.raises(rrtik.InputError, match=r"too thin for more than 0\.2 mm"):
+            rrtik.World(panda, around)
+    rrtik.World(panda, rrtik.Scene([SHEET, card], contacts=[rrtik.Touching("card", "sheet", -0.0002)]))
+
+
 def tray():
     """A hollow tray, 80 mm high and 20 mm thick, whose bottom is at z = 0: a mesh that is not convex."""
     profile = [
