@@ -59,7 +59,10 @@ class MotionContact:
     then: float | None = None
 
     def __str__(self) -> str:
-        return f"{self.touching}" + ("" if self.until is None else f", up to waypoint {self.until + 1}")
+        if self.until is None:
+            return str(self.touching)
+        then = "".join(f", and then {each}" for each in self.following)
+        return f"{self.touching}, up to waypoint {self.until + 1}{then}"
 
     @property
     def following(self) -> tuple[Touching, ...]:
@@ -119,14 +122,14 @@ def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
     for i, j in world.pairs:
         first, second = bodies[i], bodies[j]
         if name in (first.name, second.name):
-            away = _distance(world.robot, (first, second), q, frames)
+            away = signed_distance(world.robot, (first, second), q, frames)
             other = second.name if first.name == name else first.name
             if away <= NEAR and ((name, other) not in found or away < found[name, other].distance):
                 found[name, other] = Nearness(name, other, away, deepest_contact(bodies, name, other))
     return sorted(found.values(), key=lambda near: near.distance)
 
 
-def _distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Matrix) -> float:
+def signed_distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Matrix) -> float:
     """The signed distance of two bodies at q [m], of meshes that of their convex pieces; +inf if they do not touch."""
     poses = _transforms(pair, frames)
     if distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], NEAR) is not None:

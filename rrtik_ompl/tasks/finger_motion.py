@@ -23,7 +23,7 @@ from rrtik_ompl.collision.containment import Containment
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart
 from rrtik_ompl.collision.solids import around
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.tasks.contact_life import DEEPER, NEAR
+from rrtik_ompl.tasks.contact_life import DEEPER, NEAR, signed_distance
 from rrtik_ompl.tasks.setting import Setting
 
 DEEPEST = 12  # level of an interval: 1/4096 of the way
@@ -33,7 +33,7 @@ REMEDY = "attach the object, move the gripper less, or allow the pair"
 
 @dataclass(frozen=True, slots=True)
 class FingerMotion:
-    """What is known of a motion of fingers. ``fault``: what is in their way; ``note``: what is not certain."""
+    """What is known of a motion of fingers. ``fault``: what is in their way; ``note``: what is not certain, or too deep."""
 
     fault: str = ""
     note: str = ""
@@ -54,6 +54,7 @@ def finger_motion(before: Setting, after: Setting, q: Vector, taken: Sequence[st
         return FingerMotion()
     if not _on_screws(before.robot, after.robot):
         return FingerMotion(note="the way of the fingers is not checked: it is not about or along one axis")
+    note = _pressed_in(before, after, q, moving, taken)
     frames = before.robot.joint_frames(q[None])[0]
     for i, j in before.world.pairs:
         names = {first[i].name, first[j].name}
@@ -63,7 +64,24 @@ def finger_motion(before: Setting, after: Setting, q: Vector, taken: Sequence[st
         if not way.apart():
             names_in_order = " and ".join(f"'{body.name}'" for body in (first[i], first[j]))
             return FingerMotion(fault=f"contact of the fingers on their way: {names_in_order}; {REMEDY}")
-    return FingerMotion()
+    return FingerMotion(note=note)
+
+
+def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], taken: Sequence[str]) -> str:
+    """A note of the finger that closes deepest into what is held or taken next, q of shape (dof,); "" if none does."""
+    first, last = before.world.bodies, after.world.bodies
+    held = {item.name for item in after.scene.attached} | set(taken)
+    things = [k for k in range(len(last)) if last[k].name in held and k not in moving]
+    frames = after.robot.joint_frames(q[None])[0]
+    deepest, note = DEEPER + DISTANCE_TOLERANCE, ""
+    for finger in sorted(moving):
+        for thing in things:
+            depth = -signed_distance(after.robot, (last[finger], last[thing]), q, frames)
+            if depth <= deepest or -signed_distance(before.robot, (first[finger], first[thing]), q, frames) >= depth:
+                continue
+            deepest = depth
+            note = f"'{last[finger].name}' closes {1e3 * depth:.3g} mm deep into '{last[thing].name}'"
+    return f"{note}; give a width that only touches it" if note else ""
 
 
 class Way:

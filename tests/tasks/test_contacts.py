@@ -13,6 +13,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl import Alternatives, Attach, Detach, Gripper, MoveTo, Straight, Task
 from rrtik_ompl.cli.app import run
+from rrtik_ompl.tasks.contact_life import MotionContact
 
 pytestmark = pytest.mark.kernels
 
@@ -415,6 +416,25 @@ def test_every_pair_of_shapes_overlaps_by_a_millimetre_at_most(ur5, held, under)
     assert plan.proven
     assert plan.contacts[0][0].until is not None
     assert not Task(sink).plan(world, STRETCHED, seconds=0.3, seed=1).found
+
+
+@pytest.mark.parametrize("attached_first", [False, True])
+@pytest.mark.parametrize(("width", "deep"), [(0.05, False), (0.04, True)])
+def test_fingers_that_close_deep_into_what_they_hold_are_named(panda, width, deep, attached_first):
+    reach = [MoveTo(above(*PLACE[:2])), Straight(by=DOWN)]
+    grasp = [Attach("cup", "panda_hand"), Gripper("close", width=width)]
+    plan = planned(panda, scene(), [*reach, *(grasp if attached_first else grasp[::-1]), Straight(by=UP)])
+    assert plan.found, plan.reason
+    named = [note for note in plan.notes if "mm deep into 'cup'" in note]
+    assert len(named) == deep, plan.notes
+    if deep:
+        assert "finger' closes 5.0" in named[0]
+
+
+def test_the_note_of_a_motion_that_takes_and_sets_down_tells_both_parts():
+    contact = MotionContact(rrtik.Touching("cup", "table", -0.003), 2, -0.001)
+    expected = "'cup' and 'table' may overlap by 3 mm, up to waypoint 3, and then 'cup' and 'table' may overlap by 1 mm"
+    assert str(contact) == expected
 
 
 SHEET = rrtik.Obstacle("sheet", rrtik.Box([0.3, 0.3, 0.0005]), [0.5, 0.45, 0.29975])
