@@ -33,7 +33,7 @@ REMEDY = "attach the object, move the gripper less, or allow the pair"
 
 @dataclass(frozen=True, slots=True)
 class FingerMotion:
-    """What is known of a motion of fingers. ``fault``: what is in their way; ``note``: what is not certain, or too deep."""
+    """What is known of a motion of fingers. ``fault``: what is in their way; ``note``: what is doubtful."""
 
     fault: str = ""
     note: str = ""
