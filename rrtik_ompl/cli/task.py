@@ -145,18 +145,19 @@ def task_plan_checked(name: str, *, beside: bool) -> int | None:
     if beside:
         raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--proof' out.")
     plan = load_task_plan(name)
-    faults = plan.violations()
+    faults = plan.faults()
     paths = tuple(
         path.proved(world_of_motion(path, world, stage))
         for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True)
     )
-    say(*_lines(name, replace(plan, paths=paths, notes=())))
+    wrong = frozenset(number for number, motion in enumerate(faults) if motion)
+    say(*_lines(name, replace(plan, paths=paths, notes=()), wrong))
     for number, world in enumerate(plan.worlds):
         said = plan.contacts[number] if plan.contacts else ()
         others = {*world.scene.contacts} - {each.touching for each in said}  # hold for the whole motion
         say(*(f"  motion {number + 1} stands on a contact: {each}" for each in (*said, *others)))
-    say(*(f"not valid: {fault.reason}" for fault in faults))
-    return 1 if faults else 0
+    say(*(f"not valid: {fault.reason}" for motion in faults for fault in motion))
+    return 1 if wrong else 0
 
 
 def _document(plan: TaskPlan) -> dict[str, Any]:
@@ -166,13 +167,14 @@ def _document(plan: TaskPlan) -> dict[str, Any]:
     return {**kept, "motions": motions}
 
 
-def _lines(name: str, plan: TaskPlan) -> list[str]:
-    """A plan for a person: a line for each motion, and its notes."""
+def _lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -> list[str]:
+    """A plan for a person: a line for each motion, and its notes; ``wrong``: numbers of motions that are not valid."""
     chosen = f", alternatives {', '.join(str(k + 1) for k in plan.chosen)}" if plan.chosen else ""
     lines = [f"{name}: {len(plan.paths)} motions{chosen}"]
     for number, (stage, path, world) in enumerate(zip(plan.stages, plan.paths, plan.worlds, strict=True)):
         names = ", ".join(item.name for item in world.scene.attached)
-        proven, held = "proven free" if path.proven else "checked in steps", f", holds {names}" if names else ""
+        proven = "not valid" if number in wrong else "proven free" if path.proven else "checked in steps"
+        held = f", holds {names}" if names else ""
         lines.append(f"  {number + 1} {stage}: {len(path.waypoints)} waypoints, {proven}{held}")
     return [*lines, *(f"note: {note}" for note in plan.notes)]
 

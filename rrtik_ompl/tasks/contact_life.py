@@ -48,6 +48,7 @@ class MotionContact:
         touching: The two, and how near they may come.
         until: Number of the waypoint at which they have parted; None if the contact lasts to the end of the motion.
         then: How near they may come from there on [m]; None if they are checked as others are.
+        allowed: Whether a grasp has named the pair, see :class:`rrtik_ompl.Attach`.
 
     Example:
         >>> print(rrtik.MotionContact(rrtik.Touching("cup", "table", -0.001), 2))
@@ -57,6 +58,7 @@ class MotionContact:
     touching: Touching
     until: int | None = None
     then: float | None = None
+    allowed: bool = False
 
     def __str__(self) -> str:
         if self.until is None:
@@ -200,9 +202,10 @@ def lived(path: JointPath, world: World, named: frozenset[frozenset[str]], arriv
         place = ends.get(contact)
         then = at_end.get(contact.pair, again(contact) if contact.pair in named else None)
         if place is None or then == contact:
-            contacts.append(MotionContact(contact))
+            contacts.append(MotionContact(contact, allowed=contact.pair in named))
         else:
-            contacts.append(MotionContact(contact, numbers[place], None if then is None else then.distance))
+            later = None if then is None else then.distance
+            contacts.append(MotionContact(contact, numbers[place], later, contact.pair in named))
     for until in sorted(set(numbers.values())):
         strict = world_from(world, contacts, until)
         if wrong := path.with_waypoints(rows[until:]).violations(strict):

@@ -43,10 +43,11 @@ class StoodOnEntry(ContactEntry):
         None, description="number of the waypoint at which they have parted"
     )
     then: Number | None = Field(None, description="[m] that they must keep from there on; as others if left out")
+    allowed: bool = Field(False, description="whether the grasp has named the pair: it may be deeper than 5 mm")
 
     def stood_on(self) -> MotionContact:
         """The contact."""
-        return MotionContact(self.build(), self.until, self.then)
+        return MotionContact(self.build(), self.until, self.then, self.allowed)
 
 
 class MotionEntry(WorldEntry):
@@ -127,7 +128,7 @@ def is_task_plan(file: str | os.PathLike[str]) -> bool:
 
 
 def load_task_plan(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> TaskPlan:
-    """Read a plan that :func:`save_task_plan` has written; its motions have no proofs.
+    """Read a plan that :func:`save_task_plan` has written; its motions have no proofs, `TaskPlan.proven` makes them.
 
     Args:
         file: The path.
@@ -171,13 +172,18 @@ def _contact_data(contacts: tuple[MotionContact, ...]) -> dict[str, Any]:
     for each in contacts:
         entry: dict[str, Any] = {"pair": list(each.touching.names), "distance": each.touching.distance}
         entry |= {} if each.until is None else {"until": each.until}
-        found.append(entry | ({} if each.then is None else {"then": each.then}))
+        entry |= {} if each.then is None else {"then": each.then}
+        found.append(entry | ({"allowed": True} if each.allowed else {}))
     return {"contacts": found} if found else {}
 
 
 def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[World, JointPath]:
     motion, place = entry.motions[number], ("motions", number)
     world = _world(document, entry, motion, place)
+    for index, contact in enumerate(motion.contacts):
+        if contact.until is not None and contact.until >= len(motion.waypoints):
+            what = f"there is no waypoint {contact.until}; the last one is {len(motion.waypoints) - 1}"
+            raise document.error((*place, "contacts", index, "until"), what)
     with document.at((*place, "waypoints")):
         rows = finite_array(motion.waypoints, (None, world.robot.dof), "waypoints")
         return world, JointPath.of(world.robot, rows)

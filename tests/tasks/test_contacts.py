@@ -295,6 +295,115 @@ def test_the_check_of_a_saved_plan_names_contacts_and_finds_those_that_are_not_s
     assert run(["check", str(file), str(file)]) == 2
 
 
+@pytest.fixture(scope="module")
+def put_down(panda):
+    """The document of a plan that takes a cup off a table and sets it down elsewhere."""
+    plan = planned(panda, scene(), [*taken(), Straight(by=UP), *put()])
+    assert plan.found, plan.reason
+    return plan
+
+
+def as_deep_as_it_likes(document):
+    motion = document["motions"][2]
+    motion["contacts"][0]["distance"] = motion["scene"]["contacts"][0]["distance"] = -1.0
+    motion["contacts"][0].pop("until")
+
+
+def deeper_than_it_was(document):
+    motion = document["motions"][2]
+    motion["contacts"][0]["distance"] = motion["scene"]["contacts"][0]["distance"] = -0.004
+
+
+def deeper_when_it_touches_again(document):
+    document["motions"][2]["contacts"][0]["then"] = -1.0
+
+
+def moved_in_the_hand(document):
+    document["motions"][3]["scene"]["attached"][0]["pose"]["xyz"][2] -= 0.02
+
+
+def left_elsewhere(document):
+    cup = next(each for each in document["motions"][5]["scene"]["obstacles"] if each["name"] == "cup")
+    cup["pose"]["xyz"][0] += 0.002
+
+
+def left_elsewhere_at_the_end(document):
+    cup = next(each for each in document["end"]["scene"]["obstacles"] if each["name"] == "cup")
+    cup["pose"]["xyz"][0] += 0.002
+
+
+def of_a_name_that_is_not_there(document):
+    document["motions"][2]["contacts"].append({"pair": ["cup", "saucer"], "distance": -0.001, "until": 1})
+
+
+def of_a_scene_that_has_it_not(document):
+    document["motions"][3]["contacts"] = [{"pair": ["cup", "table"], "distance": -0.001}]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (as_deep_as_it_likes, "motion 3: contact of 'cup' and 'table': they may overlap by 1 mm at most, not by 1000"),
+        (deeper_than_it_was, "motion 3: contact of 'cup' and 'table': they may overlap by 1 mm at most, not by 4"),
+        (deeper_when_it_touches_again, "motion 3: contact of 'cup' and 'table': they may overlap by 1 mm at most"),
+        (moved_in_the_hand, "motion 4: 'cup' is not where the motion before has left it: 20 mm"),
+        (left_elsewhere, "motion 6: 'cup' is not where the motion before has left it: 2 mm"),
+        (left_elsewhere_at_the_end, "after motion 6: 'cup' is not where the motion before has left it: 2 mm"),
+        (of_a_name_that_is_not_there, "motion 3: contact of 'cup' and 'saucer': there is no link or object 'saucer'"),
+        (of_a_scene_that_has_it_not, "motion 4: contact of 'cup' and 'table': the motion's scene has no such contact"),
+    ],
+)
+def test_the_check_of_a_saved_plan_does_not_take_its_word(tmp_path, put_down, capsys, change, said):
+    file = tmp_path / "plan.json"
+    rrtik.save_task_plan(put_down, file)
+    document = json.loads(file.read_text())
+    change(document)
+    file.write_text(json.dumps(document))
+    assert run(["check", str(file)]) == 1
+    printed = capsys.readouterr().out
+    assert f"not valid: {said}" in printed
+    number = int(said.split("motion ")[1].split(":")[0])
+    (line,) = [each for each in printed.splitlines() if each.startswith(f"  {number} ")]
+    assert "proven free" not in line
+    assert not rrtik.load_task_plan(file).proven
+
+
+def test_a_line_down_into_the_table_is_not_valid_on_a_contact_of_a_metre(tmp_path, panda, put_down, capsys):
+    low = rrtik.Obstacle("table", TABLE.shape, TABLE.pose.translation - np.array([0.0, 0.0, 0.06]))
+    down = planned(panda, scene(table=low), [*taken(), Straight(by=[0.0, 0.0, -0.05])])
+    assert down.found, down.reason
+    table = next(each for each in put_down.worlds[0].scene.obstacles if each.name == "table")
+    worlds = []
+    for world in down.worlds:
+        others = tuple(each for each in world.scene.obstacles if each.name != "table")
+        around = dataclasses.replace(world.scene, obstacles=(table, *others))
+        if world.scene.attached:
+            around = dataclasses.replace(around, contacts=(rrtik.Touching("cup", "table", -1.0),))
+        worlds.append(world.with_scene(around))
+    false = dataclasses.replace(down, worlds=tuple(worlds), end=worlds[-1], contacts=())
+    rrtik.save_task_plan(false, tmp_path / "plan.json")
+    assert run(["check", str(tmp_path / "plan.json")]) == 1
+    printed = capsys.readouterr().out
+    assert "not valid: motion 3: contact of 'cup' and 'table'" in printed
+    assert not false.proven
+
+
+def test_a_loaded_plan_is_proven_if_the_saved_one_was(tmp_path, put_down):
+    assert put_down.proven
+    rrtik.save_task_plan(put_down, tmp_path / "plan.json")
+    again = rrtik.load_task_plan(tmp_path / "plan.json")
+    assert again.violations() == ()
+    assert again.proven
+
+
+@pytest.mark.parametrize("inside", [0.003, 0.01])
+def test_a_depth_that_a_grasp_has_named_is_valid_in_the_plan_and_in_its_file(tmp_path, panda, inside):
+    plan = planned(panda, scene(inside=inside), [*taken(allow=["table"]), Straight(by=UP)])
+    assert plan.violations() == ()
+    rrtik.save_task_plan(plan, tmp_path / "plan.json")
+    assert rrtik.load_task_plan(tmp_path / "plan.json").violations() == ()
+
+
 def test_plans_keep_their_contacts_in_files_copies_and_times(tmp_path, panda):
     plan = planned(panda, scene(), [*taken(), Straight(by=UP), *put(0.0005)])
     assert plan.found, plan.reason

@@ -1,0 +1,149 @@
+"""Whether what the motions of a plan stand on is true: contacts that are there, and things that stay where they were.
+
+A plan may come from a file that somebody has changed, so that nothing here takes its word for it: a contact may be no
+deeper than the two are where it begins, and a thing is at the beginning of a motion where it was at the end of the
+one before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE
+from rrtik_ompl.path import JointPath
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene, Touching
+from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, MotionContact, contacts_from, touching_at
+from rrtik_ompl.world import World
+from rrtik_ompl.world.route_check import Violation
+
+MOVED = 1e-6  # [m, rad] between two motions that is rounding
+
+
+def standing_faults(
+    paths: Sequence[JointPath],
+    worlds: Sequence[World],
+    contacts: Sequence[Sequence[MotionContact]],
+    end: World | None,
+) -> list[list[Violation]]:
+    """What is not true of each motion: contacts deeper than they were, names that are not there, things that jump.
+
+    Args:
+        paths: The motions.
+        worlds: Of each.
+        contacts: That each stood on.
+        end: The world after the last one; what jumps there is a fault of the last motion.
+    """
+    found: list[list[Violation]] = []
+    before: tuple[Touching, ...] = ()
+    for number, (path, world, stood_on) in enumerate(zip(paths, worlds, contacts, strict=True)):
+        reasons = _false_names(world, stood_on)
+        reasons += _too_deep(world, path.start, stood_on, before)
+        if number:
+            reasons += _jumps(worlds[number - 1], world, paths[number - 1].end)
+        found.append([Violation(0, path.start, f"motion {number + 1}: {reason}") for reason in reasons])
+        own = {each.touching for each in stood_on}
+        others = (contact for contact in world.scene.contacts if contact not in own)
+        before = (*others, *contacts_from(stood_on, len(path.waypoints)))
+    if end is not None and paths:
+        jumps = _jumps(worlds[-1], end, paths[-1].end)
+        last = max(len(paths[-1].waypoints) - 2, 0)
+        found[-1] += [Violation(last, paths[-1].end, f"after motion {len(paths)}: {reason}") for reason in jumps]
+    return found
+
+
+def _false_names(world: World, stood_on: Sequence[MotionContact]) -> list[str]:
+    """The contacts that a motion is said to stand on, and that its scene does not have."""
+    names = {*world.scene.names, *world.robot.link_names}
+    faults = []
+    for each in stood_on:
+        first, second = each.touching.names
+        unknown = [name for name in (first, second) if name not in names]
+        if unknown:
+            faults.append(f"contact of '{first}' and '{second}': there is no link or object '{unknown[0]}'")
+        elif each.touching not in world.scene.contacts:
+            faults.append(f"contact of '{first}' and '{second}': the motion's scene has no such contact")
+    return faults
+
+
+def _too_deep(world: World, q: Vector, stood_on: Sequence[MotionContact], before: Sequence[Touching]) -> list[str]:
+    """Contacts that allow more than is true where they begin, at q, shape (dof,); ``before``: those that go on."""
+    going_on = {contact.pair: contact.distance for contact in before}
+    named = {each.touching for each in stood_on if each.allowed}
+    faults = []
+    for contact in world.scene.contacts:
+        if contact.distance < going_on.get(contact.pair, 0.0) and contact.distance < -DEEPER - DISTANCE_TOLERANCE:
+            depth = _depth(world, q, contact)
+            most = (depth if contact in named else min(depth, LITTLE)) + DEEPER
+            if contact.distance < -most - DISTANCE_TOLERANCE:
+                faults.append(_deeper(contact.names, contact.distance, most, depth))
+    for each in stood_on:
+        if each.then is not None and each.then < -DEEPER - DISTANCE_TOLERANCE:
+            faults.append(_deeper(each.touching.names, each.then, DEEPER, 0.0))
+    return faults
+
+
+def _deeper(names: tuple[str, str], distance: float, most: float, depth: float) -> str:
+    """Says that a contact allows too much."""
+    first, second = names
+    allowed = f"may overlap by {1e3 * most:.3g} mm at most, not by {-1e3 * distance:.4g} mm"
+    return f"contact of '{first}' and '{second}': they {allowed}; where it begins they overlap by {1e3 * depth:.3g} mm"
+
+
+def _depth(world: World, q: Vector, contact: Touching) -> float:
+    """How deep two things overlap where their contact begins, at q, shape (dof,) [m]."""
+    if not set(contact.names) & set(world.scene.names):
+        return 0.0
+    name, other = contact.names if contact.first in world.scene.names else contact.names[::-1]
+    near = [each.distance for each in touching_at(world, q, name) if each.second == other]
+    let_go = world.robot.gripper is not None and other in world.robot.link_names
+    least = DEEPER if let_go else 0.0  # fingers may have moved away since they let it go
+    return max([least, *(-distance for distance in near)])
+
+
+def _jumps(before: World, after: World, q: Vector) -> list[str]:
+    """What is elsewhere in a world than in the one before it, at q, shape (dof,), between two motions."""
+    old = _things(before.scene)
+    new = _things(after.scene)
+    faults = [f"'{name}' is in one of the scenes before and after, not in both" for name in sorted(old.keys() ^ new)]
+    for name in sorted(old.keys() & new):
+        away, turned = _between(old[name], new[name], before, after, q)
+        if max(away, turned) > MOVED:
+            faults.append(
+                f"'{name}' is not where the motion before has left it: "
+                f"{1e3 * away:.3g} mm and {np.degrees(turned):.3g} deg away"
+            )
+    return faults
+
+
+def _things(scene: Scene) -> dict[str, Obstacle | AttachedObject]:
+    return {thing.name: thing for thing in (*scene.obstacles, *scene.attached)}
+
+
+def _between(
+    old: Obstacle | AttachedObject, new: Obstacle | AttachedObject, before: World, after: World, q: Vector
+) -> tuple[float, float]:
+    """How far a thing has moved from one world to the next [m] and turned [rad].
+
+    Fingers that move between the two take with them what they hold, so that the place of the link counts either way.
+    """
+    differences = []
+    if isinstance(old, AttachedObject) and isinstance(new, AttachedObject) and old.link == new.link:
+        differences.append(old.pose.actInv(new.pose))
+    else:
+        for robot_before in (before, after):
+            for robot_after in (before, after):
+                place = _place(old, robot_before, q)
+                differences.append(place.actInv(_place(new, robot_after, q)))
+    sizes = [
+        (float(np.linalg.norm(each.translation)), float(np.linalg.norm(pin.log3(each.rotation))))
+        for each in differences
+    ]
+    return min(sizes, key=max)
+
+
+def _place(thing: Obstacle | AttachedObject, world: World, q: Vector) -> pin.SE3:
+    return world.robot.fk(q, thing.link) * thing.pose if isinstance(thing, AttachedObject) else thing.pose
