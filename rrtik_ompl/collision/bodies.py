@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.collision.collector import collector_waits
 from rrtik_ompl.collision.shape_table import Piece, pieces
 from rrtik_ompl.collision.solids import robot_solids
-from rrtik_ompl.collision.thickness import deepest_contact
+from rrtik_ompl.collision.thickness import SHARE, least_width
 from rrtik_ompl.errors import DescriptionWarning, InputError, UnknownNameError, few
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
@@ -119,6 +119,21 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
             for piece in _pieces(item)
         ]
     return tuple(found)
+
+
+def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
+    """How deep two things in contact may overlap at most [m], by their names; infinite if one has no body.
+
+    Args:
+        bodies: All bodies of a world.
+        first: Name of a link, obstacle or attached object.
+        second: That of the other.
+    """
+    least = {first: np.inf, second: np.inf}
+    for body in bodies:
+        if body.name in least:
+            least[body.name] = min(least[body.name], least_width(body.geometry))
+    return SHARE * sum(least.values())
 
 
 def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:

@@ -1,13 +1,10 @@
-"""How thin bodies are, and how deep two that are in contact may overlap without passing through each other.
+"""How thin solids are: two in contact may not overlap so deep that they could pass through each other.
 
 Two that pass through each other are at some time as deep in one another as half of both thicknesses together. Half of
 that is left to what nobody measures: turns, and the depth at which a contact is seen.
 """
 
 from __future__ import annotations
-
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import coal
 import numpy as np
@@ -18,28 +15,10 @@ from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.shape_table import core_of
 from rrtik_ompl.collision.solids import convex_arrays, face_normals, is_closed, is_mesh, mesh_arrays, once_per_geometry
 
-if TYPE_CHECKING:
-    from rrtik_ompl.collision.bodies import Body
-
 SHARE = 0.25  # of both thicknesses together, to which two bodies in contact may overlap
 MOST_RAYS = 256  # through the wall of a hollow mesh
 COMPARED = 2_000_000  # rays times triangles
 PARALLEL = 1e-12  # of a ray and a triangle, times twice its area [m^2]
-
-
-def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
-    """How deep two things in contact may overlap at most [m], by their names; infinite if one has no body.
-
-    Args:
-        bodies: All bodies of a world.
-        first: Name of a link, obstacle or attached object.
-        second: That of the other.
-    """
-    least = {first: np.inf, second: np.inf}
-    for body in bodies:
-        if body.name in least:
-            least[body.name] = min(least[body.name], least_width(body.geometry))
-    return SHARE * sum(least.values())
 
 
 @once_per_geometry

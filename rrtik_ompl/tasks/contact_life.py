@@ -18,12 +18,11 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.collision.bodies import Body, deepest_contact
 from rrtik_ompl.collision.contacts import measured
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, usually_apart
 from rrtik_ompl.collision.motion_bound import approach_weights
 from rrtik_ompl.collision.solids import is_mesh
-from rrtik_ompl.collision.thickness import deepest_contact
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import Scene, Touching
