@@ -120,7 +120,8 @@ def _jumps(before: World, after: World, q: Vector) -> list[str]:
 
 
 def _things(scene: Scene) -> dict[str, Obstacle | AttachedObject]:
-    return {thing.name: thing for thing in (*scene.obstacles, *scene.attached)}
+    standing: dict[str, Obstacle | AttachedObject] = {thing.name: thing for thing in scene.obstacles}
+    return standing | {thing.name: thing for thing in scene.attached}
 
 
 def _between(
