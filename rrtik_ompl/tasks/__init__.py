@@ -18,6 +18,7 @@ from rrtik_ompl.problem import usable_configuration
 from rrtik_ompl.tasks.branches import Branch
 from rrtik_ompl.tasks.contact_life import MotionContact as MotionContact
 from rrtik_ompl.tasks.contact_life import world_from
+from rrtik_ompl.tasks.foreseen import never_set_down
 from rrtik_ompl.tasks.notes import notes_of
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.search import TaskSearch
@@ -111,11 +112,10 @@ class TaskPlan:
         parts = zip(self.paths, self.worlds, self.stages, contacts, self._standing(), strict=True)
         for path, world, stage, stood_on, standing in parts:
             wrong = [*standing, *path.violations(world_of_motion(path, world, stage))]
-            known = {*world.scene.names, *world.robot.link_names}
-            named = [each for each in stood_on if each.touching.pair <= known]
-            for until in sorted({each.until for each in named if each.until is not None}):
+            ended = sorted({each.until for each in stood_on if each.until is not None})
+            for until in () if standing else ended:  # what is not true is no ground for a check
                 rest = path.with_waypoints(path.waypoints[until:])
-                wrong += rest.violations(world_from(world, named, until))
+                wrong += rest.violations(world_from(world, stood_on, until))
             found.append(tuple(wrong))
         return tuple(found)
 
@@ -175,6 +175,8 @@ class Task:
         given: Any = world.robot.posture(start) if isinstance(start, str) else start
         begun = Setting.beginning(world, world.robot.configuration(given, "start"))
         q = usable_configuration(begun.world, given, "start")
+        if never := never_set_down(steps, begun.world, np.array(q)):
+            return TaskPlan(False, (), (), (), (), never)
         search = TaskSearch(time.monotonic() + positive(seconds, "seconds"), whole_number(seed, "seed"))
         done = search.run(Branch(begun, np.array(q), steps))
         if done is None:

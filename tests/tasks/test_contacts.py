@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import json
 import pickle
+import time
 
 import coal
 import numpy as np
@@ -121,6 +122,27 @@ def test_what_would_be_left_deep_inside_another_thing_is_refused_with_the_depth(
     if not found:
         assert f"'cup' would be left {1e3 * deeper:.2g}" in plan.reason
         assert "mm inside 'table'; 1 mm at most" in plan.reason
+
+
+@pytest.mark.parametrize("deeper", [0.02, 0.03])
+def test_what_no_choice_can_set_down_is_refused_at_once(panda, deeper):
+    begun = time.monotonic()
+    plan = planned(panda, scene(), [*taken(), Straight(by=UP), *put(deeper)], seconds=20.0)
+    assert time.monotonic() - begun < 5.0
+    assert plan.reason == (
+        f"stage 8 (Detach 'cup') failed: 'cup' would be left {1e3 * deeper:.3g} mm inside 'table'; 1 mm at most"
+    )
+
+
+def test_the_look_ahead_lets_go_of_what_it_does_not_know(panda):
+    """A thing that is held from the beginning, is let go and taken again: where it stands then is not foreseen."""
+    q = planned(panda, scene(), taken()[:2]).paths[-1].end
+    grasp = panda.fk(q, "panda_hand").actInv(pin.SE3(np.eye(3), PLACE))
+    around = rrtik.Scene([TABLE], [rrtik.AttachedObject("cup", "panda_hand", CUP, grasp)])
+    stages = [Detach("cup"), Attach("cup", "panda_hand"), Straight(by=UP), Straight(by=[0.0, 0.0, -0.12])]
+    plan = planned(panda, around, [*stages, Detach("cup"), Gripper("open"), Straight(by=UP)], start=q)
+    assert plan.found, plan.reason
+    assert plan.violations() == ()
 
 
 def test_a_thing_that_stands_deep_inside_another_needs_a_word_and_may_not_be_let_go_there(panda):
@@ -305,7 +327,7 @@ def put_down(panda):
 
 def as_deep_as_it_likes(document):
     motion = document["motions"][2]
-    motion["contacts"][0]["distance"] = motion["scene"]["contacts"][0]["distance"] = -1.0
+    motion["contacts"][0]["distance"] = motion["scene"]["contacts"][0]["distance"] = -0.02
     motion["contacts"][0].pop("until")
 
 
@@ -343,7 +365,7 @@ def of_a_scene_that_has_it_not(document):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (as_deep_as_it_likes, "motion 3: contact of 'cup' and 'table': they may overlap by 1 mm at most, not by 1000"),
+        (as_deep_as_it_likes, "motion 3: contact of 'cup' and 'table': they may overlap by 1 mm at most, not by 20"),
         (deeper_than_it_was, "motion 3: contact of 'cup' and 'table': they may overlap by 1 mm at most, not by 4"),
         (deeper_when_it_touches_again, "motion 3: contact of 'cup' and 'table': they may overlap by 1 mm at most"),
         (moved_in_the_hand, "motion 4: 'cup' is not where the motion before has left it: 20 mm"),
@@ -368,9 +390,9 @@ def test_the_check_of_a_saved_plan_does_not_take_its_word(tmp_path, put_down, ca
     assert not rrtik.load_task_plan(file).proven
 
 
-def test_a_line_down_into_the_table_is_not_valid_on_a_contact_of_a_metre(tmp_path, panda, put_down, capsys):
+def test_a_line_down_into_the_table_is_not_valid_on_a_contact_as_deep(tmp_path, panda, put_down, capsys):
     low = rrtik.Obstacle("table", TABLE.shape, TABLE.pose.translation - np.array([0.0, 0.0, 0.06]))
-    down = planned(panda, scene(table=low), [*taken(), Straight(by=[0.0, 0.0, -0.05])])
+    down = planned(panda, scene(table=low), [*taken(), Straight(by=[0.0, 0.0, -0.015])])
     assert down.found, down.reason
     table = next(each for each in put_down.worlds[0].scene.obstacles if each.name == "table")
     worlds = []
@@ -378,7 +400,7 @@ def test_a_line_down_into_the_table_is_not_valid_on_a_contact_of_a_metre(tmp_pat
         others = tuple(each for each in world.scene.obstacles if each.name != "table")
         around = dataclasses.replace(world.scene, obstacles=(table, *others))
         if world.scene.attached:
-            around = dataclasses.replace(around, contacts=(rrtik.Touching("cup", "table", -1.0),))
+            around = dataclasses.replace(around, contacts=(rrtik.Touching("cup", "table", -0.02),))
         worlds.append(world.with_scene(around))
     false = dataclasses.replace(down, worlds=tuple(worlds), end=worlds[-1], contacts=())
     rrtik.save_task_plan(false, tmp_path / "plan.json")

@@ -1,0 +1,96 @@
+"""What a task sets down too deep whatever is chosen, known from its stages before anything is searched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.arrays import Vector
+from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.goal import PoseGoal
+from rrtik_ompl.tasks.contact_life import DEEPER, Nearness, joined_with, left_inside, signed_distance
+from rrtik_ompl.tasks.program import Step
+from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, MoveTo, Straight
+from rrtik_ompl.tip_motion import DEVIATION, TURN_DEVIATION
+from rrtik_ompl.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class Tip:
+    """Where the tip is, and how far it may be from there [m] and turned [rad]."""
+
+    pose: pin.SE3
+    away: float = 0.0
+    turned: float = 0.0
+
+
+def never_set_down(steps: Sequence[Step], world: World, q: Vector) -> str:
+    """Why a stage can never set down what it holds: the place is too deep inside an obstacle; "" if nothing says so.
+
+    Only what is sure is said: poses of the tip that are not known, and alternatives, end the look ahead.
+
+    Args:
+        steps: Of the task.
+        world: At its beginning.
+        q: Where the arm begins, shape (dof,).
+    """
+    tip: Tip | None = Tip(world.robot.fk(q))
+    grasps: dict[str, Tip] = {}
+    taken = {held.name for held in world.scene.attached}
+    for step in steps:
+        stage = step.stage
+        if isinstance(stage, Alternatives):
+            return ""
+        if isinstance(stage, MoveTo):
+            tip = _reached(stage, world)
+        elif isinstance(stage, Straight) and tip is not None:
+            tip = Tip(stage.goal(tip.pose), tip.away + DEVIATION, tip.turned + TURN_DEVIATION)
+        elif isinstance(stage, Attach):
+            known = tip is not None and stage.object not in taken
+            if known and tip is not None and world.robot.tip in joined_with(world.robot, stage.link):
+                pose = tip.pose.actInv(world.scene.obstacle(stage.object).pose)
+                grasps[stage.object] = replace(tip, pose=pose)
+            taken.add(stage.object)
+        elif isinstance(stage, Detach):
+            grasp = grasps.pop(stage.object, None)
+            deep = "" if tip is None or grasp is None else _too_deep(world, q, stage.object, tip, grasp, taken)
+            if deep:
+                return f"{step} failed: {deep}"
+    return ""
+
+
+def _reached(stage: MoveTo, world: World) -> Tip | None:
+    """Where the tip is after a motion; None if several places are possible."""
+    goal = stage.goal
+    if isinstance(goal, PoseGoal):
+        return Tip(goal.T_world_tip, goal.position_tolerance, goal.orientation_tolerance)
+    if isinstance(goal, str):
+        return Tip(world.robot.fk(world.robot.posture(goal)))
+    return Tip(world.robot.fk(goal)) if isinstance(goal, np.ndarray) else None
+
+
+def _too_deep(world: World, q: Vector, name: str, tip: Tip, grasp: Tip, taken: set[str]) -> str:
+    """Says how deep a thing would be left inside an obstacle that nothing has moved, if that is sure."""
+    frames = world.robot.joint_frames(q[None])[0]
+    pose = tip.pose * grasp.pose
+    allowed = {frozenset(pair) for pair in world.scene.allowed_collisions}
+    others = {each.name for each in world.scene.obstacles if frozenset((name, each.name)) not in allowed} - taken
+    arm = float(np.linalg.norm(grasp.pose.translation))
+    shift = pose * world.scene.obstacle(name).pose.inverse()
+    for own in (body for body in world.bodies if body.name == name):
+        reach = arm + float(np.linalg.norm(_centre(world, own, name)) + own.geometry.aabb_radius)
+        unsure = tip.away + grasp.away + (tip.turned + grasp.turned) * reach
+        placed = replace(own, placement=shift * own.placement)
+        for other in (body for body in world.bodies if body.name in others):
+            away = signed_distance(world.robot, (placed, other), q, frames)
+            if away < -DEEPER - unsure:
+                return left_inside(Nearness(name, other.name, away, DEEPER))
+    return ""
+
+
+def _centre(world: World, body: Body, name: str) -> Vector:
+    """Of the box around a body, as seen from the frame of the obstacle that it is part of [m], shape (3,)."""
+    return world.scene.obstacle(name).pose.actInv(body.placement).act(np.array(body.geometry.aabb_center))
