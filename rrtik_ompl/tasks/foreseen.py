@@ -93,4 +93,5 @@ def _too_deep(world: World, q: Vector, name: str, tip: Tip, grasp: Tip, taken: s
 
 def _centre(world: World, body: Body, name: str) -> Vector:
     """Of the box around a body, as seen from the frame of the obstacle that it is part of [m], shape (3,)."""
-    return world.scene.obstacle(name).pose.actInv(body.placement).act(np.array(body.geometry.aabb_center))
+    placement = world.scene.obstacle(name).pose.actInv(body.placement)
+    return np.array(placement.act(np.array(body.geometry.aabb_center)))
