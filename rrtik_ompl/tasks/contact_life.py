@@ -50,7 +50,8 @@ class MotionContact:
         allowed: Whether a grasp has named the pair, see :class:`rrtik_ompl.Attach`.
 
     Example:
-        >>> print(rrtik.MotionContact(rrtik.Touching("cup", "table", -0.001), 2))
+        >>> from rrtik_ompl.tasks.contact_life import MotionContact
+        >>> print(MotionContact(rrtik.Touching("cup", "table", -0.001), 2))
         'cup' and 'table' may overlap by 1 mm, up to waypoint 3
     """
 
