@@ -17,6 +17,7 @@ PEERS = {
     "pytracik",
     "trac_ik",
     "ikpy",
+    "mujoco",
     "eaik",
     "mplib",
     "pyroboplan",
