@@ -65,7 +65,7 @@ class ExactChecker:
         self._tables = TakenTables(arm.pack(bodies.whole, pairs, covers))
         self._robot, self.bodies = robot, bodies
         self._pairs, self._covers = pairs, covers
-        self._contacts = Prover(robot, bodies, self.in_contact)
+        self._contacts = Once(Prover, robot, bodies, self.in_contact)  # most worlds have none, and never ask
         self._data = working_memory(robot.model)
         self._approaches = Once(lambda: dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True)))
         self._containment = Once(_containment_of, bodies, pairs, covers)
@@ -87,7 +87,7 @@ class ExactChecker:
         """The same checker for another thread."""
         other = copy.copy(self)
         other._tables, other._data = self._tables.for_thread(self._packed), self._robot.model.createData()
-        other._contacts = self._contacts.for_thread()
+        other._contacts = Once(Prover, self._robot, self.bodies, self.in_contact)
         return other
 
     def moved(self, number: int, placement: pin.SE3) -> ExactChecker | None:
@@ -101,7 +101,7 @@ class ExactChecker:
             return None
         other = copy.copy(self)
         other._tables, other.bodies = taken, self.bodies.with_(number, body)
-        other._contacts = Prover(self._robot, other.bodies, self.in_contact)
+        other._contacts = Once(Prover, self._robot, other.bodies, self.in_contact)
         other._containment = Once(_containment_of, other.bodies, self._pairs, self._covers)
         return other
 
@@ -110,7 +110,7 @@ class ExactChecker:
         other = copy.copy(self)
         other.bodies = bodies
         other._tables = TakenTables(other._packed())
-        other._contacts = Prover(self._robot, other.bodies, self.in_contact)
+        other._contacts = Once(Prover, self._robot, other.bodies, self.in_contact)
         return other
 
     def _packed(self) -> FastWorld:
@@ -127,7 +127,7 @@ class ExactChecker:
             apart = [self._gaps(full, pairs) is not None for full, pairs in zip(configurations, doubtful, strict=True)]
             free[answers == UNDECIDED] = apart
         if self.in_contact:
-            free[free] = self._contacts.proven(rows[free], rows[free])
+            free[free] = self._contacts().proven(rows[free], rows[free])
         return free
 
     def contacts_of_meshes_kept(self, row: Matrix) -> frozenset[tuple[int, int]]:
@@ -155,7 +155,7 @@ class ExactChecker:
             for k in np.flatnonzero(answers == UNDECIDED):
                 free[k] = self._motion_free_by_coal(starts[k], ends[k], int(steps[k]))
         if self.in_contact:
-            free[free] = self._contacts.proven(starts[free], ends[free])
+            free[free] = self._contacts().proven(starts[free], ends[free])
         return free
 
     def _motion_free_by_coal(self, start: Vector, end: Vector, steps: int) -> bool:
