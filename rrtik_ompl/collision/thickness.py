@@ -33,7 +33,8 @@ def least_width(geometry: coal.CollisionGeometry) -> float:
     if isinstance(geometry, CloudSolid):
         return 2.0 * float(geometry.cloud.radius)
     if is_mesh(geometry):
-        return 0.5 * _thinnest_wall(*mesh_arrays(geometry)) if is_closed(geometry) else 0.0
+        wall = _thinnest_wall(*mesh_arrays(geometry)) if is_closed(geometry) else 0.0
+        return 0.5 * wall if np.isfinite(wall) else 0.0  # no ray came through: its wall is not known
     core = core_of(geometry)
     if core is not None:
         half = 0.0
