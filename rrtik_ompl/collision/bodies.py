@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -305,6 +306,13 @@ def _solid_name(bodies: tuple[Body, ...], number: int) -> str:
     link = bodies[number].name
     own = [k for k, body in enumerate(bodies) if body.name == link]
     return f"'{link}'" if len(own) == 1 else f"'{link}' (solid {own.index(number) + 1})"
+
+
+def far_apart(first: Body, second: Body, distance: float) -> bool:
+    """Whether the balls around two bodies that stand still are farther apart than a distance [m]."""
+    one, other = (body.placement.act(body.geometry.aabb_center).tolist() for body in (first, second))
+    reach = first.geometry.aabb_radius + second.geometry.aabb_radius + distance
+    return bool(math.dist(one, other) > reach)  # no number where one of them has no end
 
 
 def _touch(first: Body, second: Body, frames: Sequence[pin.SE3]) -> bool:

@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import coal
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.arrays import Mask, Vector, finite_array, not_negative
 from rrtik_ompl.choices import Accuracy
-from rrtik_ompl.collision.bodies import Body, Pairs
+from rrtik_ompl.collision.bodies import Body, Pairs, far_apart
 from rrtik_ompl.collision.certificate import distance, fixed_contact
 from rrtik_ompl.collision.cloud_solid import cloud_solid
 from rrtik_ompl.errors import InputError, UnknownNameError, require
@@ -201,7 +200,7 @@ class MovingWorld:
         for pair in self._fixed:
             part, solid = sorted((self._bodies[k] for k in pair), key=lambda body: body.kind == "obstacle")
             way = ways.get(solid.name, 0.0)
-            if way > 0.0 and _may_meet(part, solid, way):
+            if way > 0.0 and not far_apart(part, solid, way):
                 places = part.placement.homogeneous, solid.placement.homogeneous
                 if distance(part.geometry, places[0], solid.geometry, places[1], way) is None:
                     return False
@@ -211,17 +210,6 @@ class MovingWorld:
         """See ``blocked``; predicted places do not count, for nothing can be done about them."""
         found = fixed_contact(self.robot, tuple(self._bodies), self._fixed)
         return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
-
-
-def _may_meet(first: Body, second: Body, way: float) -> bool:
-    """Whether balls around two standing bodies are no farther apart than a way [m]."""
-    solids = first.geometry, second.geometry
-    if any(isinstance(solid, coal.Halfspace) for solid in solids):
-        return True
-    centres = [
-        body.placement.act(np.asarray(solid.aabb_center)) for body, solid in zip((first, second), solids, strict=True)
-    ]
-    return float(np.linalg.norm(centres[0] - centres[1])) <= way + sum(float(solid.aabb_radius) for solid in solids)
 
 
 def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
@@ -13,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.choices import Accuracy
-from rrtik_ompl.collision.bodies import Body, Pairs
+from rrtik_ompl.collision.bodies import Body, Pairs, far_apart
 from rrtik_ompl.collision.certificate import Certificate, fixed_contact
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE
 from rrtik_ompl.collision.shape_table import pieces
@@ -188,14 +187,8 @@ def _certificate(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> Certific
 
 def _touching(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> bool:
     """Whether one of some pairs of bodies that never move touches; most are told apart by the balls around them."""
-    near = [(bodies[i], bodies[j]) for i, j in pairs if not _far(bodies[i], bodies[j])]
+    near = [(bodies[i], bodies[j]) for i, j in pairs if not far_apart(bodies[i], bodies[j], DISTANCE_TOLERANCE)]
     return any(fixed_contact(robot, both, ((0, 1),)) is not None for both in near)
-
-
-def _far(first: Body, second: Body) -> bool:
-    (one, other) = (body.placement.act(body.geometry.aabb_center).tolist() for body in (first, second))
-    reach = first.geometry.aabb_radius + second.geometry.aabb_radius + DISTANCE_TOLERANCE
-    return bool(math.dist(one, other) > reach)  # no number where one of them has no end
 
 
 def _quietly(kind: type[Kind], settings: WorldSettings) -> Kind:
