@@ -1,13 +1,14 @@
 """Whether what the motions of a plan stand on is true: contacts that are there, and things that stay where they were.
 
 A plan may come from a file that somebody has changed, so that nothing here takes its word for it: a contact may be no
-deeper than the two are where it begins, and a thing is at the beginning of a motion where it was at the end of the
-one before.
+deeper than the two are where it begins, and a thing is at the beginning of a motion what it was, and where it was, at
+the end of the one before.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,7 +16,9 @@ import pinocchio as pin
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE
 from rrtik_ompl.path import JointPath
+from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene, Touching
+from rrtik_ompl.shapes.shape import same_shape
 from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, MotionContact, contacts_from, touching_at
 from rrtik_ompl.world import World
 from rrtik_ompl.world.route_check import Violation
@@ -29,13 +32,13 @@ def standing_faults(
     contacts: Sequence[Sequence[MotionContact]],
     end: World | None,
 ) -> list[list[Violation]]:
-    """What is not true of each motion: contacts deeper than they were, names that are not there, things that jump.
+    """What is not true of each motion: contacts deeper than they were, names that are not there, things that change.
 
     Args:
         paths: The motions.
         worlds: Of each.
         contacts: That each stood on.
-        end: The world after the last one; what jumps there is a fault of the last motion.
+        end: The world after the last one; what changes there is a fault of the last motion.
     """
     found: list[list[Violation]] = []
     before: tuple[Touching, ...] = ()
@@ -43,15 +46,15 @@ def standing_faults(
         reasons = _false_names(world, stood_on)
         reasons += _too_deep(world, path.start, stood_on, before)
         if number:
-            reasons += _jumps(worlds[number - 1], world, paths[number - 1].end)
+            reasons += _changes(worlds[number - 1], world, paths[number - 1].end)
         found.append([Violation(0, path.start, f"motion {number + 1}: {reason}") for reason in reasons])
         own = {each.touching for each in stood_on}
         others = (contact for contact in world.scene.contacts if contact not in own)
         before = (*others, *contacts_from(stood_on, len(path.waypoints)))
     if end is not None and paths:
-        jumps = _jumps(worlds[-1], end, paths[-1].end)
+        changes = _changes(worlds[-1], end, paths[-1].end)
         last = max(len(paths[-1].waypoints) - 2, 0)
-        found[-1] += [Violation(last, paths[-1].end, f"after motion {len(paths)}: {reason}") for reason in jumps]
+        found[-1] += [Violation(last, paths[-1].end, f"after motion {len(paths)}: {reason}") for reason in changes]
     return found
 
 
@@ -104,12 +107,21 @@ def _depth(world: World, q: Vector, contact: Touching) -> float:
     return max([least, *(-distance for distance in near)])
 
 
-def _jumps(before: World, after: World, q: Vector) -> list[str]:
-    """What is elsewhere in a world than in the one before it, at q, shape (dof,), between two motions."""
+def _changes(before: World, after: World, q: Vector) -> list[str]:
+    """What is another in a world than in the one before it, at q, shape (dof,), between two motions.
+
+    Fingers move there, and things are taken and set down; nothing else happens.
+    """
+    faults = []
+    if _lasting(before.robot) != _lasting(after.robot):
+        faults.append("the robot is not described as in the motion before")
+    if set(before.scene.allowed_collisions) != set(after.scene.allowed_collisions):
+        faults.append("the allowed collisions are not those of the motion before")
     old = _things(before.scene)
     new = _things(after.scene)
-    faults = [f"'{name}' is in one of the scenes before and after, not in both" for name in sorted(old.keys() ^ new)]
+    faults += [f"'{name}' is in one of the scenes before and after, not in both" for name in sorted(old.keys() ^ new)]
     for name in sorted(old.keys() & new):
+        faults += [f"'{name}' has not the {what} that it had before" for what in _altered(old[name], new[name])]
         away, turned = _between(old[name], new[name], before, after, q)
         if max(away, turned) > MOVED:
             faults.append(
@@ -117,6 +129,23 @@ def _jumps(before: World, after: World, q: Vector) -> list[str]:
                 f"{1e3 * away:.3g} mm and {np.degrees(turned):.3g} deg away"
             )
     return faults
+
+
+def _lasting(robot: Robot) -> dict[str, Any]:
+    """The description of a robot but for what its fingers are held at."""
+    fingers = () if robot.gripper is None else robot.gripper.joints
+    locked = {name: value for name, value in robot.source.get("locked", {}).items() if name not in fingers}
+    return {**robot.source, "locked": locked}
+
+
+def _altered(old: Obstacle | AttachedObject, new: Obstacle | AttachedObject) -> list[str]:
+    """What a thing keeps from one motion to the next, and has not kept."""
+    altered = [] if same_shape(old.shape, new.shape) else ["shape"]
+    altered += [] if old.margin == new.margin else ["margin"]
+    if isinstance(old, AttachedObject) and isinstance(new, AttachedObject) and old.link == new.link:
+        altered += [] if old.padding == new.padding else ["padding"]
+        altered += [] if set(old.allow) == set(new.allow) else ["list of what it may touch"]
+    return altered
 
 
 def _things(scene: Scene) -> dict[str, Obstacle | AttachedObject]:

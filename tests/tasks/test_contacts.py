@@ -354,6 +354,37 @@ def left_elsewhere_at_the_end(document):
     cup["pose"]["xyz"][0] += 0.002
 
 
+def the_cup(document, number):
+    scene = document["motions"][number]["scene"]
+    (cup,) = [each for key in ("obstacles", "attached") for each in scene.get(key, ()) if each["name"] == "cup"]
+    return cup
+
+
+def thinner(document):
+    cup = the_cup(document, 4)
+    cup["box"][0] *= 0.5
+
+
+def with_less_room(document):
+    the_cup(document, 1)["margin"] = 0.01
+
+
+def padded_meanwhile(document):
+    the_cup(document, 3)["padding"] = 0.001
+
+
+def may_touch_more(document):
+    the_cup(document, 3)["allow"] = ["table"]
+
+
+def allowed_meanwhile(document):
+    document["motions"][3]["scene"]["allowed_collisions"] = [["cup", "table"]]
+
+
+def another_robot_meanwhile(document):
+    document["motions"][3]["robot"]["padding"] = {"panda_link5": 0.01}
+
+
 def of_a_name_that_is_not_there(document):
     document["motions"][2]["contacts"].append({"pair": ["cup", "saucer"], "distance": -0.001, "until": 1})
 
@@ -371,6 +402,12 @@ def of_a_scene_that_has_it_not(document):
         (moved_in_the_hand, "motion 4: 'cup' is not where the motion before has left it: 20 mm"),
         (left_elsewhere, "motion 6: 'cup' is not where the motion before has left it: 2 mm"),
         (left_elsewhere_at_the_end, "after motion 6: 'cup' is not where the motion before has left it: 2 mm"),
+        (thinner, "motion 5: 'cup' has not the shape that it had before"),
+        (with_less_room, "motion 2: 'cup' has not the margin that it had before"),
+        (padded_meanwhile, "motion 4: 'cup' has not the padding that it had before"),
+        (may_touch_more, "motion 4: 'cup' has not the list of what it may touch that it had before"),
+        (allowed_meanwhile, "motion 4: the allowed collisions are not those of the motion before"),
+        (another_robot_meanwhile, "motion 4: the robot is not described as in the motion before"),
         (of_a_name_that_is_not_there, "motion 3: contact of 'cup' and 'saucer': there is no link or object 'saucer'"),
         (of_a_scene_that_has_it_not, "motion 4: contact of 'cup' and 'table': the motion's scene has no such contact"),
     ],
