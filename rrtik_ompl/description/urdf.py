@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rrtik_ompl.description.faults import not_read, tell
+from rrtik_ompl.description.gripper import GripperJoints
 from rrtik_ompl.description.moveit.srdf import Srdf, read_srdf
 from rrtik_ompl.description.moveit.srdf_gripper import srdf_gripper
 from rrtik_ompl.description.robot_build import JointLimits, build_robot, merge_limits
@@ -17,7 +20,7 @@ from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.description.xacro_text import robot_text
 from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 
 if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose
@@ -140,11 +143,15 @@ def robot_from_urdf_text(
             source=source,
         )
         robot = replace(robot, gripper=srdf_gripper(semantics, tree, description.mimics, actuated))
+    told = {name: values for name, values in semantics.postures(group).items() if name not in (postures or {})}
     tell(
         [
+            *semantics.of_another(description.name, where),
             *semantics.unknown_names(tree),
+            *(semantics.moved_passive(actuated) if group is None and joints is None else ()),
             *semantics.short_states(group, actuated),
-            *_outside(robot, semantics, group),
+            *_outside(robot, told, semantics, group),
+            *_hand_outside(robot.gripper, tree, semantics),
             *not_read(where, description.unread),
             *not_read(str(joint_limits), unread_limits),
         ],
@@ -153,11 +160,40 @@ def robot_from_urdf_text(
     return robot
 
 
-def _outside(robot: Robot, semantics: Srdf, group: str | None) -> list[str]:
-    """A line for each state of an SRDF that is a posture and outside the robot's limits."""
-    states = {state for _, state in semantics.states}
-    faults = {name: robot.limit_fault(q) for name, q in robot.postures.items() if name in states}
-    return [f"{semantics.place_of(name, group)}: posture '{name}': {fault}" for name, fault in faults.items() if fault]
+def _outside(
+    robot: Robot, told: Mapping[str, Mapping[str, float]], semantics: Srdf, group: str | None
+) -> Iterator[str]:
+    """A line for each state of an SRDF that is a posture and outside the robot's limits, also by full turns.
+
+    Args:
+        robot: The robot.
+        told: Values of joints, by state, as the file has them.
+        semantics: The file.
+        group: The group of the robot.
+    """
+    for name, values in told.items():
+        if name not in robot.postures:
+            continue
+        fault = robot.limit_fault(np.array([values[joint] for joint in robot.joint_names]))
+        if fault:
+            turned = not robot.limit_fault(robot.postures[name])
+            remedy = "; it is taken for the same posture within them, by full turns" if turned else ""
+            yield f"{semantics.place_of(name, group)}: posture '{name}': {fault}{remedy}"
+
+
+def _hand_outside(gripper: GripperJoints | None, tree: Tree, semantics: Srdf) -> Iterator[str]:
+    """A line for each joint of a gripper that its states bring outside its limits."""
+    if gripper is None:
+        return
+    ranges = {joint.name: (joint.lower, joint.upper) for joint in tree.joints if joint.kind != "continuous"}
+    for name, *values in zip(gripper.joints, gripper.opened, gripper.closed, strict=True):
+        low, high = ranges.get(name, (-np.inf, np.inf))
+        for value in values:
+            if not low - LIMIT_TOLERANCE <= value <= high + LIMIT_TOLERANCE:
+                yield (
+                    f"{semantics.where}: a state of the gripper: joint '{name}' is at {value:g}, outside its limits "
+                    f"{low:g} .. {high:g}"
+                )
 
 
 def package_roots(packages: FilePath | Iterable[FilePath]) -> list[Path]:

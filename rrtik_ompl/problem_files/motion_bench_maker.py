@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,22 +14,24 @@ import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.joint_ranges import narrowed
 from rrtik_ompl.description.padding import padded
 from rrtik_ompl.description.scaling import scaled
-from rrtik_ompl.errors import InputError, SceneWarning
+from rrtik_ompl.errors import InputError, SceneWarning, UnknownNameError, few
 from rrtik_ompl.files.sections import parse
-from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
+from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.goal import Goal, JointGoal
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.moveit_frames import WORLD, Frames
-from rrtik_ompl.problem_files.moveit_messages import Constraints, JointConstraint, RequestMessage, SceneMessage
+from rrtik_ompl.problem_files.moveit_messages import JointConstraint, RequestMessage, RobotState, SceneMessage
 from rrtik_ompl.problem_files.moveit_regions import held_regions_of, tip_goal
-from rrtik_ompl.problem_files.moveit_scene import SceneReader, passed_over
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.problem_files.moveit_scene import SceneReader, passed_over, tell
+from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
 from rrtik_ompl.world import World
 
 FilePath = str | os.PathLike[str]
+DESCRIBING = ("urdf", "srdf", "joint_limits", "packages", "xacro_args")  # options of a robot's files
 SAME_BASE = 1e-9  # largest difference of two poses that are one [m, and of entries of the rotation]
 
 
@@ -37,11 +40,11 @@ def load_motion_bench_maker(
 ) -> Problem:
     """Read a scene and its request.
 
-    The joints of the start state that the group does not move (the fingers) are held where the start state has them,
-    and what the scene or the start state attaches is held by its link. Paddings and scales of links are those of the
-    robot; a padding counts between links, too. Path constraints of joints narrow the limits of the robot, others are
-    regions of the problem. Frames are the world, links and what they hold where the start state has them, objects, and
-    the fixed frames of the scene.
+    The joints that the group does not move (the fingers) are held where the start state has them, else where the state
+    of the scene does; what either attaches is held by its link. Without an SRDF beside the URDF the joints of the group
+    are taken to be those of the goal. Paddings and scales of links are those of the robot; a padding counts between
+    links, too. Path constraints of joints narrow the limits of the robot, others are regions of the problem. Frames are
+    the world, links and what they hold where the start state has them, objects, and the fixed frames of the scene.
 
     Which links may touch each other is the robot's own business (its SRDF); of the scene's allowed collisions those
     with an obstacle or an attached object are used, and all of them if the robot says nothing about its links.
@@ -58,19 +61,39 @@ def load_motion_bench_maker(
         ProblemError: If start or goal is in collision or outside the limits.
 
     Warns:
-        SceneWarning: If links may not touch by the scene, but are never compared by the robot's own list.
+        SceneWarning: If something is named that is not there (a link that may be touched, an entry of the allowed
+            collisions, a joint), the robot is another one than the scene's or moves other joints than the group, or
+            links may not touch by the scene but are never compared by the robot's own list.
     """
     scene_file, request_file = _pair(Path(scene_path), None if request_path is None else Path(request_path))
     scene_document, request_document = read_yaml(scene_file), read_yaml(request_file)
     message = parse(scene_document, SceneMessage)
     request = parse(request_document, RequestMessage)
-    with scene_document.at(("robot_model_name",)):
-        wanted = message.robot_model_name if robot is None else robot
-        arm = wanted if isinstance(wanted, Robot) else _robot(wanted, request)
-    with request_document.at(("start_state", "multi_dof_joint_state")):
-        _refuse_another_base(arm, request, isinstance(robot, Robot))
+    with scene_document.at(("robot_state", "joint_state")):
+        states = message.robot_state.values()
+    with request_document.at(("start_state", "joint_state")):
+        states |= request.start_state.values()
+    based = request.start_state.multi_dof_joint_state.transforms
+    state_document, key = (request_document, "start_state") if based else (scene_document, "robot_state")
+    with state_document.at((key, "multi_dof_joint_state")):
+        base = _base_pose(request.start_state if based else message.robot_state)
+    if isinstance(robot, Robot):
+        arm = robot
+        with state_document.at((key, "multi_dof_joint_state")):
+            _refuse_another_base(arm, base)
+        if fault := _another_group(arm, request.group_name):
+            tell(request_document, ("group_name",), fault)
+        if fault := _held_elsewhere(arm, states):
+            tell(request_document, ("start_state", "joint_state"), fault)
+    else:
+        name = message.robot_model_name if robot is None else robot
+        with _said_where(scene_document, request_document, message, request):
+            arm = _robot(name, request_document, request, states, base)
+    if robot is not None and message.robot_model_name not in _names_of(arm):
+        line = f"the scene is of robot '{message.robot_model_name}', and is read with robot '{arm.name}'"
+        tell(scene_document, ("robot_model_name",), line)
     arm = _as_the_scene_says(scene_document, message, request_document, request, arm)
-    states = message.robot_state.values() | request.start_state.values()
+    _tell_misspelt_joints(request_document, request, arm)
     with request_document.at(("start_state", "joint_state")):
         start = _configuration(arm, states, "start")
     with scene_document.at(("fixed_frame_transforms",)):
@@ -85,7 +108,7 @@ def load_motion_bench_maker(
     with scene_document.at(("world",)):
         world = World(arm, scene)
     with request_document.at(("goal_constraints", 0)):
-        goal = _goal(arm, request.goal_constraints[0], frames)
+        goal = _goal(arm, request, states, frames)
     with request_document.at(("path_constraints",)):
         regions = held_regions_of(request.path_constraints, frames)
     name = f"{scene_file.resolve().parent.name}/{scene_file.stem}"
@@ -103,50 +126,163 @@ def _pair(scene: Path, request: Path | None) -> tuple[Path, Path]:
     raise InputError(f"{scene}: call the two files sceneNAME.yaml and requestNAME.yaml, or give both")
 
 
-def _robot(name: FilePath, request: RequestMessage) -> Robot:
-    """The robot by name or URDF, base and unmoved joints where the start state has them."""
+@contextmanager
+def _said_where(
+    scene_document: YamlDocument, request_document: YamlDocument, scene: SceneMessage, request: RequestMessage
+) -> Iterator[None]:
+    """Put in front of an error about a name that the robot does not have the place that asks for it."""
+    try:
+        yield
+    except UnknownNameError as error:
+        goal = request.goal_constraints[0]
+        asked: dict[str, Location] = {link: ("goal_constraints", 0) for link in goal.links}
+        for k, each in enumerate(goal.joint_constraints):
+            asked[each.joint_name] = ("goal_constraints", 0, "joint_constraints", k)
+        asked[request.group_name] = ("group_name",)
+        if error.name == scene.robot_model_name:
+            with scene_document.at(("robot_model_name",)):
+                raise
+        if error.name in asked:
+            with request_document.at(asked[error.name]):
+                raise
+        raise
+
+
+def _robot(
+    name: FilePath,
+    document: YamlDocument,
+    request: RequestMessage,
+    states: Mapping[str, float],
+    base: pin.SE3,
+) -> Robot:
+    """The robot by name or file, base and unmoved joints where the start has them.
+
+    Without an SRDF the group is taken to be the joints of the goal, or those that move its link.
+
+    Raises:
+        InputError: If a goal of joints, without an SRDF, leaves out one between two that it names.
+    """
     options: dict[str, Any] = {}
-    if Path(name).suffix.lower() == ".urdf":
+    joints = [c.joint_name for c in request.goal_constraints[0].joint_constraints]
+    guessed = False
+    if os.path.isdir(name):
+        options = {"group": request.group_name}
+    elif Path(name).suffix.lower() == ".urdf":
         semantics = Path(name).with_suffix(".srdf")
-        joints = [c.joint_name for c in request.goal_constraints[0].joint_constraints]
+        guessed = bool(joints) and not os.path.isfile(semantics)
+        options = {"joints": joints} if guessed else {}
         if os.path.isfile(semantics):
             options = {"srdf": str(semantics), "group": request.group_name}
-        elif joints:
-            options = {"joints": joints}
     links = request.goal_constraints[0].links
     if links:
         options["tip"] = links[0]
-    base = _base_pose(request)
     if not np.array_equal(base.homogeneous, np.eye(4)):
         options["base_pose"] = base
     free = load_robot(name, **options)
+    if guessed:
+        _tell_held_joints(free, document, request.group_name)
     held = free.movable.difference(free.joint_names)  # the start state may name joints that this robot has fixed
-    locked = {joint: value for joint, value in request.start_state.values().items() if joint in held}
+    locked = {joint: value for joint, value in states.items() if joint in held}
     return load_robot(name, locked=locked, **options)
 
 
-def _base_pose(request: RequestMessage) -> pin.SE3:
-    """``T_world_base`` of the start state.
+def _tell_held_joints(robot: Robot, document: YamlDocument, group: str) -> None:
+    """Tell of joints above those of a goal that are held, as the goal does not name them.
+
+    Raises:
+        InputError: If one is between two that the goal names: the arm would be another one.
+    """
+    frames = robot.model.frames
+    above: list[str] = []
+    for joint in robot.joint_names:
+        number = robot.model.getFrameId(joint)
+        below_another = False
+        held = []
+        while number > 0:
+            number = frames[number].parentFrame
+            name = frames[number].name
+            if name in robot.joint_names:
+                below_another = True
+                break
+            if name in robot.movable:
+                held.append(name)
+        if below_another and held:
+            with document.at(("goal_constraints", 0, "joint_constraints")):
+                raise InputError(
+                    f"it leaves out joint '{held[0]}' above '{joint}', and without an SRDF the joints of group "
+                    f"'{group}' are not known; put the SRDF beside the URDF, or name the joint in the goal"
+                )
+        above += [name for name in held if name not in above]
+    if above:
+        line = f"without an SRDF its joints are taken to be those of the goal; held still: {few(above)}"
+        tell(document, ("group_name",), line)
+
+
+def _names_of(robot: Robot) -> set[str]:
+    """What a scene may call a robot: by its own name, or that of its file."""
+    files = {Path(str(robot.source[kind])).stem for kind in ("urdf", "mjcf", "dh") if kind in robot.source}
+    return {robot.name, str(robot.source.get("name", robot.name)), *files}
+
+
+def _another_group(robot: Robot, group: str) -> str:
+    """A line about a robot of the caller whose joints are not those of a group of its SRDF; "" if that is not known."""
+    source = dict(robot.source)
+    kind = next((key for key in ("moveit", "urdf") if key in source), "")
+    if not kind or source.get("group") == group or not {"moveit", "srdf"} & source.keys():
+        return ""
+    of_files = {key: source[key] for key in DESCRIBING if key in source and key != kind}
+    try:
+        moving = load_robot(source[kind], group=group, **of_files).joint_names
+    except InputError as error:  # its group; all else can be loaded otherwise, or the robot would not be there
+        return str(error) if getattr(error, "name", "") == group else ""
+    if set(moving) == set(robot.joint_names):
+        return ""
+    return f"group '{group}' moves {few(moving)}, and the robot that was given {few(robot.joint_names)}"
+
+
+def _held_elsewhere(robot: Robot, states: Mapping[str, float]) -> str:
+    """A line about a joint that a robot of the caller was not told to hold where the start has it; "" for none."""
+    own = robot.source.get("locked", {})
+    for joint in sorted(robot.movable.difference(robot.joint_names).intersection(states)):
+        value = states[joint]
+        known = own.get(joint, value if own else 0.0)  # what follows a joint that is held there is not told by itself
+        if abs(value - known) > LIMIT_TOLERANCE:
+            return f"joint '{joint}' is at {value:g}, and the robot that was given was not loaded with that in locked="
+    return ""
+
+
+def _base_pose(state: RobotState) -> pin.SE3:
+    """``T_world_base`` of a state.
 
     Raises:
         InputError: If it is given in another frame than the world.
     """
-    state = request.start_state.multi_dof_joint_state
-    frame = state.header.frame_id.removeprefix("/")
-    placed = state.transforms[0].build() if state.transforms else pin.SE3.Identity()
+    moved = state.multi_dof_joint_state
+    frame = moved.header.frame_id.removeprefix("/")
+    placed = moved.transforms[0].build() if moved.transforms else pin.SE3.Identity()
     if frame not in ("", WORLD) and not np.array_equal(placed.homogeneous, np.eye(4)):
         raise InputError(f"the base is given in frame '{frame}'; give it in the frame '{WORLD}'")
     return placed
 
 
-def _refuse_another_base(robot: Robot, request: RequestMessage, given: bool) -> None:
-    """Refuse a robot of the caller that stands elsewhere than the start state says."""
-    if not given or not request.start_state.multi_dof_joint_state.transforms:
+def _refuse_another_base(robot: Robot, base: pin.SE3) -> None:
+    """Refuse a robot of the caller that stands elsewhere than the state says."""
+    wanted = base.homogeneous
+    if np.array_equal(wanted, np.eye(4)):
         return
-    base = _base_pose(request).homogeneous
     stands = robot.fk(np.clip(np.zeros(robot.dof), robot.lower, robot.upper), robot.link_names[0]).homogeneous
-    if np.abs(base - stands).max() > SAME_BASE and not np.array_equal(base, np.eye(4)):
+    if np.abs(wanted - stands).max() > SAME_BASE:
         raise InputError("it moves the base, and the robot that was given stands elsewhere; give its name or its URDF")
+
+
+def _tell_misspelt_joints(document: YamlDocument, request: RequestMessage, robot: Robot) -> None:
+    """Tell of names of the start state that are like those of joints which it does not name."""
+    names = request.start_state.joint_state.name
+    unnamed = robot.movable.difference(names)
+    for k, name in enumerate(names):
+        if name not in robot.movable and (near := nearest_name(name, unnamed)):
+            line = f"no joint '{name}' of robot '{robot.name}'; it is left out{near}"
+            tell(document, ("start_state", "joint_state", "name", k), line)
 
 
 def _as_the_scene_says(
@@ -186,8 +322,34 @@ def _configuration(robot: Robot, values: Mapping[str, float], what: str) -> Vect
     return np.array([values[joint] for joint in robot.joint_names])
 
 
-def _goal(robot: Robot, wanted: Constraints, frames: Frames) -> Goal:
-    if wanted.joint_constraints and not wanted.links:
-        values = {c.joint_name: c.position for c in wanted.joint_constraints}
-        return JointGoal(_configuration(robot, values, "goal"))
-    return tip_goal(wanted, frames)
+def _goal(robot: Robot, request: RequestMessage, states: Mapping[str, float], frames: Frames) -> Goal:
+    wanted = request.goal_constraints[0]
+    if not wanted.joint_constraints or wanted.links:
+        return tip_goal(wanted, frames)
+    values: dict[str, float] = {}
+    for each in wanted.joint_constraints:
+        name = each.joint_name
+        if values.setdefault(name, each.position) != each.position:
+            raise InputError(f"joint '{name}' has two positions; leave one of them out")
+        if name not in robot.joint_names:
+            _refuse_unmoved(robot, each, states.get(name), request.group_name)
+    missing = [joint for joint in robot.joint_names if joint not in values]
+    if missing:
+        raise InputError(
+            f"no value for joint '{missing[0]}' of group '{request.group_name}'; a goal that leaves joints free "
+            f"is not read: give one for each of {', '.join(robot.joint_names)}"
+        )
+    return JointGoal(_configuration(robot, values, "goal"))
+
+
+def _refuse_unmoved(robot: Robot, wanted: JointConstraint, value: float | None, group: str) -> None:
+    """Refuse a goal of a joint that the arm does not move, unless the joint is there already."""
+    name = wanted.joint_name
+    if name not in robot.movable:
+        raise UnknownNameError(f"joint of robot '{robot.name}'", name, robot.movable)
+    low, high = wanted.position - wanted.tolerance_below, wanted.position + wanted.tolerance_above
+    if value is None or not low - LIMIT_TOLERANCE <= value <= high + LIMIT_TOLERANCE:
+        raise InputError(
+            f"joint '{name}' is none of group '{group}', so that no path brings it to {wanted.position:g}; "
+            "take it out, or choose another group"
+        )

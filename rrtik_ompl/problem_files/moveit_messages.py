@@ -129,16 +129,33 @@ class Primitive(Message):
     type: Annotated[PrimitiveName, _by_number(SHAPE_NUMBERS)]
     dimensions: Annotated[list[Length], Field(min_length=1, max_length=3)]
 
+    def check(self) -> None:
+        """Refuse another number of dimensions.
+
+        Raises:
+            InputError: It says how many there must be.
+        """
+        count = sum(self._counts().values())
+        if len(self.dimensions) != count:
+            raise InputError(f"a {self.type} has {count} dimensions, found {len(self.dimensions)}")
+
     def build(self, factor: float = 1.0) -> Shape:
-        """The shape, so many times as large."""
+        """The shape, so many times as large.
+
+        Raises:
+            InputError: If it has another number of dimensions.
+        """
+        self.check()
         kind = KNOWN[self.type]
-        sizes = {m.name: 3 if m.kind == "three lengths" else 1 for m in kind.measures}
-        if len(self.dimensions) != sum(sizes.values()):
-            raise InputError(f"a {self.type} has {sum(sizes.values())} dimensions, found {len(self.dimensions)}")
+        sizes = self._counts()
         rest, values = iter([factor * size for size in self.dimensions]), {}
         for name in kind.moveit:
             values[name] = next(rest) if sizes[name] == 1 else [next(rest) for _ in range(sizes[name])]
         return kind(**values)
+
+    def _counts(self) -> dict[str, int]:
+        """How many numbers each measure has."""
+        return {m.name: 3 if m.kind == "three lengths" else 1 for m in KNOWN[self.type].measures}
 
 
 class CollisionObject(Message):
@@ -163,8 +180,11 @@ class CollisionObject(Message):
         """Refuse geometry that is not read, and lists of different lengths.
 
         Raises:
-            InputError: If there are meshes or planes, or a shape or a subframe has no pose.
+            InputError: If there are meshes or planes, or a shape or a subframe has no pose, or a shape has another
+                number of dimensions.
         """
+        for solid in self.primitives:
+            solid.check()
         if self.meshes or self.planes:
             raise InputError(f"'{self.id}': meshes and planes are not read; write them as box, cylinder or sphere")
         if len(self.primitive_poses) != len(self.primitives) and (self.primitive_poses or not self.pose.given):
@@ -296,7 +316,7 @@ class RobotState(Message):
         """
         names, positions = self.joint_state.name, self.joint_state.position
         if len(names) != len(positions):
-            raise InputError(f"start_state: {len(names)} joint names, but {len(positions)} positions")
+            raise InputError(f"{len(names)} joint names, but {len(positions)} positions; give one position for each")
         return dict(zip(names, positions, strict=True))
 
 
@@ -378,7 +398,7 @@ class PositionConstraint(Message):
         solids, places = self.constraint_region.primitives, self.constraint_region.primitive_poses
         if len(solids) != 1 or len(places) != 1 or solids[0].type not in ("sphere", "box"):
             raise InputError("position_constraints: only a region of one sphere or one box can be read")
-        solids[0].build()  # refuses another number of dimensions
+        solids[0].check()
         return solids[0], places[0].build()
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.description.faults import nearest_name
+from rrtik_ompl.errors import InputError, SceneWarning, UnknownNameError, few
 from rrtik_ompl.files.octree import cells_of_tree
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument
 from rrtik_ompl.problem_files.moveit_frames import Frames
@@ -17,12 +21,12 @@ from rrtik_ompl.problem_files.moveit_messages import (
     AttachedMessage,
     CollisionObject,
     PlacedOctomap,
+    Primitive,
     RobotState,
     SceneMessage,
 )
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
-from rrtik_ompl.shapes import Shape
 from rrtik_ompl.shapes.octree import Octree
 
 OCTOMAP = "<octomap>"  # MoveIt's name for it
@@ -34,7 +38,7 @@ class _Object:
     """An object: where it is in the world, its shapes and where they are in it, and frames in it."""
 
     pose: pin.SE3
-    shapes: list[tuple[Shape, pin.SE3]] = field(default_factory=list)
+    shapes: list[tuple[Primitive, pin.SE3]] = field(default_factory=list)
     parts: dict[str, pin.SE3] = field(default_factory=dict)
 
 
@@ -73,8 +77,14 @@ class SceneReader:
             InputError: If one of them cannot be read; with file, line and key.
         """
         for k, item in enumerate(state.attached_collision_objects):
-            with document.at((*location, "attached_collision_objects", k)):
+            place = (*location, "attached_collision_objects", k)
+            with document.at(place):
                 self._attach(item)
+            for j, link in enumerate(item.touch_links):
+                if link and link not in self._robot.link_names:
+                    near = nearest_name(link, self._robot.link_names)
+                    line = f"no link '{link}' of robot '{self._robot.name}'; it is left out{near}"
+                    tell(document, (*place, "touch_links", j), line)
 
     def scene(self, document: YamlDocument) -> Scene:
         """The scene.
@@ -86,8 +96,8 @@ class SceneReader:
         obstacles = []
         for name, item in self._objects.items():
             names[name] = _numbered(name, len(item.shapes))
-            for part, (shape, place) in zip(names[name], item.shapes, strict=True):
-                obstacles.append(Obstacle(part, shape, item.pose * place))
+            for part, (solid, place) in zip(names[name], item.shapes, strict=True):
+                obstacles.append(Obstacle(part, solid.build(), item.pose * place))
         if self._map is not None:
             obstacles.append(self._map)
             names[OCTOMAP] = [OCTOMAP]
@@ -98,7 +108,15 @@ class SceneReader:
         with document.at(("world",)):
             scene = Scene(tuple(obstacles), tuple(attached))
         with document.at(("allowed_collision_matrix",)):
-            allowed = _allowed(self._message.allowed_collision_matrix, self._robot, names)
+            matrix = self._message.allowed_collision_matrix
+            allowed = _allowed(matrix, self._robot, names)
+            once = {item.id for item in self._message.world.collision_objects}
+            known = {*self._robot.link_names, *names, *once, OCTOMAP}
+            unknown = dict(_unknown_entries(matrix, known))
+            for name, key in list(unknown.items())[:1]:
+                others = f" (so are {few(list(unknown)[1:], SHOWN)})" if len(unknown) > 1 else ""
+                line = f"no link or object '{name}'; what is said of it is left out{others}{nearest_name(name, known)}"
+                tell(document, ("allowed_collision_matrix", *key), line)
             return Scene(scene.obstacles, scene.attached, allowed)
 
     def _do(self, item: CollisionObject) -> None:
@@ -118,7 +136,7 @@ class SceneReader:
         elif item.operation == "append" and known is not None:
             added = self._built(item)
             own = known.pose.actInv(added.pose)
-            known.shapes += [(shape, own * place) for shape, place in added.shapes]
+            known.shapes += [(solid, own * place) for solid, place in added.shapes]
             known.parts |= {name: own * place for name, place in added.parts.items()}
         elif known is not None:
             raise InputError(f"scene: the name '{item.id}' is used 2 times; names must differ")
@@ -135,16 +153,15 @@ class SceneReader:
         elif len(item.primitive_poses) == len(known.shapes):
             known.pose = header
             places = [place.build() for place in item.primitive_poses]
-            known.shapes = [(shape, place) for (shape, _), place in zip(known.shapes, places, strict=True)]
+            known.shapes = [(solid, place) for (solid, _), place in zip(known.shapes, places, strict=True)]
         else:
             raise InputError(f"'{item.id}': to move it, give its pose, or a pose for each of its primitives")
 
-    def _built(self, item: CollisionObject, factor: float = 1.0) -> _Object:
+    def _built(self, item: CollisionObject) -> _Object:
         """An object as its message says."""
         pose = self._frames.pose(item.header.frame_id) * item.pose.build()
-        solids = [solid.build(factor) for solid in item.primitives]
         parts = dict(zip(item.subframe_names, [each.build() for each in item.subframe_poses], strict=True))
-        return _Object(pose, list(zip(solids, item.places(), strict=True)), parts)
+        return _Object(pose, list(zip(item.primitives, item.places(), strict=True)), parts)
 
     def _attach(self, item: AttachedMessage) -> None:
         """Give an object to a link: one of the message, or one of the world that it names."""
@@ -154,9 +171,9 @@ class SceneReader:
             raise InputError(f"'{item.object.id}': an attached object is added; leave out those that are not held")
         if not self._robot.model.existFrame(item.link_name) or item.link_name not in self._robot.link_names:
             raise UnknownNameError(f"link of robot '{self._robot.name}'", item.link_name, self._robot.link_names)
-        name, factor = item.object.id, self._factors.get(item.link_name, 1.0)
+        name = item.object.id
         if item.object.primitives:
-            taken = self._built(item.object, factor)
+            taken = self._built(item.object)
         elif name in self._objects:
             taken = self._objects[name]
         else:
@@ -166,12 +183,18 @@ class SceneReader:
         T_link_object = self._frames.pose(item.link_name).actInv(taken.pose)
         allow = tuple(link for link in item.touch_links if link in self._robot.link_names and link != item.link_name)
         thick = self._robot.padding.get(item.link_name, 0.0)
+        factor = self._factors.get(item.link_name, 1.0)
         self._held[name] = [
-            AttachedObject(part, item.link_name, shape, T_link_object * place, allow, thick)
-            for part, (shape, place) in zip(_numbered(name, len(taken.shapes)), taken.shapes, strict=True)
+            AttachedObject(part, item.link_name, solid.build(factor), T_link_object * place, allow, thick)
+            for part, (solid, place) in zip(_numbered(name, len(taken.shapes)), taken.shapes, strict=True)
         ]
         frame = _frame_of(item.object, taken)
         self._frames.add(name, frame, taken.parts, moves=self._frames.moves(item.link_name))
+
+
+def tell(document: YamlDocument, location: Location, line: str) -> None:
+    """Warn of something that stands at a location of a message and is not in the problem."""
+    warnings.warn(SceneWarning(f"{document.place(location)}: {line}"), stacklevel=3)
 
 
 def passed_over(matrix: AllowedMatrix, robot: Robot) -> str:
@@ -233,6 +256,27 @@ def _allowed(matrix: AllowedMatrix, robot: Robot, names: dict[str, list[str]]) -
         if not (between_links and robot.allowed_collisions):
             found += [(a, b) for a in names.get(first, [first]) for b in names.get(second, [second])]
     return tuple(found)
+
+
+def _unknown_entries(matrix: AllowedMatrix, known: Collection[str]) -> Iterator[tuple[str, Location]]:
+    """Names of a matrix that nothing has, and that would decide something, and where they stand.
+
+    Tables are often of a robot with more links, and of things that are gone. A name is therefore taken for no slip of
+    the pen if the one that is most like it stands in the same list.
+    """
+    stated, defaults = matrix.stated(), matrix.defaults()
+    free = {name for pair, allowed in stated.items() if allowed for name in pair}
+    overrides = any(defaults.values())  # so that pairs that may not touch count, too
+    lists: dict[str, tuple[Sequence[str], Collection[str]]] = {
+        "entry_names": (matrix.entry_names, matrix.entry_names if overrides else free),
+        "default_entry_names": (matrix.default_entry_names, [name for name, allowed in defaults.items() if allowed]),
+    }
+    for key, (names, deciding) in lists.items():
+        for k, name in enumerate(names):
+            if name in known or name not in deciding:
+                continue
+            if not set(get_close_matches(name, known, n=1)) & set(names):
+                yield name, (key, k)
 
 
 def _by_default(matrix: AllowedMatrix, every: list[str]) -> list[tuple[str, str]]:

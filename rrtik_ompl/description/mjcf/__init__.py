@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rrtik_ompl.description.faults import not_read, tell
+from rrtik_ompl.description.mjcf.bodies import WORLD
 from rrtik_ompl.description.mjcf.read import Mjcf, read_mjcf
 from rrtik_ompl.description.moveit.joint_limits import read_joint_limits, unread_limits
 from rrtik_ompl.description.robot_build import build_robot
 from rrtik_ompl.description.robot_source import source_entry
 from rrtik_ompl.description.urdf_read import located
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import InputError, few
 from rrtik_ompl.files.text import read_text
 from rrtik_ompl.robot import Robot
 
@@ -66,11 +67,12 @@ def robot_from_mjcf(
     found = read_mjcf(Path(path))
     options = {"joints": joints, "tip": tip, "joint_limits": joint_limits, "locked": locked, "base_pose": base_pose}
     limits = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in found.tree.joints])
+    actuated = _actuated(found, joints, tip)
     with located(str(path)):
         robot = build_robot(
             found.name or Path(path).stem,
             found.tree,
-            joints=_actuated(found, joints, tip),
+            joints=actuated,
             mimics=found.mimics,
             locked=locked,
             tip=next((site for site in TIP_SITES if site in found.sites), None) if tip is None else tip,
@@ -86,7 +88,7 @@ def robot_from_mjcf(
     tell(
         [
             *(f"{path}: key '{name}': {fault}" for name, fault in faults.items() if fault),
-            *not_read(str(path), found.unread),
+            *not_read(str(path), [*found.unread, *_other_trees(found, actuated, locked or {})]),
             *not_read(str(joint_limits), [] if joint_limits is None else unread_limits(joint_limits)),
         ],
         strict,
@@ -100,3 +102,22 @@ def _actuated(found: Mjcf, joints: Iterable[str] | None, tip: str | None) -> tup
     followers = {tie.joint for tie in found.mimics}
     over = found.tree.walk() if tip is None else found.tree.chain(tip)
     return tuple(joint.name for joint in over if joint.kind != "fixed" and joint.name not in followers)
+
+
+def _other_trees(found: Mjcf, actuated: Sequence[str], locked: Mapping[str, float]) -> list[str]:
+    """What stands beside the robot and could move by itself: joints that are held in trees without an actuated one."""
+    above = {joint.child: joint for joint in found.tree.joints}
+    roots: dict[str, str] = {}  # for each joint the body on the world that carries it
+    for joint in found.tree.walk():
+        link = joint.child
+        while above[link].parent != WORLD:
+            link = above[link].parent
+        roots[joint.name] = link
+    moving = {roots[joint] for joint in actuated if joint in roots}
+    followers = {tie.joint for tie in found.mimics if tie.source in actuated}
+    held = [
+        f"'{joint.name}'"
+        for joint in found.tree.walk()
+        if joint.kind != "fixed" and roots[joint.name] not in moving and joint.name not in {*locked, *followers}
+    ]
+    return [f"joints beside the robot, held: {few(held)}"] if held else []

@@ -29,6 +29,7 @@ def unread_of_mjcf(
     kinds = {
         "of the scene (add it as obstacles)": scenery,
         "free bodies, held where they are:": _quoted(free),
+        "mocap bodies, held where they are:": _names(each for each in root.iter("body") if each.get("mocap") == "true"),
         "loops, left open:": _loops(root),
         "joints held by <equality>:": _held(root),
         "actuators of no joint:": _names(acting),

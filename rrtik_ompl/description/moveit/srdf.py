@@ -70,6 +70,7 @@ class Srdf:
 
     Attributes:
         where: File name for messages.
+        name: Of the robot.
         groups: By name.
         states: Joint values [rad or m] by (group, state).
         allowed: Pairs of link names never checked against each other.
@@ -83,6 +84,7 @@ class Srdf:
     """
 
     where: str
+    name: str = ""
     groups: Mapping[str, Group] = field(default_factory=dict)
     states: Mapping[tuple[str, str], Mapping[str, float]] = field(default_factory=dict)
     allowed: frozenset[frozenset[str]] = frozenset()
@@ -119,6 +121,22 @@ class Srdf:
                 place = self.places[owner, state]
                 found.append(f"{place}: group_state '{state}' has no value of joint '{lacking[0]}' and is left out")
         return found
+
+    def of_another(self, name: str, where: str) -> list[str]:
+        """A line if the file is of a robot of another name than the one that a URDF describes."""
+        if not self.name or not name or self.name == name:
+            return []
+        return [f"{self.where}: it is of robot '{self.name}', and {where} describes '{name}'; is it the right file?"]
+
+    def moved_passive(self, joints: Iterable[str]) -> list[str]:
+        """A line for each of some joints, which move, that has no motor."""
+        moving = set(joints)
+        return [
+            f"{each.place}: <{each.tag}>: joint '{each.name}' has no motor and is moved like the others; "
+            "choose by group= or joints="
+            for each in self.mentions
+            if each.tag == "passive_joint" and each.name in moving
+        ]
 
     def place_of(self, state: str, group: str | None) -> str:
         """File and line of a state of a group, or of another group if this one has no such state."""
@@ -220,6 +238,7 @@ def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
     )
     return Srdf(
         where=where,
+        name=robot.get("name", ""),
         groups={group.name: group for group in groups},
         states=states,
         allowed=_pairs(robot, "disable_collisions"),
