@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 
+import numpy as np
+
 from rrtik_ompl.errors import DescriptionWarning, InputError, few, printable
+from rrtik_ompl.robot import Robot
 
 MOST_NAMED = 3  # faults in one line
 MOST_UNREAD = 8  # things in one line
@@ -34,6 +37,20 @@ def tell(faults: Sequence[str], strict: bool) -> None:
 def not_read(where: str, things: Sequence[str]) -> list[str]:
     """The fault of a file that says more than is read of it; none if there is nothing."""
     return [f"{where}: not read: {few(things, MOST_UNREAD)}"] if things else []
+
+
+def postures_outside(robot: Robot, told: Mapping[str, Mapping[str, float]]) -> Iterator[tuple[str, str]]:
+    """The postures that a file has outside the limits, be it only by full turns: name, and what is wrong.
+
+    Args:
+        robot: The robot, whose postures are turned into its limits where a full turn does it.
+        told: Values of joints [rad or m] by posture, as the file has them.
+    """
+    for name in sorted(robot.postures.keys() & told.keys()):
+        fault = robot.limit_fault(np.array([told[name][joint] for joint in robot.joint_names]))
+        if fault:
+            turned = "" if robot.limit_fault(robot.postures[name]) else "; it is taken a full turn away"
+            yield name, f"{fault}{turned}"
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rrtik_ompl.description.faults import not_read, tell
+from rrtik_ompl.description.faults import not_read, postures_outside, tell
 from rrtik_ompl.description.gripper import GripperJoints
 from rrtik_ompl.description.moveit.srdf import Srdf, read_srdf
 from rrtik_ompl.description.moveit.srdf_gripper import srdf_gripper
@@ -150,7 +150,10 @@ def robot_from_urdf_text(
             *semantics.unknown_names(tree),
             *(semantics.moved_passive(actuated) if group is None and joints is None else ()),
             *semantics.short_states(group, actuated),
-            *_outside(robot, told, semantics, group),
+            *(
+                f"{semantics.place_of(name, group)}: posture '{name}': {fault}"
+                for name, fault in postures_outside(robot, told)
+            ),
             *_hand_outside(robot.gripper, tree, semantics),
             *not_read(where, description.unread),
             *not_read(str(joint_limits), unread_limits),
@@ -158,27 +161,6 @@ def robot_from_urdf_text(
         strict,
     )
     return robot
-
-
-def _outside(
-    robot: Robot, told: Mapping[str, Mapping[str, float]], semantics: Srdf, group: str | None
-) -> Iterator[str]:
-    """A line for each state of an SRDF that is a posture and outside the robot's limits, also by full turns.
-
-    Args:
-        robot: The robot.
-        told: Values of joints, by state, as the file has them.
-        semantics: The file.
-        group: The group of the robot.
-    """
-    for name, values in told.items():
-        if name not in robot.postures:
-            continue
-        fault = robot.limit_fault(np.array([values[joint] for joint in robot.joint_names]))
-        if fault:
-            turned = not robot.limit_fault(robot.postures[name])
-            remedy = "; it is taken for the same posture within them, by full turns" if turned else ""
-            yield f"{semantics.place_of(name, group)}: posture '{name}': {fault}{remedy}"
 
 
 def _hand_outside(gripper: GripperJoints | None, tree: Tree, semantics: Srdf) -> Iterator[str]:

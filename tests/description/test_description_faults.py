@@ -133,6 +133,61 @@ def test_a_posture_outside_the_limits_is_named_in_an_srdf_and_in_an_mjcf(arm, tm
         load_robot(tmp_path / "arm.xml", strict=True)
 
 
+def test_a_posture_that_full_turns_bring_inside_the_limits_is_named_too(arm, tmp_path):
+    srdf = arm.with_suffix(".srdf")
+    srdf.write_text(SRDF.replace('value="0.2"', 'value="6.5"'))
+    [found] = said(arm, srdf=srdf)
+    assert "arm.srdf:12: posture 'home': joint 'elbow' is at 372.423 deg, outside its limits" in found
+    assert found.endswith("; it is taken a full turn away")
+    (tmp_path / "arm.xml").write_text(
+        '<mujoco><compiler angle="radian"/><worldbody><body><joint name="j" range="-1 1"/><geom size=".1"/></body>'
+        '</worldbody><keyframe><key name="home" qpos="6.5"/></keyframe></mujoco>'
+    )
+    [found] = said(tmp_path / "arm.xml")
+    assert "arm.xml: key 'home': joint 'j' is at 372.423 deg, outside its limits" in found
+
+
+def test_an_srdf_of_another_robot_is_named(arm):
+    srdf = arm.with_suffix(".srdf")
+    srdf.write_text(SRDF.replace('robot name="arm"', 'robot name="crane"'))
+    [found] = said(arm, srdf=srdf)
+    assert re.search(r"arm\.srdf: it is of robot 'crane', and .*arm\.urdf describes 'arm'", found)
+    with pytest.raises(InputError, match="of robot 'crane'"):
+        load_robot(arm, srdf=srdf, strict=True)
+
+
+def test_a_joint_without_a_motor_that_is_moved_is_named(arm):
+    srdf = arm.with_suffix(".srdf")
+    srdf.write_text(SRDF.replace('<passive_joint name="mount"/>', '<passive_joint name="elbow"/>'))
+    [found] = said(arm, srdf=srdf)
+    assert "arm.srdf:20: <passive_joint>: joint 'elbow' has no motor and is moved like the others; choose by " in found
+    with pytest.raises(InputError, match="has no motor"):
+        load_robot(arm, srdf=srdf, strict=True)
+    assert said(arm, srdf=srdf, joints=["elbow"]) == []
+    assert said(arm, srdf=srdf, tip="upper") == []
+    assert load_robot(arm, srdf=srdf, group="arm").joint_names == ("shoulder",)
+
+
+HAND = (
+    '<link name="finger"/><joint name="grip" type="prismatic"><parent link="fore"/><child link="finger"/>'
+    '<axis xyz="1 0 0"/><limit lower="0" upper="0.04" velocity="1" effort="1"/></joint></robot>'
+)
+STATES = """<group name="jaw"><joint name="grip"/></group>
+<group_state name="open" group="jaw"><joint name="grip" value="{}"/></group_state>
+<group_state name="close" group="jaw"><joint name="grip" value="0"/></group_state></robot>"""
+
+
+def test_a_gripper_that_opens_beyond_its_limits_is_named(arm):
+    arm.write_text(ARM.replace("</robot>", HAND))
+    srdf = arm.with_suffix(".srdf")
+    text = SRDF.replace('group="hand" parent', 'group="jaw" parent')
+    srdf.write_text(text.replace("</robot>", STATES.format(0.04)))
+    assert said(arm, srdf=srdf, group="arm") == []
+    srdf.write_text(text.replace("</robot>", STATES.format(0.4)))
+    [found] = said(arm, srdf=srdf, group="arm")
+    assert "arm.srdf: a state of the gripper: joint 'grip' is at 0.4, outside its limits 0 .. 0.04" in found
+
+
 ELBOW_LIMIT = '<limit lower="-2" upper="2" velocity="1" effort="1"/></joint></robot>'
 UNREAD = {
     "soft limits": ('<safety_controller k_velocity="1" soft_lower_limit="-1" soft_upper_limit="2"/></joint></robot>',

@@ -107,6 +107,7 @@ def test_the_same_postures_touch_as_in_mujoco(tmp_path, name):
 LEFT_OUT = {
     "plane": ('<geom name="ground" type="plane" size="1 1 1"/>', "", "plane 'ground'"),
     "free body": ('<body name="cube"><freejoint/><geom size=".1"/></body>', "", "free bodies.*'cube'"),
+    "mocap": ('<body name="hand" mocap="true"><geom size=".1"/></body>', "", "mocap bodies, held.*: 'hand'"),
     "connect": ("", '<equality><connect body1="first" body2="second" anchor="0 0 0"/></equality>',
                 "loops, left open: connect of 'first' and 'second'"),
     "weld": ("", '<equality><weld body1="second"/></equality>', "loops, left open: weld of 'second'"),
@@ -132,6 +133,26 @@ def test_what_is_left_out_is_named_and_refused_where_all_must_be_read(tmp_path, 
         load_robot(file)
     with pytest.raises(InputError, match="without strict"):
         load_robot(file, strict=True)
+
+
+DOOR = '<body name="door" pos="9 0 0"><joint name="hinge"/><geom size=".1"/></body>'
+FOLLOWED = '<equality><joint joint1="hinge" joint2="j1"/></equality>'
+
+
+def test_joints_of_what_stands_beside_the_robot_are_named_where_they_are_held(tmp_path):
+    file = tmp_path / "arm.xml"
+    file.write_text(ON_THE_WORLD.format(DOOR))
+    first = next(name for name in load_robot(file).joint_names if name != "hinge")
+    with pytest.warns(DescriptionWarning, match="arm.xml: not read: joints beside the robot, held: 'hinge'"):
+        load_robot(file, joints=[first])
+    with pytest.raises(InputError, match="without strict"):
+        load_robot(file, joints=[first], strict=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DescriptionWarning)
+        assert "hinge" in load_robot(file).joint_names
+        load_robot(file, joints=[first], locked={"hinge": 0.5})
+        file.write_text(ON_THE_WORLD.format(DOOR).replace("</mujoco>", FOLLOWED + "</mujoco>"))
+        load_robot(file, joints=["j1"])
 
 
 def test_all_that_is_left_out_is_one_warning_and_what_is_not_in_force_is_none(tmp_path):

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rrtik_ompl.description.faults import not_read, tell
+from rrtik_ompl.description.faults import not_read, postures_outside, tell
 from rrtik_ompl.description.mjcf.bodies import WORLD
 from rrtik_ompl.description.mjcf.read import Mjcf, read_mjcf
 from rrtik_ompl.description.moveit.joint_limits import read_joint_limits, unread_limits
@@ -84,10 +84,9 @@ def robot_from_mjcf(
             unchecked_solids=found.apart,
             source={"mjcf": str(Path(path).resolve())} | source_entry(options),
         )
-    faults = {name: robot.limit_fault(q) for name, q in robot.postures.items()}
     tell(
         [
-            *(f"{path}: key '{name}': {fault}" for name, fault in faults.items() if fault),
+            *(f"{path}: key '{name}': {fault}" for name, fault in postures_outside(robot, found.postures)),
             *not_read(str(path), [*found.unread, *_other_trees(found, actuated, locked or {})]),
             *not_read(str(joint_limits), [] if joint_limits is None else unread_limits(joint_limits)),
         ],
