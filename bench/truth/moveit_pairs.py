@@ -353,6 +353,19 @@ CASES: dict[str, Case] = {
         {"start_state": {"attached_collision_objects": [{"link_name": "tool", "object": {"id": "bar"}}]}},
         parts=(BALL, (coal.Box(0.02, 0.02, 0.4), at(0.0, 0.0, 0.3))),
     ),
+    "an object of the world that a scaled link holds": Case(
+        world(PLATE, box("bar", [0.02, 0.02, 0.4], pose(0, 0, 0.3)))
+        | {"link_scale": [{"link_name": "tool", "scale": 2.0}]},
+        {"start_state": {"attached_collision_objects": [{"link_name": "tool", "object": {"id": "bar"}}]}},
+        parts=((coal.Sphere(0.02), NOWHERE), (coal.Box(0.04, 0.04, 0.8), at(0.0, 0.0, 0.3))),
+    ),
+    "a base of the scene's state": Case(
+        {"robot_state": base_at(pose(0, 0, 1))},
+        {"goal_constraints": [{"position_constraints": [ball(pose(1, 0, 0.2))]}]},
+        obstacles=((coal.Box(0.2, 1.0, 1.0), at(0.5, 0.0, 1.0)),),
+        base=at(0, 0, 1),
+        goal=near([1.0, 0.0, 1.2]),
+    ),
     "coordinates with names and constants of ROS": Case(
         world(
             moved(
