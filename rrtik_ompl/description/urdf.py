@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -143,17 +143,13 @@ def robot_from_urdf_text(
             source=source,
         )
         robot = replace(robot, gripper=srdf_gripper(semantics, tree, description.mimics, actuated))
-    told = {name: values for name, values in semantics.postures(group).items() if name not in (postures or {})}
     tell(
         [
             *semantics.of_another(description.name, where),
             *semantics.unknown_names(tree),
-            *(semantics.moved_passive(actuated) if group is None and joints is None else ()),
+            *semantics.moved_passive(actuated if joints is None else ()),
             *semantics.short_states(group, actuated),
-            *(
-                f"{semantics.place_of(name, group)}: posture '{name}': {fault}"
-                for name, fault in postures_outside(robot, told)
-            ),
+            *_outside(robot, postures or {}, semantics, group),
             *_hand_outside(robot.gripper, tree, semantics),
             *not_read(where, description.unread),
             *not_read(str(joint_limits), unread_limits),
@@ -161,6 +157,13 @@ def robot_from_urdf_text(
         strict,
     )
     return robot
+
+
+def _outside(robot: Robot, others: Collection[str], semantics: Srdf, group: str | None) -> Iterator[str]:
+    """A line for each state of an SRDF that is a posture, but not one of some others, outside the robot's limits."""
+    told = {name: values for name, values in semantics.postures(group).items() if name not in others}
+    for name, fault in postures_outside(robot, told):
+        yield f"{semantics.place_of(name, group)}: posture '{name}': {fault}"
 
 
 def _hand_outside(gripper: GripperJoints | None, tree: Tree, semantics: Srdf) -> Iterator[str]:

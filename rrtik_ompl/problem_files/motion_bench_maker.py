@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +17,7 @@ from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.joint_ranges import narrowed
 from rrtik_ompl.description.padding import padded
 from rrtik_ompl.description.scaling import scaled
-from rrtik_ompl.errors import InputError, SceneWarning, UnknownNameError, few
+from rrtik_ompl.errors import InputError, UnknownNameError, few
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.goal import Goal, JointGoal
@@ -73,22 +72,7 @@ def load_motion_bench_maker(
         states = message.robot_state.values()
     with request_document.at(("start_state", "joint_state")):
         states |= request.start_state.values()
-    based = request.start_state.multi_dof_joint_state.transforms
-    state_document, key = (request_document, "start_state") if based else (scene_document, "robot_state")
-    with state_document.at((key, "multi_dof_joint_state")):
-        base = _base_pose(request.start_state if based else message.robot_state)
-    if isinstance(robot, Robot):
-        arm = robot
-        with state_document.at((key, "multi_dof_joint_state")):
-            _refuse_another_base(arm, base)
-        if fault := _another_group(arm, request.group_name):
-            tell(request_document, ("group_name",), fault)
-        if fault := _held_elsewhere(arm, states):
-            tell(request_document, ("start_state", "joint_state"), fault)
-    else:
-        name = message.robot_model_name if robot is None else robot
-        with _said_where(scene_document, request_document, message, request):
-            arm = _robot(name, request_document, request, states, base)
+    arm = _arm(scene_document, message, request_document, request, robot, states)
     if robot is not None and message.robot_model_name not in _names_of(arm):
         line = f"the scene is of robot '{message.robot_model_name}', and is read with robot '{arm.name}'"
         tell(scene_document, ("robot_model_name",), line)
@@ -104,7 +88,7 @@ def load_motion_bench_maker(
     reader.hold(request_document, ("start_state",), request.start_state)
     scene = reader.scene(scene_document)
     if over := passed_over(message.allowed_collision_matrix, arm):
-        warnings.warn(SceneWarning(over), stacklevel=2)
+        tell(scene_document, ("allowed_collision_matrix",), over)
     with scene_document.at(("world",)):
         world = World(arm, scene)
     with request_document.at(("goal_constraints", 0)):
@@ -124,6 +108,32 @@ def _pair(scene: Path, request: Path | None) -> tuple[Path, Path]:
     if scene.name.startswith("request"):
         return scene.with_name("scene" + scene.name.removeprefix("request")), scene
     raise InputError(f"{scene}: call the two files sceneNAME.yaml and requestNAME.yaml, or give both")
+
+
+def _arm(
+    scene_document: YamlDocument,
+    scene: SceneMessage,
+    request_document: YamlDocument,
+    request: RequestMessage,
+    robot: Robot | FilePath | None,
+    states: Mapping[str, float],
+) -> Robot:
+    """The robot of the caller, or of the scene, with its base and its fingers where the start has them."""
+    moved = bool(request.start_state.multi_dof_joint_state.transforms)
+    document, key = (request_document, "start_state") if moved else (scene_document, "robot_state")
+    with document.at((key, "multi_dof_joint_state")):
+        base = _base_pose(request.start_state if moved else scene.robot_state)
+    if not isinstance(robot, Robot):
+        with _said_where(scene_document, request_document, scene, request):
+            name = scene.robot_model_name if robot is None else robot
+            return _robot(name, request_document, request, states, base)
+    with document.at((key, "multi_dof_joint_state")):
+        _refuse_another_base(robot, base)
+    if fault := _another_group(robot, request.group_name):
+        tell(request_document, ("group_name",), fault)
+    if fault := _held_elsewhere(robot, states):
+        tell(request_document, ("start_state", "joint_state"), fault)
+    return robot
 
 
 @contextmanager
