@@ -180,7 +180,7 @@ class JointPath:
         rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
         return route_violations(world, rows, positive(fine, "resolution", "give metres"))
 
-    def proved(self, world: World, *, clearance: float = 0.0, seconds: float | None = None) -> JointPath:
+    def proved(self, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
         """The same path with what is proven of its motions, see :meth:`World.prove`.
 
         Raises:
@@ -200,8 +200,14 @@ class JointPath:
         return self.proof is not None and self.proof.proven
 
     def proven_in(self, world: World) -> bool:
-        """Whether its proof covers every motion, and was made by this world or another form of it."""
-        return self.proof is not None and self.proof.proven and world.prover.made(self.proof)
+        """Whether its proof covers every motion, keeps what the world keeps, and was made by a form of the world."""
+        proof = self.proof
+        return (
+            proof is not None
+            and proof.proven
+            and proof.clearance >= world.settings.kept
+            and world.prover.made(proof)
+        )
 
     def save(self, path: str | os.PathLike[str], *, proof: bool = False) -> None:
         """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
@@ -259,7 +265,8 @@ _ATTRIBUTES = tuple(each.name for each in fields(JointPath))
 def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:
     """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
     proved = path.proved(world, clearance=clearance)
-    for kept in sorted({min(clearance, CLEARANCE), 0.0} - {clearance}, reverse=True):
+    least = world.settings.kept
+    for kept in sorted({max(min(clearance, CLEARANCE), least), least} - {clearance}, reverse=True):
         if proved.proven:
             break
         proved = path.proved(world, clearance=kept)

@@ -49,11 +49,12 @@ def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> lis
     room = roomiest(world, ends, clearance)
     if room is None:
         return [Level(world, None, 0.0)]
-    kept = sorted({room.kept, min(room.kept, CLEARANCE), 0.0}, reverse=True)
+    least = world.settings.kept
+    kept = sorted({room.kept, max(min(room.kept, CLEARANCE), least), least}, reverse=True)
     return [Level(world, each, min(room.searched, each + min(each, CLEARANCE))) for each in kept]
 
 
 def roomiest(world: World, ends: Matrix, clearance: float | None) -> Room | None:
     """As :func:`room_between`, with a centimetre, or what the world keeps, where nothing is said."""
-    wanted = max(PREFERRED_CLEARANCE, world.settings.clearance) if clearance is None else clearance
+    wanted = max(PREFERRED_CLEARANCE if clearance is None else clearance, world.settings.kept)
     return room_between(world, ends, wanted)

@@ -32,7 +32,7 @@ class WorldKeys(Section):
     accuracy: Accuracy = Field(
         "exact", description="exact, or conservative: what kernels cannot prove free counts as blocked"
     )
-    clearance: NotNegative = Field(0.0, description="[m] that checks keep from obstacles on top of their margins")
+    clearance: NotNegative = Field(0.0, description="[m] that is kept from obstacles on top of their margins")
     proving: NotNegative | None = Field(
         None,
         description="[m] of clearance with which motions must be proven to count as free; in steps if absent",

@@ -292,7 +292,7 @@ def _fit(edges: NDArray[np.int64], states: NDArray[np.int64], count: int) -> boo
 def _kept(world: World) -> list[float]:
     """What free motions of a world keep: its clearance, and that of its proofs [m]."""
     proving = world.settings.proving
-    return [world.settings.clearance, NOT_PROVING if proving is None else proving]
+    return [world.settings.clearance + world.settings.inflation, NOT_PROVING if proving is None else proving]
 
 
 def _restored(

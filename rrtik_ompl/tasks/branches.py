@@ -270,7 +270,7 @@ def way_of(robot: Robot, a: Vector, b: Vector) -> float:
 def _way(branch: Branch, stage: Straight) -> Way:
     """Of the tip on a straight line that begins where a branch has come to."""
     tip = branch.after.robot.fk(branch.q)
-    return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, 0.0)
+    return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, None)
 
 
 def again(branch: Branch, effort: int) -> Branch:

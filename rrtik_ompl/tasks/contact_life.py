@@ -213,7 +213,7 @@ def lived(path: JointPath, world: World, named: frozenset[frozenset[str]], arriv
             return Lived(path.with_waypoints(rows[: until + 1]), (), (), fault, strict)
     made = path
     if len(rows) > len(path.waypoints):
-        made = path.with_waypoints(rows).proved(world, clearance=0.0 if path.proof is None else path.proof.clearance)
+        made = path.with_waypoints(rows).proved(world, clearance=None if path.proof is None else path.proof.clearance)
     left = contacts_from(contacts, len(rows))
     lasting = tuple(contact for contact in left if at_end.get(contact.pair) != contact)
     return Lived(made, tuple(each for each in contacts if each.until != 0), lasting)

@@ -56,7 +56,7 @@ def straight(
     *,
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
-    clearance: float = 0.0,
+    clearance: float | None = None,
     seed: int = 0,
 ) -> StraightResult:
     """Move the tip in a straight line, its axes turning about one axis, as far as the arm can and nothing is touched.
@@ -74,7 +74,7 @@ def straight(
             keeps the orientation of the beginning.
         deviation: Of the tip from the line at most [m].
         turn_deviation: Of its orientation at most [rad].
-        clearance: To be kept from every obstacle on top of its margin [m].
+        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
         seed: Of the random numbers with which a redundant arm tries other ways.
 
     Raises:
@@ -104,7 +104,7 @@ def arc(
     *,
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
-    clearance: float = 0.0,
+    clearance: float | None = None,
     seed: int = 0,
 ) -> StraightResult:
     """Move the tip on the circle that leads through a point to a goal; all else is as for :func:`straight`.
@@ -116,7 +116,7 @@ def arc(
         through: Point of the world that the tip passes [m], shape (3,).
         deviation: Of the tip from the line at most [m].
         turn_deviation: Of its orientation at most [rad].
-        clearance: To be kept from every obstacle on top of its margin [m].
+        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
         seed: Of the random numbers with which a redundant arm tries other ways.
 
     Raises:
@@ -145,7 +145,7 @@ def screw(
     turns: int = 0,
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
-    clearance: float = 0.0,
+    clearance: float | None = None,
     seed: int = 0,
 ) -> StraightResult:
     """Move the tip about and along one line of the world at once, as a screw, a door or a valve goes.
@@ -157,7 +157,7 @@ def screw(
         turns: Whole turns on top of the shortest way to the goal; a negative number turns the other way.
         deviation: Of the tip from the line at most [m].
         turn_deviation: Of its orientation at most [rad].
-        clearance: To be kept from every obstacle on top of its margin [m].
+        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
         seed: Of the random numbers with which a redundant arm tries other ways.
 
     Raises:
@@ -186,7 +186,7 @@ def linear(
     *,
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
-    clearance: float = 0.0,
+    clearance: float | None = None,
     seed: int = 0,
 ) -> StraightResult:
     """Move the tip in straight lines from pose to pose; all else is as for :func:`straight`.
@@ -197,7 +197,7 @@ def linear(
         poses: Poses of the tip one after the other, each as ``T_world_goal`` of :func:`straight`.
         deviation: Of the tip from the line at most [m].
         turn_deviation: Of its orientation at most [rad].
-        clearance: To be kept from every obstacle on top of its margin [m].
+        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
         seed: Of the random numbers with which a redundant arm tries other ways.
 
     Raises:
@@ -237,15 +237,16 @@ def _moved(
     rails: Callable[[pin.SE3], list[Rail]],
     deviation: float,
     turn_deviation: float,
-    clearance: float,
+    clearance: float | None,
     seed: int,
 ) -> StraightResult:
     """Follow the rails that begin where the tip is."""
     tolerance = Tolerance(positive(deviation, "deviation"), positive(turn_deviation, "turn_deviation"))
     if tolerance.turn > 1.0:
         raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
-    room, number = not_negative(clearance, "clearance"), whole_number(seed, "seed")
+    number = whole_number(seed, "seed")
     require(world, World, "world", "use World(robot, scene)")
+    room = None if clearance is None else max(not_negative(clearance, "clearance"), world.settings.kept)
     begin, starts = _begin(world, q, number)
     way = Way(tuple(rails(begin)), tolerance, room)
     if way.leads_nowhere(world.robot):

@@ -54,7 +54,7 @@ def chords_of(durations: Vector, pushes: Vector, slack: float) -> Chords:
 
 
 def proof_by_chords(
-    times: Vector, pushes: Vector, places: Callable[[Vector], Matrix], world: World, clearance: float, finer: int = 0
+    times: Vector, pushes: Vector, places: Callable[[Vector], Matrix], world: World, clearance: float | None, finer: int = 0
 ) -> Proof:
     """Prove the pieces of a motion, m of them; those that are not proven by chords are tried again with finer ones.
 
@@ -63,7 +63,7 @@ def proof_by_chords(
         pushes: See :func:`chords_of`.
         places: Configurations at times, shape (k,) to (k, dof).
         world: The world.
-        clearance: To be kept from every obstacle [m].
+        clearance: To be kept from every obstacle [m]; what the world keeps if None.
         finer: How many of ``SLACKS`` have been tried.
     """
     h, slack = np.diff(times), SLACKS[finer]

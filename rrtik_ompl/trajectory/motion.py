@@ -29,7 +29,7 @@ from rrtik_ompl.trajectory.messages import write_mcap
 from rrtik_ompl.trajectory.text import dumps, written_ending
 from rrtik_ompl.units import joint_units
 from rrtik_ompl.world import Proof, World
-from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
+from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, not_proven
 
 END_ERROR = 1e-6  # [s] before the end; a tick there is the end, for no drive takes two points at once
 FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it
@@ -195,7 +195,7 @@ class Trajectory:
         """Check the motion itself, not the path it was made from, densely and independently of planners.
 
         Each piece is checked in steps in which no point of the arm moves more than half of the world's motion
-        resolution, by :meth:`World.certify`.
+        resolution, by :meth:`World.certify`; where motions have to be proven (:meth:`World.proving`), it is proven too.
 
         Returns:
             A line for the first fault of every piece that has one: time, and the pair or limit; empty if it is valid.
@@ -206,9 +206,10 @@ class Trajectory:
         require(world, World, "world of a trajectory's check")
         finite_array(self.positions, (None, world.robot.dof), f"trajectory for robot '{world.robot.name}'")
         clock = bad_moments(self, world)
-        return tuple(f"after {t:.3f} s: {world.explain(q)}" for t, q in zip(clock, self(clock).positions, strict=True))
+        places = zip(clock, self(clock).positions, strict=True)
+        return tuple(f"after {t:.3f} s: {world.explain(q) or not_proven(world)}" for t, q in places)
 
-    def prove(self, world: World, *, clearance: float = 0.0) -> Proof:
+    def prove(self, world: World, *, clearance: float | None = None) -> Proof:
         """Prove the motion itself free, at every time, not the path it was made from.
 
         Each piece is cut into parts so short that no point of the arm leaves the straight motion between the ends of a
@@ -217,7 +218,7 @@ class Trajectory:
 
         Args:
             world: The world.
-            clearance: To be kept from every obstacle on top of its margin [m].
+            clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None.
 
         Returns:
             The proof; its motions are the pieces between two knots.
@@ -280,7 +281,7 @@ class Trajectory:
         return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}
 
 
-def proof_of_pieces(motion: Trajectory, world: World, clearance: float, first: int, end: int) -> Proof:
+def proof_of_pieces(motion: Trajectory, world: World, clearance: float | None, first: int, end: int) -> Proof:
     """A proof of the pieces from ``first`` up to ``end``; see :meth:`Trajectory.prove`."""
     h, begin = np.diff(motion.times)[first:end], motion.accelerations[first:end]
     pushes = np.maximum(np.abs(begin), np.abs(begin + h[:, None] * motion.jerks[first:end]))
@@ -296,5 +297,10 @@ def bad_moments(motion: Trajectory, world: World) -> Vector:
     pieces, shares = even_parts(counts)
     clock = np.append(motion.times[pieces] + shares * h[pieces], motion.duration)
     bad = np.flatnonzero(~world.certify(motion(clock).positions))
-    _, where = np.unique(np.append(pieces, len(h) - 1)[bad], return_index=True)
-    return np.asarray(clock[bad[where]])
+    touching, where = np.unique(np.append(pieces, len(h) - 1)[bad], return_index=True)
+    moments = np.asarray(clock[bad[where]])
+    if world.settings.proving is None:
+        return moments
+    gaps = proof_of_pieces(motion, world, world.settings.proving, 0, len(h)).unproven
+    unproven = np.setdiff1d([gap.motion for gap in gaps], touching).astype(np.int64)
+    return np.sort(np.concatenate([moments, motion.times[unproven]]))

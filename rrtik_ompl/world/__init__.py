@@ -20,7 +20,7 @@ from rrtik_ompl.collision.contacts import Contact as Contact
 from rrtik_ompl.collision.contacts import inside, measured
 from rrtik_ompl.collision.motion_bound import displacement_weights
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
-from rrtik_ompl.copies import Items, KeptHere, Once, in_notebook, shallow_copy
+from rrtik_ompl.copies import Items, KeptHere, in_notebook, shallow_copy
 from rrtik_ompl.errors import InputError, MeshWarning, Renamed, UnknownNameError
 from rrtik_ompl.fast import FastWorld
 from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
@@ -32,14 +32,14 @@ from rrtik_ompl.world.holding_prover import HoldingProver
 from rrtik_ompl.world.proof import Gap as Gap
 from rrtik_ompl.world.proof import Proof as Proof
 from rrtik_ompl.world.proof import Prover
-from rrtik_ompl.world.rebuild import Rebuilt, hollow_solids
+from rrtik_ompl.world.rebuild import Rebuilt, hollow_solids, with_room
 from rrtik_ompl.world.settings import ACCURACIES as ACCURACIES
 from rrtik_ompl.world.settings import FINEST_RESOLUTION as FINEST_RESOLUTION
 from rrtik_ompl.world.settings import MOTION_RESOLUTION, WorldSettings
 
 SETTINGS = tuple(each.name for each in fields(WorldSettings))
 # What of a world is made anew when one of these changes is said in World._in; any other change makes all of it anew.
-SHARING = {"accuracy", "motion_resolution", "clearance", "proving", "constraints"}
+SHARING = {"accuracy", "motion_resolution", "clearance", "proving", "inflation", "constraints"}
 
 
 class World(Rebuilt):
@@ -73,8 +73,9 @@ class World(Rebuilt):
         motion_resolution: Largest step of any point of the arm between two checked configurations [m].
         accuracy: "exact" or "conservative".
         self_margin: How far links, and what they hold, must stay from each other where they must not touch [m].
-        clearance: What checks keep from obstacles on top of their margins [m]; see :meth:`with_clearance`.
+        clearance: What is kept from obstacles on top of their margins [m]; see :meth:`with_clearance`.
         proving: Motions must be proven too, with this clearance [m]; None if they need not be. See :meth:`proving`.
+        inflation: What checks keep on top of the clearance, for searches that leave room [m]; no other answer does.
         constraints: Regions, placed in the world, that a frame must not leave. Only what keeps them is then free; a
             :class:`rrtik_ompl.Problem` says where those begin that are ``from_start``.
 
@@ -93,6 +94,7 @@ class World(Rebuilt):
         self_margin: float = 0.0,
         clearance: float = 0.0,
         proving: float | None = None,
+        inflation: float = 0.0,
         constraints: Iterable[TaskRegion] = (),
     ) -> None:
         settings = WorldSettings(
@@ -103,6 +105,7 @@ class World(Rebuilt):
             self_margin=self_margin,
             clearance=clearance,
             proving=proving,
+            inflation=inflation,
             constraints=constraints,  # type: ignore[arg-type]  # made a tuple there
         )
         self._settings = settings
@@ -115,10 +118,10 @@ class World(Rebuilt):
         self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
         self.pairs = pairs = colliding_pairs(robot, settings.scene, self.bodies)
         moving, standing = by_motion(self.bodies, pairs)
-        self._certificate = Once(Certificate, robot, self.bodies, pairs)
+        self._certificate = self._second_checker()
         self._motions = KeptHere()
         conservative = settings.accuracy == "conservative"
-        self._checks = ExactChecker(robot, self._with_room(settings.clearance), moving, conservative=conservative)
+        self._checks = ExactChecker(robot, self._searched_bodies(), moving, conservative=conservative)
         self._always_colliding = always = fixed_contact(robot, self.bodies, standing) is not None
         self.prover = Prover(robot, self._bodies, moving, self_margin=own, always_colliding=always)
         self.constraints: HeldRegions | None = None
@@ -192,11 +195,13 @@ class World(Rebuilt):
         """The same robot and scene with other settings."""
         other = copy.copy(self)
         other._settings = settings
+        if changed & {"clearance", "inflation"}:
+            other._checks = self._checks.with_bodies(other._searched_bodies())
         if "clearance" in changed:
-            other._checks = self._checks.with_bodies(self._with_room(settings.clearance))
+            other._certificate = other._second_checker()
         if "accuracy" in changed:
             other._checks = other._checks.as_conservative(settings.accuracy == "conservative")
-        if changed & {"clearance", "motion_resolution"}:
+        if changed & {"clearance", "inflation", "motion_resolution"}:
             other._motions = KeptHere()
         if "constraints" in changed:
             other._hold(settings.constraints)
@@ -230,10 +235,10 @@ class World(Rebuilt):
     __copy__, _repr_html_ = shallow_copy, in_notebook
 
     def with_clearance(self, clearance: float) -> World:
-        """The same world for searches that leave room: its checks keep a distance [m] on top of obstacles' margins.
+        """The same world, where a distance [m] is kept from obstacles on top of their margins.
 
-        It takes the place of an earlier one; 0 takes it away. :meth:`contacts`, :meth:`certify` and proofs stay as they
-        are.
+        It takes the place of an earlier one; 0 takes it away. Checks, proofs and whatever moves in it keep it;
+        :meth:`contacts` and :meth:`clearance` tell of margins alone.
 
         Raises:
             InputError: If the clearance is negative or infinite.
@@ -250,11 +255,9 @@ class World(Rebuilt):
         """
         return self.with_settings(proving=clearance)
 
-    def _with_room(self, clearance: float) -> Items[Body]:
-        """The bodies, obstacles with a clearance [m] on top of their margins."""
-        if clearance == 0.0:
-            return self._bodies
-        return Items(tuple(replace(b, margin=b.margin + clearance) if b.kind == "obstacle" else b for b in self.bodies))
+    def _searched_bodies(self) -> Items[Body]:
+        """The bodies, obstacles with all that checks keep on top of their margins."""
+        return with_room(self._bodies, self._settings.clearance + self._settings.inflation)
 
     def _hold(self, regions: tuple[TaskRegion, ...]) -> None:
         """Keep path constraints, and no others."""
@@ -292,33 +295,44 @@ class World(Rebuilt):
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
-        return bool(self.prover.proven(self._rows(a, 1), self._rows(b, 1))[0])
+        kept = self._settings.kept
+        return bool(self.prover.proven(self._rows(a, 1), self._rows(b, 1), clearance=kept)[0])
 
-    def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float = 0.0) -> Mask:
+    def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float | None = None) -> Mask:
         """Which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole. Shape (m,).
 
-        ``clearance`` [m] is kept from every obstacle on top of its margin. What grazes an obstacle cannot be proven.
+        ``clearance`` [m] is kept from every obstacle on top of its margin, by default what the world keeps. What grazes
+        an obstacle cannot be proven.
         """
-        kept = not_negative(clearance, "clearance")
+        kept = self._proven_clearance(clearance)
         return in_blocks(partial(self.prover.proven, clearance=kept), *self._both_ends(A, B))
 
     def prove(
-        self, waypoints: ArrayLike, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None
+        self,
+        waypoints: ArrayLike,
+        *,
+        clearance: float | None = None,
+        slack: float = 0.0,
+        seconds: float | None = None,
     ) -> Proof:
         """Prove the straight motions between waypoints, shape (k, dof), free for their whole length; after [16].
 
         Args:
             waypoints: See above; a single one counts as a motion that stands still.
-            clearance: To be kept from every obstacle on top of its margin [m].
+            clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None.
             slack: To be kept between all bodies on top of that [m]: how far a point may leave the straight motions.
             seconds: When to stop; what was not looked at by then is not proven.
 
         Raises:
             InputError: If there are no waypoints, one is no finite row of ``dof`` numbers, or a number is out of range.
         """
-        kept, spare = not_negative(clearance, "clearance"), not_negative(slack, "slack")
-        limit, rows = None if seconds is None else positive(seconds, "seconds"), self._rows(waypoints, 2)
-        return self.prover.route(rows, clearance=kept, slack=spare, seconds=limit)
+        kept = self._proven_clearance(clearance)
+        spare = not_negative(slack, "slack")
+        limit = None if seconds is None else positive(seconds, "seconds")
+        return self.prover.route(self._rows(waypoints, 2), clearance=kept, slack=spare, seconds=limit)
+
+    def _proven_clearance(self, asked: float | None) -> float:
+        return self._settings.kept if asked is None else not_negative(asked, "clearance")
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
@@ -332,7 +346,8 @@ class World(Rebuilt):
         pairs = tuple(pair for pair in self.pairs if pair not in kept) if kept else self.pairs
         found = list(measured(self.bodies, pairs, self.robot.joint_frames(rows)[0], near_only=True))
         if not found:
-            certificate = Certificate(self.robot, self.bodies, pairs) if kept else self._certificate()
+            shared = not kept and self._settings.clearance == 0.0
+            certificate = self._certificate() if shared else Certificate(self.robot, self.bodies, pairs)
             found = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
         return tuple(sorted(found, key=lambda c: c.clearance))
 
@@ -359,7 +374,8 @@ class World(Rebuilt):
         if self._settings.clearance == 0.0:
             return ()
         frames = self.robot.joint_frames(self._rows(q, 1))[0]
-        near = measured(self._checks.bodies, self.pairs, frames, near_only=True)
+        roomy = with_room(self._bodies, self._settings.clearance).whole
+        near = measured(roomy, self.pairs, frames, near_only=True)
         kept = (c for c in near if c.clearance + self._settings.clearance > 0.0)
         return tuple(sorted(kept, key=lambda c: c.clearance))
 
@@ -388,7 +404,7 @@ class World(Rebuilt):
     def certify(self, Q: ArrayLike) -> Mask:
         """A second opinion on rows of Q, (m, dof) -> (m,), not by the checks of planners: proofs first, then coal."""
         mask = self.robot.within_limits(rows := self._rows(Q, 2))
-        open_ = mask & ~self.prover.still_proven(rows)
+        open_ = mask & ~self.prover.still_proven(rows, clearance=self._settings.clearance)
         mask[open_] = self._certificate().free(rows[open_])
         return mask if self.constraints is None else mask & self.constraints.held(rows)
 

@@ -37,7 +37,7 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
     Args:
         world: The world.
         ends: Where a path begins and ends.
-        clearance: Wanted [m]; None for a millimetre or that of the world, or less if the ends have less.
+        clearance: Wanted [m]; None for a millimetre, or less if the ends have less, but not less than the world keeps.
     """
     for room in _rooms(world, clearance):
         if world.motions_proven(ends, ends, clearance=room.searched).all():
@@ -62,10 +62,14 @@ def rooms_between(world: World, ends: NDArray[np.float64], clearance: float | No
 
 def _rooms(world: World, clearance: float | None) -> Iterator[Room]:
     """What may be kept, the most first."""
-    wanted = max(CLEARANCE, world.settings.clearance) if clearance is None else clearance
+    least = world.settings.kept
+    wanted = max(CLEARANCE if clearance is None else clearance, least)
     less = (wanted * 0.5**k for k in range(HALVINGS))
     for searched in chain((wanted + min(wanted, SPARE),), less, (0.0,)):
-        yield Room(min(wanted, searched), searched)
+        if searched >= least:
+            yield Room(min(wanted, searched), searched)
+    if least and least < wanted:
+        yield Room(least, least)
 
 
 def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> float | None:
@@ -85,10 +89,10 @@ def keeping(world: World, clearance: float, *, proven: float | None = None) -> W
         proven: That they are proven to keep at least [m]; None if nothing needs be proven that the world does not ask.
     """
     own = world.settings
-    roomy = max(clearance, own.clearance)
+    inflation = max(clearance - own.clearance, own.inflation)
     if proven is None:
-        return world.with_settings(clearance=roomy)
-    return world.with_settings(clearance=roomy, proving=max(proven, own.proving or 0.0))
+        return world.with_settings(inflation=inflation)
+    return world.with_settings(inflation=inflation, proving=max(proven, own.proving or 0.0))
 
 
 def leaving_room(world: World, room: Room) -> World:
@@ -129,15 +133,15 @@ def check_route_clearance(world: World, clearance: float | None, rows: Matrix) -
 
 
 def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> Iterator[float]:
-    """The clearances that a route, shape (k, dof), is itself proven to keep, of what is wanted and none [m].
+    """The clearances that a route, shape (k, dof), is itself proven to keep, of what is wanted and what the world keeps [m].
 
     Args:
         world: The world.
         rows: The route.
-        clearance: Wanted [m]; None for a millimetre or that of the world, or less if the ends have less.
+        clearance: Wanted [m]; None for a millimetre, or less if the ends have less, but not less than the world keeps.
     """
     room = room_between(world, rows[[0, -1]], clearance)
-    for kept in sorted({room.kept, 0.0}, reverse=True) if room is not None else ():
+    for kept in sorted({room.kept, world.settings.kept}, reverse=True) if room is not None else ():
         if world.prove(rows, clearance=kept).proven:
             yield kept
 

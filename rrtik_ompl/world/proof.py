@@ -237,14 +237,14 @@ class Prover:
         """Whether a proof is one of these bodies, by this object or its like for another thread."""
         return proof.prover is not None and proof.prover._kin is self._kin
 
-    def still_proven(self, rows: Matrix) -> Mask:
-        """Which configurations, shape (m, dof), are proven free. Shape (m,).
+    def still_proven(self, rows: Matrix, *, clearance: float) -> Mask:
+        """Which configurations, shape (m, dof), are proven free, with a clearance [m]. Shape (m,).
 
         Of a few none is, as long as the table is not made: that takes longer than coal needs for them.
         """
         mask = np.full(len(rows), self._tables.packed is not None or len(rows) > FEW)
         if mask.any():
-            mask[[gap.motion for gap in self.still_gaps(rows, clearance=0.0)]] = False
+            mask[[gap.motion for gap in self.still_gaps(rows, clearance=clearance)]] = False
         return mask
 
     def still_gaps(self, rows: Matrix, *, clearance: float) -> list[Gap]:

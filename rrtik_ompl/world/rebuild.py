@@ -136,12 +136,23 @@ class Rebuilt:
             checks = moved
         other._checks, other._motions = checks, self._motions
         self._motions = KeptHere()
-        other._certificate = Once(_certificate, self.robot, other._bodies, self.pairs)
+        other._certificate = other._second_checker()
         still = numbers.standing(None if self._always_colliding else placements)
         other._always_colliding = _touching(self.robot, other._bodies, still)
         moving = tuple(placements)
         other.prover = self.prover.moved(other._bodies, moving, always_colliding=other._always_colliding)
         return other
+
+    def _second_checker(self) -> Callable[[], Certificate]:
+        """What makes the checker behind :meth:`World.certify`, when that is asked for."""
+        return Once(_certificate, self.robot, self._bodies, self.pairs, self._settings.clearance)
+
+
+def with_room(bodies: Items[Body], room: float) -> Items[Body]:
+    """The same bodies, but for obstacles, which have that much more margin [m]."""
+    if room == 0.0:
+        return bodies
+    return Items(tuple(replace(b, margin=b.margin + room) if b.kind == "obstacle" else b for b in bodies.whole))
 
 
 @dataclass(slots=True, eq=False)
@@ -181,8 +192,8 @@ class _Numbers:
         return tuple(pair for k in moved for pair in self.fixed.get(k, ()))
 
 
-def _certificate(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> Certificate:
-    return Certificate(robot, tuple(bodies), pairs)
+def _certificate(robot: Robot, bodies: Items[Body], pairs: Pairs, clearance: float) -> Certificate:
+    return Certificate(robot, with_room(bodies, clearance).whole, pairs)
 
 
 def _touching(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> bool:

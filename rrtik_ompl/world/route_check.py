@@ -49,7 +49,8 @@ def motion_taken(world: World, a: Vector, b: Vector) -> bool:
 
 def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
     """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
-    proof = known if known is not None and known.proven else world.prove(rows)
+    enough = known is not None and known.proven and known.clearance >= world.settings.kept
+    proof = known if enough else world.prove(rows)
     if proof.proven:
         margins = "its margins and " if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
         kept = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""
@@ -87,7 +88,27 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
     found = []
     for run in np.split(open_, np.flatnonzero(np.diff(open_) > 1) + 1) if len(open_) else ():
         found += _sampled(world, rows, counts, run)
-    return tuple(found)
+    return tuple(found if world.settings.proving is None else _with_unproven(world, rows, open_, found))
+
+
+def _with_unproven(
+    world: World, rows: Matrix, open_: NDArray[np.int64], found: list[Violation]
+) -> Iterator[Violation]:
+    """What was found, and each other motion that is not proven to keep what it must, of those given by numbers."""
+    broken = {violation.edge: violation for violation in found}
+    wanted = world.settings.proving
+    proven = world.motions_proven(rows[open_], rows[open_ + 1], clearance=wanted)
+    for edge, enough in zip(open_.tolist(), proven.tolist(), strict=True):
+        if edge in broken:
+            yield broken[edge]
+        elif not enough:
+            yield Violation(edge, frozen(rows[edge]), not_proven(world))
+
+
+def not_proven(world: World) -> str:
+    """What is said of a motion that has to be proven, and is not."""
+    wanted = 1e3 * (world.settings.proving or 0.0)
+    return f"not proven to keep {wanted:.4g} mm from every obstacle" if wanted else "not proven free"
 
 
 def _not_held(constraints: HeldRegions, rows: Matrix) -> list[Violation]:

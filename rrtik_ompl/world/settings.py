@@ -31,8 +31,9 @@ class WorldSettings:
         accuracy: "exact" or "conservative".
         motion_resolution: Largest step of any point of the arm between two checked configurations [m].
         self_margin: How far links, and what they hold, must stay from each other where they must not touch [m].
-        clearance: What checks keep from obstacles on top of their margins [m]; proofs are told theirs.
+        clearance: What is kept from obstacles on top of their margins [m].
         proving: Motions must be proven too, with this clearance [m]; None if they need not be.
+        inflation: What checks keep on top of the clearance, for searches that leave room [m]; no other answer does.
         constraints: Regions that a frame must not leave, placed in the world.
 
     Raises:
@@ -53,6 +54,7 @@ class WorldSettings:
     self_margin: float = field(default=0.0, metadata=LENGTH)
     clearance: float = field(default=0.0, metadata=LENGTH)
     proving: float | None = field(default=None, metadata=LENGTH)
+    inflation: float = field(default=0.0, metadata=LENGTH)
     constraints: tuple[TaskRegion, ...] = ()
 
     __reduce__ = as_value
@@ -72,10 +74,16 @@ class WorldSettings:
             "self_margin": not_negative(self.self_margin, "self_margin"),
             "clearance": not_negative(self.clearance, "clearance"),
             "proving": None if self.proving is None else not_negative(self.proving, "clearance"),
+            "inflation": not_negative(self.inflation, "inflation"),
             "constraints": listed(self.constraints, "path constraints"),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
+
+    @property
+    def kept(self) -> float:
+        """What every motion keeps from obstacles on top of their margins, where nobody asks for more [m]."""
+        return max(self.clearance, self.proving or 0.0)
 
     def unusual(self) -> Iterator[str]:
         """Each setting beside robot and scene that is not the default, as ``name=value``."""
