@@ -188,6 +188,12 @@ def position(place: Message, size: list[float], **more: Any) -> Message:
     return {"header": {"frame_id": "base"}, "link_name": "tool", "constraint_region": region} | more
 
 
+def fixed(parent: str, child: str, x: float) -> Message:
+    """A frame that stands in another one, along its x axis."""
+    transform = {"translation": [x, 0, 0], "rotation": [0, 0, 0, 1]}
+    return {"header": {"frame_id": parent}, "child_frame_id": child, "transform": transform}
+
+
 HELD = {"attached_collision_objects": [attached(ROD)]}
 SIDEWAYS = pin.SE3(pin.Quaternion(*[QUARTER[k] for k in (3, 0, 1, 2)]).matrix(), np.array([0.0, 0.0, 0.5]))
 FREE_PAIR: tuple[Solid, ...] = ()
@@ -365,6 +371,38 @@ CASES: dict[str, Case] = {
         obstacles=((coal.Box(0.2, 1.0, 1.0), at(0.5, 0.0, 1.0)),),
         base=at(0, 0, 1),
         goal=near([1.0, 0.0, 1.2]),
+    ),
+    "an object at the tool where the scene has that": Case(
+        {"robot_state": {"joint_state": {"name": ["x", "y", "z"], "position": [0.4, 0.1, 0]}}}
+        | world(box("plate", [0.2, 1, 1], pose(0.1, -0.1, 0), "tool"))
+    ),
+    "held at a place of the world where the scene has the tool": Case(
+        {
+            "robot_state": {
+                "joint_state": {"name": ["x", "y", "z"], "position": [0.4, 0.1, 0.2]},
+                "attached_collision_objects": [attached(box("rod", [0.7, 0.02, 0.02], pose(0.4, 0.1, 0.2), "world"))],
+            }
+        },
+        parts=(BALL, STICK),
+    ),
+    "a goal in the frame of what was held there": Case(
+        {
+            "robot_state": {
+                "joint_state": {"name": ["x"], "position": [0.4]},
+                "attached_collision_objects": [attached(box("rod", [0.7, 0.02, 0.02], pose(0.4, 0, 0), "world"))],
+            }
+        },
+        {"goal_constraints": [{"position_constraints": [ball(pose(1, 0, 0.2), "rod")]}]},
+        parts=(BALL, STICK),
+        goal=near(AT_ONE),
+    ),
+    "fixed frames in any order": Case(
+        {"fixed_frame_transforms": [fixed("shelf", "cell", 0.3), fixed("world", "shelf", 0.2)]}
+        | world(moved(PLATE, header={"frame_id": "cell"}, primitive_poses=[pose(0, 0, 0)]))
+    ),
+    "fixed frames in each other": Case(
+        {"fixed_frame_transforms": [fixed("shelf", "cell", 0.3), fixed("cell", "shelf", 0.2)]},
+        refused="fixed_frame_transforms.*cell, shelf",
     ),
     "coordinates with names and constants of ROS": Case(
         world(

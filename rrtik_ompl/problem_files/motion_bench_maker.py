@@ -43,7 +43,8 @@ def load_motion_bench_maker(
     of the scene does; what either attaches is held by its link. Without an SRDF beside the URDF the joints of the group
     are taken to be those of the goal. Paddings and scales of links are those of the robot; a padding counts between
     links, too. Path constraints of joints narrow the limits of the robot, others are regions of the problem. Frames are
-    the world, links and what they hold where the start state has them, objects, and the fixed frames of the scene.
+    the world, links, what they hold, objects, and the fixed frames of the scene; the arm stands where the state of the
+    scene has it for what the scene says, and where the path begins for the request.
 
     Which links may touch each other is the robot's own business (its SRDF); of the scene's allowed collisions those
     with an obstacle or an attached object are used, and all of them if the robot says nothing about its links.
@@ -80,11 +81,14 @@ def load_motion_bench_maker(
     _tell_misspelt_joints(request_document, request, arm)
     with request_document.at(("start_state", "joint_state")):
         start = _configuration(arm, states, "start")
+    with scene_document.at(("robot_state", "joint_state")):
+        shown = _configuration(arm, states | message.robot_state.values(), "robot_state")
     with scene_document.at(("fixed_frame_transforms",)):
-        frames = Frames(arm, start, message.fixed_frame_transforms)
+        frames = Frames(arm, shown, message.fixed_frame_transforms)
     reader = SceneReader(arm, frames, message)
     reader.read_world(scene_document)
     reader.hold(scene_document, ("robot_state",), message.robot_state)
+    frames = reader.start_at(start)
     reader.hold(request_document, ("start_state",), request.start_state)
     scene = reader.scene(scene_document)
     if over := passed_over(message.allowed_collision_matrix, arm):

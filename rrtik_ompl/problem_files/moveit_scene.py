@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.arrays import Vector
 from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.errors import InputError, SceneWarning, UnknownNameError, few
 from rrtik_ompl.files.octree import cells_of_tree
@@ -69,6 +70,11 @@ class SceneReader:
                 self._do(item)
         with document.at(("world", "octomap", "octomap")):
             self._map = _mapped(self._message.world.octomap, self._frames)
+
+    def start_at(self, q: Vector) -> Frames:
+        """The frames once the arm stands where a path begins, shape (dof,), and has taken along what it holds."""
+        self._frames = self._frames.moved_to(q)
+        return self._frames
 
     def hold(self, document: YamlDocument, location: Location, state: RobotState) -> None:
         """Read what a state attaches to links; one of the name of an earlier one takes its place.
@@ -189,7 +195,7 @@ class SceneReader:
             for part, (solid, place) in zip(_numbered(name, len(taken.shapes)), taken.shapes, strict=True)
         ]
         frame = _frame_of(item.object, taken)
-        self._frames.add(name, frame, taken.parts, moves=self._frames.moves(item.link_name))
+        self._frames.add(name, frame, taken.parts, link=item.link_name)
 
 
 def tell(document: YamlDocument, location: Location, line: str) -> None:
