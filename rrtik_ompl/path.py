@@ -203,10 +203,7 @@ class JointPath:
         """Whether its proof covers every motion, keeps what the world keeps, and was made by a form of the world."""
         proof = self.proof
         return (
-            proof is not None
-            and proof.proven
-            and proof.clearance >= world.settings.kept
-            and world.prover.made(proof)
+            proof is not None and proof.proven and proof.clearance >= world.settings.kept and world.prover.made(proof)
         )
 
     def save(self, path: str | os.PathLike[str], *, proof: bool = False) -> None:

@@ -32,7 +32,10 @@ IK_SECONDS = 1e9  # no limit: the rounds of inverse kinematics are counted, some
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Way:
-    """Rails one after the other, how exactly to follow them, and what to keep from obstacles [m]; None for what the world keeps."""
+    """Rails one after the other, how exactly to follow them, and what to keep from obstacles [m].
+
+    The clearance is None for what the world keeps.
+    """
 
     rails: tuple[Rail, ...]
     tolerance: Tolerance

@@ -39,7 +39,8 @@ def blended(
     None where no such motion is faster than ``slowest`` [s], or none is free.
     """
     kept = spaced(corners, MERGED_SHARE * blend)
-    rows = corners if len(kept) == len(corners) else vertices(corners[kept])
+    merged = len(kept) < len(corners)
+    rows = vertices(corners[kept]) if merged else corners
     if len(rows) < 2:  # the whole path is shorter than what is merged
         return None
     along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
@@ -53,7 +54,8 @@ def blended(
         places, apart, on_path = (np.concatenate(column) for column in columns)
         bad = places[apart > room]
         if len(bad) == 0:
-            bad = places[faults(motion, ~on_path)]
+            off_path = np.ones_like(on_path) if merged else ~on_path  # what was proven is the path with all corners
+            bad = places[faults(motion, off_path)]
         if len(bad) == 0:
             return motion
         radii = _narrower(radii, along[1:-1], bad, LEAST_RADIUS * blend)

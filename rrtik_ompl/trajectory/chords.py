@@ -54,7 +54,12 @@ def chords_of(durations: Vector, pushes: Vector, slack: float) -> Chords:
 
 
 def proof_by_chords(
-    times: Vector, pushes: Vector, places: Callable[[Vector], Matrix], world: World, clearance: float | None, finer: int = 0
+    times: Vector,
+    pushes: Vector,
+    places: Callable[[Vector], Matrix],
+    world: World,
+    clearance: float | None,
+    finer: int = 0,
 ) -> Proof:
     """Prove the pieces of a motion, m of them; those that are not proven by chords are tried again with finer ones.
 

@@ -133,7 +133,7 @@ def check_route_clearance(world: World, clearance: float | None, rows: Matrix) -
 
 
 def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> Iterator[float]:
-    """The clearances that a route, shape (k, dof), is itself proven to keep, of what is wanted and what the world keeps [m].
+    """The clearances that a route, shape (k, dof), is itself proven to keep: what is wanted, what the world keeps [m].
 
     Args:
         world: The world.

@@ -91,9 +91,7 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
     return tuple(found if world.settings.proving is None else _with_unproven(world, rows, open_, found))
 
 
-def _with_unproven(
-    world: World, rows: Matrix, open_: NDArray[np.int64], found: list[Violation]
-) -> Iterator[Violation]:
+def _with_unproven(world: World, rows: Matrix, open_: NDArray[np.int64], found: list[Violation]) -> Iterator[Violation]:
     """What was found, and each other motion that is not proven to keep what it must, of those given by numbers."""
     broken = {violation.edge: violation for violation in found}
     wanted = world.settings.proving

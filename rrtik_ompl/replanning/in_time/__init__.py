@@ -105,7 +105,7 @@ def plan_in_time(
         horizon: The latest arrival [s].
         speed: The configuration's, all joints counted alike [rad/s or m/s]; None: the joints' limits alone.
         margin: Distance to obstacles that is always kept, beside their own margins [m].
-        clearance: What is proven beside it [m]; 1 mm if None.
+        clearance: What is proven beside it [m]; 1 mm if None, or as much as the world asks proofs for.
         limits: Of the joints' speeds; those of the robot if None.
         iterations: Of the search at most; it goes on for earlier arrivals until it finds no more for a while.
         seconds: That the search may take by the clock [s].
@@ -124,12 +124,14 @@ def plan_in_time(
     require(problem, Problem, "problem to plan in time", "use Problem(world, start, goal) or load_scenario(name)")
     refuse_constraints(problem, "plan in time")
     refuse_endless_turns(problem.world.scene)
+    settings = problem.world.settings
+    wanted = CLEARANCE if clearance is None else not_negative(clearance, "clearance")
     options = _Options(
         slot=1.0 / positive(rate, "rate", "give slots a second, such as 10"),
         horizon=positive(horizon, "horizon", "give the latest arrival [s]"),
         speed=float("inf") if speed is None else positive(speed, "speed", "give it in rad/s or m/s"),
         margin=not_negative(margin, "margin"),
-        clearance=CLEARANCE if clearance is None else not_negative(clearance, "clearance"),
+        clearance=max(wanted, (settings.proving or 0.0) - settings.clearance),
         limits=limits,
         seed=whole_number(seed, "seed"),
     )
