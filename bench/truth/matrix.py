@@ -11,7 +11,7 @@ from rrtik_bench.report.page import Report
 from rrtik_ompl import load_robot
 
 ROBOTS = ("ur5", "titan4", "panda_primitives", "planar6")
-ROUNDS = 25  # of each kind and robot, at full size
+ROUNDS = 10  # of each kind and robot, at full size
 POSTURES, MOTIONS = 120, 24
 
 

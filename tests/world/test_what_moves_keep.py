@@ -45,7 +45,7 @@ def path(kept):
 
 
 def roadmap(kept):
-    return rrtik.Roadmap(kept, seed=1).path(HERE, THERE)
+    return rrtik.Roadmap(kept, vertices=300, seed=1).path(HERE, THERE)
 
 
 def blended(kept, blend):
