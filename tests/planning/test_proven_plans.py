@@ -212,10 +212,12 @@ def test_bounds_of_fewest_moves_do_not_depend_on_the_clearance():
 def test_worlds_with_a_clearance_share_everything_else():
     problem = rrtik.load_problem("titan4_sdu")
     wide = problem.world.with_clearance(0.2)
-    assert not wide.valid(problem.start) or not wide.valid(problem.goal.q)
+    ends = np.stack([problem.start, problem.goal.q])
+    assert not wide.valid_batch(ends).all()
+    assert not wide.certify(ends).all(), "a second opinion keeps it too"
     assert problem.world.valid(problem.start)
     assert wide.clearance(problem.start) == problem.world.clearance(problem.start)
-    assert wide.certify(problem.start[None]).all()
+    assert problem.world.with_settings(inflation=0.2).certify(ends).all(), "what searches keep on top is theirs alone"
     assert problem.world.proving(0.01).fast is None
     assert dataclasses.is_dataclass(problem.world.prove([problem.start]))
 
