@@ -17,6 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.collision.collector import collector_waits
+from rrtik_ompl.collision.joined_links import joined_links
 from rrtik_ompl.collision.shape_table import Piece, pieces
 from rrtik_ompl.collision.solids import robot_solids
 from rrtik_ompl.collision.thickness import SHARE, least_width
@@ -176,8 +177,8 @@ def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
 def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:
     """Numbers of the bodies that must not touch: all but what is rigidly joined or allowed, and adjacent links.
 
-    Links are adjacent if one joint lies between them: they overlap at it by construction. What a link holds does not,
-    so it is checked against all links but its own and those that it is allowed to touch.
+    Links are adjacent if one joint of the description joins them (`joined_links`): they overlap at it by construction.
+    What a link holds does not, so it is checked against all links but its own and those that it is allowed to touch.
 
     Args:
         robot: The robot.
@@ -239,12 +240,12 @@ def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
 
     A description without a list of allowed pairs says nothing about solids that overlap by construction; two that
     touch in every one of many random postures can only be such ones. They are left out, and a warning names them. With
-    a list that is done only for links between which other programs may not look: those joined by links without solids,
-    and those that are asked for although a joint joins them.
+    a list that is done only for links between which other programs may not look: those joined by links without solids
+    or by joints that are fixed or held, and those that are asked for although a joint joins them.
     """
     bodies = link_bodies(robot)
     solids = [item.name for item in robot.collision.geometryObjects]
-    parents = list(robot.model.parents)
+    joined = joined_links(robot)
     nearest = _carrying_parents(robot, bodies)
     pairs: list[tuple[int, int]] = []
     doubtful: list[tuple[int, int]] = []
@@ -254,7 +255,7 @@ def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
         wanted = names in robot.checked_collisions
         if (
             not _may_meet(first, second)
-            or (_adjacent(first.joint, second.joint, parents) and not wanted)
+            or (names in joined and not wanted)
             or names in robot.allowed_collisions
             or frozenset((solids[i], solids[j])) in robot.unchecked_solids
         ):
@@ -279,7 +280,7 @@ def _carrying_parents(robot: Robot, bodies: Iterable[Body]) -> dict[int, int]:
     return found
 
 
-def _adjacent(first: int, second: int, parents: Mapping[int, int] | Sequence[int]) -> bool:
+def _adjacent(first: int, second: int, parents: Mapping[int, int]) -> bool:
     """Whether one of two joints is the parent of the other."""
     return bool(parents[first] == second or parents[second] == first)
 

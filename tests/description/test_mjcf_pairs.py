@@ -41,8 +41,18 @@ SHOULDER = (
 <joint name="j3" axis="1 0 0" range="-3 3"/><geom size=".05" pos="0 .35 0"/></body></body></body></worldbody>
 </mujoco>"""
 )
+WELDED = (
+    HEAD
+    + """<body name="a"><joint name="j1" axis="0 0 1" range="-3 3"/><geom size=".02" fromto="0 0 0 .3 0 0" type="capsule"/>
+<body name="camera" pos=".4 .15 0"><geom size=".06"/></body>
+<body name="b" pos=".4 0 0"><joint name="j2" axis="0 0 1" range="-3 3"/>
+<geom type="capsule" size=".02" fromto=".08 0 0 .2 0 0"/><body name="c" pos=".25 0 0">
+<joint name="j3" axis="0 0 1" range="-3 3"/><geom type="capsule" size=".02" fromto=".08 0 0 .3 0 0"/></body></body></body>
+</worldbody></mujoco>"""
+)
 FILES = {
     "masks": MASKS,
+    "a body welded beside a joint": WELDED,
     "neighbours over two joints": SHOULDER,
     **{f"on a base, {name}": ON_A_BASE.format(text) for name, text in STANDING.items()},
     **{f"on the world, {name}": ON_THE_WORLD.format(text) for name, text in STANDING.items()},
@@ -50,6 +60,7 @@ FILES = {
 # contacts that MuJoCo 4.0.0 finds in 400 postures drawn with seed 1
 BY_MUJOCO = {
     "masks": 9,
+    "a body welded beside a joint": 79,
     "neighbours over two joints": 51,
     "on a base, geom of the world": 107,
     "on a base, body beside the base": 107,

@@ -39,18 +39,18 @@ def solids_apart(masks: Mapping[str, Sequence[Mask]]) -> frozenset[frozenset[str
     )
 
 
-def joined_by_several(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
-    """Pairs of bodies that several joints join, and what is rigidly joined to one of the two.
+def joined_bodies(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
+    """Pairs of bodies that joints join, and what is welded to one of the two: neighbours, to MuJoCo.
 
-    To MuJoCo they are neighbours as any others; here each joint has a link of its own behind it.
+    Here each of several joints has a link of its own behind it, and what is welded to a link is another link.
     """
     rigid: dict[str, list[str]] = {}
     for name in bodies:
         rigid.setdefault(_carrier(name, bodies), []).append(name)
-    several = [name for name, body in bodies.items() if len(_moving(body)) > 1]
+    moving = [name for name, body in bodies.items() if _moving(body)]
     found = {
         frozenset(pair)
-        for name in several
+        for name in moving
         for pair in product(rigid[name], rigid[_carrier(bodies[name].parent, bodies)])
     }
     return frozenset(found) - touchable(bodies)

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.description.mjcf.bodies import WORLD, Body, joined_by_several, meet, solids_apart, touchable
+from rrtik_ompl.description.mjcf.bodies import WORLD, Body, joined_bodies, meet, solids_apart, touchable
 from rrtik_ompl.description.mjcf.geoms import OF_THE_SCENE, masks, meshes_of, solid_of
 from rrtik_ompl.description.mjcf.unread import unread_of_mjcf
 from rrtik_ompl.description.mjcf.values import MAIN, Settings
@@ -239,9 +239,9 @@ def _excluded(root: Element, reader: _Reader) -> frozenset[frozenset[str]]:
 
 
 def _apart(reader: _Reader) -> frozenset[frozenset[str]]:
-    """Pairs of solids that never collide: by their masks, or as several joints lie between their bodies."""
+    """Pairs of solids that never collide: by their masks, or as neighbours."""
     found = set(solids_apart(reader.masks))
-    for one, other in joined_by_several(reader.bodies):
+    for one, other in joined_bodies(reader.bodies):
         numbered = ([f"{name}_{k}" for k in range(len(reader.masks.get(name, ())))] for name in (one, other))
         found |= {frozenset(pair) for pair in product(*numbered)}
     return frozenset(found)
