@@ -45,13 +45,18 @@ class Chain:
 
     __reduce__ = as_value
 
+    def whole_turns(self) -> Mask:
+        """Which actuated joints, shape (dof,), leave every link where it was if they turn by a whole turn."""
+        turning = ~self.prismatic[:, None] & (self.gain == np.rint(self.gain))
+        return np.asarray((turning | (self.gain == 0.0)).all(axis=0))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Robot:
     """A read-only arm. Configurations ``q`` have one number per actuated joint: radians, or metres if prismatic.
 
-    Continuous joints have infinite limits and any real number as a value: q and q + 2 pi are the same posture, and a
-    straight motion between two values turns by their difference.
+    Continuous joints have infinite limits and any real number as a value: q and q + 2 pi are the same posture (all that
+    follows such a joint makes whole turns too), and a straight motion between two values turns by their difference.
 
     Attributes:
         name, joint_names: Name used in messages and files; the actuated joints, in the order of q.

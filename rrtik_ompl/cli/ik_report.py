@@ -62,10 +62,11 @@ def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tupl
         turns, found or not. Joints that turn without limits are not counted.
     """
     posture = mid_range_configuration(robot) if near is None else near
-    counted = ~(robot.prismatic | robot.continuous)
+    whole = robot.chain.whole_turns()
+    counted = whole & ~robot.continuous
     turned = result.solutions - TAU * np.round((result.solutions - posture) / TAU)
     Q = np.where(counted & (robot.lower <= turned) & (turned <= robot.upper), turned, result.solutions)
-    looks = np.hstack([np.where(robot.prismatic, Q, np.cos(Q)), np.where(robot.prismatic, 0.0, np.sin(Q))])
+    looks = np.hstack([np.where(whole, np.cos(Q), Q), np.where(whole, np.sin(Q), 0.0)])
     kept = different_rows(looks, np.linalg.norm(Q - posture, axis=1).argsort(kind="stable"))
     q, lower, upper = Q[kept][:, counted], robot.lower[counted], robot.upper[counted]
     fitting = 1.0 + np.floor((upper - q) / TAU) + np.floor((q - lower) / TAU)

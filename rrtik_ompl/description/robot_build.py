@@ -11,16 +11,17 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import LARGEST, TAU, Vector, bounded_array, frozen
+from rrtik_ompl.arrays import LARGEST, TAU, Mask, Vector, bounded_array, frozen
 from rrtik_ompl.description import robot_pickle as robot_pickle  # teaches pickle to take robots
 from rrtik_ompl.description.robot_source import BasePose
 from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.tree import Joint, Tree
 from rrtik_ompl.description.tree_model import build_models
-from rrtik_ompl.errors import InputError, TipWarning, UnknownNameError, name_of
+from rrtik_ompl.errors import DescriptionWarning, InputError, TipWarning, UnknownNameError, name_of
 from rrtik_ompl.robot import LIMIT_TOLERANCE, Chain, Robot
 
 RATES = ("velocity", "acceleration", "jerk")
+MOST_TURNS = 100  # of a joint without limits that something follows at a fraction
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,9 +116,12 @@ def build_robot(
     tip_name = _last_link(name, tree, actuated) if tip is None else name_of(tip, f"the tip of robot '{name}'")
     if not model.existFrame(tip_name):
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
+    chain = _chain(model, actuated, ties)
+    whole = chain.whole_turns()
+    limited |= _periods(name, limited, actuated, ties, whole)
     bounds = _limits(name, [movable[joint] for joint in actuated], limited)
     named = {
-        key: frozen(_turned_inside(np.array([values[j] for j in actuated]), bounds))
+        key: frozen(_turned_inside(np.array([values[j] for j in actuated]), bounds, whole))
         for key, values in (postures or {}).items()
         if all(j in values for j in actuated)
     }
@@ -133,7 +137,7 @@ def build_robot(
         model=model,
         collision=collision,
         looks=looks,
-        chain=_chain(model, actuated, ties),
+        chain=chain,
         self_collision=self_collision,
         closed_form=closed_form,
         planar=planar,
@@ -292,12 +296,51 @@ def _cut(leader: Mapping[str, float], follower: Mapping[str, float], tie: Mimic)
     return {"lower": max(leader["lower"], min(ends)), "upper": min(leader["upper"], max(ends)), **rates}
 
 
-def _turned_inside(q: Vector, bounds: Mapping[str, Any]) -> Vector:
+def _periods(
+    name: str,
+    limits: Mapping[str, Mapping[str, float]],
+    actuated: tuple[str, ...],
+    ties: Mapping[str, Mimic],
+    whole: Mask,
+) -> dict[str, dict[str, float]]:
+    """Limits of actuated joints without any whose whole turns are other postures, as something follows at a fraction.
+
+    They may turn to either side until all that follows has made whole turns too; a warning says so.
+    """
+    found = {}
+    for joint, turns_alike in zip(actuated, whole, strict=True):
+        own = limits[joint]
+        if turns_alike or np.isfinite(own["lower"]) or np.isfinite(own["upper"]):
+            continue
+        following = {tie.joint: tie.multiplier for tie in ties.values() if tie.source == joint}
+        turns = _turns_of(following.values())
+        found[joint] = {**own, "lower": -turns * TAU, "upper": turns * TAU}
+        fraction = next(each for each, gain in following.items() if gain != round(gain))
+        message = (
+            f"robot '{name}': joint '{joint}' turns without end, but '{fraction}' follows it as "
+            f"{following[fraction]:g} x, so that a whole turn is another posture: it is taken to turn by up to {turns} "
+            f"{'turn' if turns == 1 else 'turns'} to either side; joint_limits=FILE can say otherwise"
+        )
+        warnings.warn(DescriptionWarning(message), stacklevel=3)
+    return found
+
+
+def _turns_of(gains: Iterable[float]) -> int:
+    """The least number of turns that is whole turns, to a part in a thousand, of all that follows by these factors."""
+    factors = np.array([abs(gain) for gain in gains if gain != 0.0])
+    for count in range(1, MOST_TURNS):
+        made = count * factors
+        if (np.abs(made - np.rint(made)) <= 1e-3 * made).all():
+            return count
+    return MOST_TURNS
+
+
+def _turned_inside(q: Vector, bounds: Mapping[str, Any], whole: Mask) -> Vector:
     """The same posture with joints that lie outside their limits turned by a full turn, if that brings them inside."""
     for turn in (TAU, -TAU):
         other = q + turn
         outside = (q < bounds["lower"]) | (q > bounds["upper"])
-        fits = (other >= bounds["lower"]) & (other <= bounds["upper"]) & ~bounds["prismatic"]
+        fits = (other >= bounds["lower"]) & (other <= bounds["upper"]) & whole
         q = np.where(outside & fits, other, q)
     return q
 

@@ -1,11 +1,24 @@
 """Joints that follow others: what they follow keeps within every limit of theirs, whatever says that they follow."""
 
+import warnings
+
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from rrtik_ompl.arrays import TAU
 from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.cli.ik_report import fold_full_turns
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.errors import DescriptionWarning, InputError
+from rrtik_ompl.goal import PoseGoal, joint_difference
+from rrtik_ompl.ik.goal_configurations import goal_configurations
+from rrtik_ompl.ik.method_interface import IkResult
+from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.planning import plan
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.search.roadmap import Roadmap
+from rrtik_ompl.tasks.through import plan_through
 from rrtik_ompl.world import World
 
 JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{name}_link"/><axis xyz="0 0 1"/>
@@ -151,3 +164,106 @@ def test_followers_of_followers_and_references_are_those_of_mujoco(tmp_path):
     a, b, c = robot.joint_values(np.array([[0.5]]))[0]
     assert b == pytest.approx(-0.3 + 0.1 - 0.5 * (a - 0.2))
     assert c == pytest.approx(2.0 * (b + 0.3))
+
+
+GEARS = (1.0, -1.0, 2.0, 0.5, 1.5, -0.25)  # of a follower, by the angle of an endless leader
+ENDLESS = """<robot name="geared"><link name="base"/><link name="a_link"/><link name="b_link"/>
+<joint name="a" type="{kind}"><parent link="base"/><child link="a_link"/><axis xyz="0 0 1"/>
+<limit lower="-{limit}" upper="{limit}" velocity="1" effort="1"/></joint>
+<joint name="b" type="continuous"><parent link="a_link"/><child link="b_link"/><origin xyz=".3 0 0"/><axis xyz="0 1 0"/>
+{mimic}</joint></robot>"""
+
+
+def geared(gain, kind="continuous", limit=7):
+    return ENDLESS.format(kind=kind, limit=limit, mimic=MIMIC.format(source="a", gain=gain, offset=0.2))
+
+
+def places_by_pinocchio(text, gain, q):
+    """Every frame for values of the leader, by Pinocchio's own reader of URDF, shape (m, frames, 4, 4)."""
+    model = pin.buildModelFromXML(text.replace("<mimic", "<!--mimic").replace('offset="0.2"/>', 'offset="0.2"/>-->'))
+    data, found = model.createData(), []
+    for value in np.ravel(q):
+        angles = {"a": value, "b": gain * value + 0.2}
+        full = [x for name in ("a", "b") for x in _written(model.joints[model.getJointId(name)], angles[name])]
+        pin.framesForwardKinematics(model, data, np.array(full))
+        found.append([place.homogeneous for place in data.oMf])
+    return np.array(found)
+
+
+def _written(joint, angle):
+    return (angle,) if joint.nq == 1 else (np.cos(angle), np.sin(angle))
+
+
+def _difference(robot, q):
+    base = np.zeros(1)
+    return base + joint_difference(robot, q[None], base)[0]
+
+
+def _planned(robot, q):
+    found = plan(Problem(World(robot), [0.3], q), seed=1, seconds=2.0)
+    return found.path.end
+
+
+def _through(robot, q):
+    found = plan_through(World(robot), [0.3], [q], seed=1, seconds=2.0)
+    return found.path.waypoints[found.reached[0]]
+
+
+def _by_kinematics(robot, q):
+    found = solve_ik(robot, PoseGoal(robot.fk(q, "b_link")), near=[0.0], seed=1)
+    return found.solutions
+
+
+def _joined_on_a_roadmap(robot, q):
+    found = Roadmap(World(robot), vertices=20, seed=1).path([0.3], q)
+    return found.end
+
+
+def _folded(robot, q):
+    given = IkResult(q[None], np.zeros((1, 2)), "", "", 0, "damped", 0.0)
+    return fold_full_turns(robot, given, np.zeros(1))[0].solutions
+
+
+ALIKE = {  # what the library gives for the posture q, which it then calls the same
+    "goal of a problem": lambda robot, q: Problem(World(robot), [0.3], q).goal.q,
+    "goals of a search": lambda robot, q: (
+        goal_configurations(Problem(World(robot), [0.3], q), np.random.default_rng(1)).rows
+    ),
+    "shortest difference": _difference,
+    "end of a plan": _planned,
+    "end of a plan through goals": _through,
+    "inverse kinematics": _by_kinematics,
+    "a roadmap": _joined_on_a_roadmap,
+    "folded solutions": _folded,
+}
+
+
+@pytest.mark.parametrize("way", ALIKE)
+@pytest.mark.parametrize("gain", GEARS)
+def test_what_the_library_calls_the_same_posture_is_the_same_for_all_that_follows(gain, way):
+    text = geared(gain)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        robot = robot_from_urdf_text(text, tip="b_link")
+    assert robot.continuous[0] == (gain == round(gain))
+    for q in ([TAU], [-TAU + 0.4], [2.5]):
+        given = np.atleast_2d(ALIKE[way](robot, np.array(q)))
+        expected = places_by_pinocchio(text, gain, q)
+        assert np.allclose(places_by_pinocchio(text, gain, given), expected, atol=1e-3), q
+        assert np.allclose(robot.fk_batch(given, "b_link"), expected[:, -1], atol=1e-3)
+
+
+@pytest.mark.parametrize(("gain", "turns"), [(0.5, 2), (1.5, 2), (-0.25, 4), (0.333333, 3), (0.001, 100), (np.pi, 7)])
+def test_a_leader_whose_whole_turns_are_other_postures_gets_limits_and_a_warning(gain, turns):
+    with pytest.warns(DescriptionWarning, match=f"'geared': joint 'a' turns without end, but 'b'.*up to {turns} turn"):
+        robot = robot_from_urdf_text(geared(gain), tip="b_link")
+    assert robot.upper[0] == -robot.lower[0] == turns * TAU
+    assert not robot.continuous[0]
+
+
+@pytest.mark.parametrize("gain", GEARS)
+def test_a_posture_is_turned_into_the_limits_only_if_it_stays_the_same(gain):
+    text = geared(gain, "revolute", 1)
+    robot = robot_from_urdf_text(text, tip="b_link", postures={"far": {"a": TAU - 0.5}})
+    given = places_by_pinocchio(text, gain, robot.posture("far"))
+    assert np.allclose(given, places_by_pinocchio(text, gain, TAU - 0.5))

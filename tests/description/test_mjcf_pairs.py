@@ -43,12 +43,12 @@ SHOULDER = (
 )
 WELDED = (
     HEAD
-    + """<body name="a"><joint name="j1" axis="0 0 1" range="-3 3"/><geom size=".02" fromto="0 0 0 .3 0 0" type="capsule"/>
-<body name="camera" pos=".4 .15 0"><geom size=".06"/></body>
+    + """<body name="a"><joint name="j1" axis="0 0 1" range="-3 3"/>
+<geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/><body name="camera" pos=".4 .15 0"><geom size=".06"/></body>
 <body name="b" pos=".4 0 0"><joint name="j2" axis="0 0 1" range="-3 3"/>
 <geom type="capsule" size=".02" fromto=".08 0 0 .2 0 0"/><body name="c" pos=".25 0 0">
-<joint name="j3" axis="0 0 1" range="-3 3"/><geom type="capsule" size=".02" fromto=".08 0 0 .3 0 0"/></body></body></body>
-</worldbody></mujoco>"""
+<joint name="j3" axis="0 0 1" range="-3 3"/><geom type="capsule" size=".02" fromto=".08 0 0 .3 0 0"/></body></body>
+</body></worldbody></mujoco>"""
 )
 FILES = {
     "masks": MASKS,
