@@ -15,7 +15,7 @@ from rrtik_ompl.copies import as_value, in_notebook
 from rrtik_ompl.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.robot import Robot, require_joints
 from rrtik_ompl.transitions import (
     SAME,
     merge_moves,
@@ -167,15 +167,12 @@ class JointPath:
             The first violation of every edge that has one; empty for a valid path.
 
         Raises:
-            InputError: If the path has another number of joints than the world's robot, is too long for its checks,
-                or ``resolution`` is not positive.
+            InputError: If the path moves other joints than the world's robot, or these in another order, is too long
+                for its checks, or ``resolution`` is not positive.
         """
         require(world, World, "world of a path's check")
-        rows, robot = self.waypoints, world.robot
-        if rows.shape[1] != robot.dof:
-            raise InputError(
-                f"path of {rows.shape[1]} joints: robot '{robot.name}' has {robot.dof}; it is another robot's"
-            )
+        require_joints(world.robot, self.joint_names, "path")
+        rows = self.waypoints
         fine = verification_resolution(world) if resolution is None else resolution
         rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
         return route_violations(world, rows, positive(fine, "resolution", "give metres"))
@@ -187,6 +184,7 @@ class JointPath:
             InputError: If the path is another robot's, there is no world, or the clearance is negative or infinite.
         """
         require(world, World, "world of a path's proof")
+        require_joints(world.robot, self.joint_names, "path")
         return self.with_proof(world.prove(self.waypoints, clearance=clearance, seconds=seconds))
 
     def with_proof(self, proof: Proof) -> JointPath:
@@ -295,10 +293,5 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
 
 
 def _fitted(path: JointPath, robot: Robot) -> JointPath:
-    named = path.joint_names != tuple(f"joint{k + 1}" for k in range(len(path.joint_names)))
-    if path.waypoints.shape[1] != robot.dof or (named and path.joint_names != robot.joint_names):
-        raise InputError(
-            f"the path moves {', '.join(path.joint_names)}, but robot '{robot.name}' has the joints "
-            f"{', '.join(robot.joint_names)}"
-        )
+    require_joints(robot, path.joint_names, "path")
     return JointPath.of(robot, path.waypoints)

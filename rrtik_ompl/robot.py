@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from threading import get_ident
@@ -276,6 +276,25 @@ class Robot:
     def _frame_id(self, frame: str | None) -> int:
         require(frame, str | None, f"frame of robot '{self.name}'")
         return _frame_number(self, self.tip if frame is None else frame)
+
+
+def require_joints(robot: Robot, names: Sequence[str], what: str) -> None:
+    """Refuse what moves other joints than a robot, or the same ones in another order.
+
+    Args:
+        robot: The robot.
+        names: Of the joints that it moves; ``joint1, joint2, ...`` stands for no names.
+        what: What it is, such as "path".
+
+    Raises:
+        InputError: If the names, or their number, are not those of the robot's actuated joints.
+    """
+    unnamed = tuple(names) == tuple(f"joint{k + 1}" for k in range(len(names)))
+    if len(names) == robot.dof and (unnamed or tuple(names) == robot.joint_names):
+        return
+    remedy = "put its columns in that order" if set(names) == set(robot.joint_names) else "it is another robot's"
+    own, wanted = ", ".join(names), ", ".join(robot.joint_names)
+    raise InputError(f"the {what} moves {own}, but robot '{robot.name}' has the joints {wanted}; {remedy}")
 
 
 @lru_cache(maxsize=64)

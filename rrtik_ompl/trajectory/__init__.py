@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.arrays import Matrix, bounded_array, not_negative
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.robot import Robot, require_joints
 from rrtik_ompl.trajectory.blending import blended, fault_finder, stopped
 from rrtik_ompl.trajectory.corners import vertices
 from rrtik_ompl.trajectory.dynamics import DynamicLimits
@@ -76,9 +76,10 @@ def time_parameterize(
         between them.
 
     Raises:
-        InputError: If the path has one waypoint, does not move, or has another number of joints than the limits; if the
-            blend is negative or comes without a world, the clearance is negative or more than an end of the path can
-            keep, or the arm cannot be held still within the torques.
+        InputError: If the path has one waypoint, does not move, has another number of joints than the limits, or moves
+            other joints than the robot (of the limits or the world), or these in another order; if the blend is
+            negative or comes without a world, the clearance is negative or more than an end of the path can keep, or
+            the arm cannot be held still within the torques.
 
     Example:
         >>> problem = rrtik.load_problem("planar3_boxes")
@@ -93,6 +94,9 @@ def time_parameterize(
     bounds = RateLimits.of(limits) if isinstance(limits, Robot) else limits
     require(bounds, RateLimits, "limits of a path to time", "use RateLimits.of(robot)")
     bounds = bounds.for_joints(path.waypoints.shape[1])
+    for robot in (limits if isinstance(limits, Robot) else None, None if world is None else world.robot):
+        if robot is not None:
+            require_joints(robot, path.joint_names, "path")
     corners = _corners(path)
     reach = float(bounded_array(blend, (), "blend"))
     if reach < 0.0:

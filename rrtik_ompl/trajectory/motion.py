@@ -15,6 +15,7 @@ from rrtik_ompl.copies import as_value, in_notebook
 from rrtik_ompl.errors import InputError, at_most, require
 from rrtik_ompl.files.text import write_text
 from rrtik_ompl.path import JointPath
+from rrtik_ompl.robot import require_joints
 from rrtik_ompl.trajectory.chords import proof_by_chords
 from rrtik_ompl.trajectory.cubics import (
     cubic_peaks,
@@ -201,10 +202,10 @@ class Trajectory:
             A line for the first fault of every piece that has one: time, and the pair or limit; empty if it is valid.
 
         Raises:
-            InputError: If it has another number of joints than the world's robot.
+            InputError: If it moves other joints than the world's robot, or these in another order.
         """
         require(world, World, "world of a trajectory's check")
-        finite_array(self.positions, (None, world.robot.dof), f"trajectory for robot '{world.robot.name}'")
+        require_joints(world.robot, self.joint_names, "trajectory")
         clock = bad_moments(self, world)
         places = zip(clock, self(clock).positions, strict=True)
         return tuple(f"after {t:.3f} s: {world.explain(q) or not_proven(world)}" for t, q in places)
@@ -224,10 +225,11 @@ class Trajectory:
             The proof; its motions are the pieces between two knots.
 
         Raises:
-            InputError: If it has another number of joints than the world's robot, or the clearance is negative.
+            InputError: If it moves other joints than the world's robot, or these in another order, or the clearance is
+                negative.
         """
         require(world, World, "world of a trajectory's proof")
-        finite_array(self.positions, (None, world.robot.dof), f"trajectory for robot '{world.robot.name}'")
+        require_joints(world.robot, self.joint_names, "trajectory")
         return proof_of_pieces(self, world, clearance, 0, len(self.times) - 1)
 
     def jumps(self) -> Matrix:

@@ -14,7 +14,7 @@ from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import Goal, JointGoal, MultiGoal
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.robot import Robot, require_joints
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory import Trajectory
 from rrtik_ompl.viewer.drawing.marks import Mark
@@ -236,11 +236,7 @@ def _timed(robot: Robot, path: ShownPath) -> tuple[Vector | None, ShownPath]:
     """Times and frames of a timed motion; a path has no times."""
     if not isinstance(path, Trajectory):
         return None, path
-    if path.joint_names != robot.joint_names:
-        raise InputError(
-            f"view: the trajectory moves {', '.join(path.joint_names)}, but robot '{robot.name}' has the joints "
-            f"{', '.join(robot.joint_names)}"
-        )
+    require_joints(robot, path.joint_names, "trajectory")
     count = int(np.clip(np.ceil(FRAME_RATE * path.duration), 2, MOST_FRAMES))
     clock = np.linspace(0.0, path.duration, count + 1)
     return clock, path(clock).positions
@@ -248,6 +244,8 @@ def _timed(robot: Robot, path: ShownPath) -> tuple[Vector | None, ShownPath]:
 
 def _waypoints(robot: Robot, path: ShownPath) -> Matrix:
     given: Any = path
+    if isinstance(path, JointPath | Trajectory):
+        require_joints(robot, path.joint_names, "path")
     rows = finite_array(getattr(given, "waypoints", given), (None, None), "path")
     if len(rows) == 0 or rows.shape[1] != robot.dof:
         raise InputError(
