@@ -16,7 +16,7 @@ from rrtik_ompl.collision.shape_table import pieces
 from rrtik_ompl.copies import Once
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Tree
 from rrtik_ompl.errors import InputError
-from rrtik_ompl.files.mesh import MAX_BYTES, finite_numbers
+from rrtik_ompl.files.mesh import MAX_BYTES, finite_numbers, stated_unit
 from rrtik_ompl.files.text import read_bytes
 
 GREY = (0.7, 0.7, 0.7, 1.0)
@@ -141,10 +141,15 @@ def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]
 
 def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.CollisionGeometry:
     if mesh not in meshes:
-        if not finite_numbers(read_bytes(mesh.path, MAX_BYTES)):
+        data = read_bytes(mesh.path, MAX_BYTES)
+        if not finite_numbers(data):
             raise InputError(f"{where}: mesh {mesh.path} holds numbers that are not finite; export it again")
         try:
-            meshes[mesh] = coal.MeshLoader().load(str(mesh.path), np.array(mesh.scale))
+            scale = np.array(mesh.scale) * stated_unit(mesh.path, data)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+        try:
+            meshes[mesh] = coal.MeshLoader().load(str(mesh.path), scale)
         except (ValueError, RuntimeError) as error:
             raise InputError(
                 f"{where}: mesh {mesh.path} cannot be read as triangles; export it again as STL, OBJ or DAE"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -59,7 +60,7 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
         raise InputError(f"{path}: not a usable mesh: it holds numbers that are not finite; export it again")
     if len(data) > LONG_BYTES:
         tell_once(f"reading {os.fspath(path)}, {len(data) / 1e6:.0f} MB: about ten seconds for a million triangles")
-    vertices, triangles = _read(path, factor * _stated_unit(path, data))
+    vertices, triangles = _read(path, factor * stated_unit(path, data))
     mesh = Mesh(vertices, triangles, source=os.path.abspath(path), scale=factor)
     if not mesh.closed:
         message = f"{path}: {mesh.open_edges} open edges; the mesh is treated as a surface, not as a solid"
@@ -89,19 +90,37 @@ def _reason(error: Exception) -> str:
     return said[-1].rstrip(".")
 
 
-def _stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
-    """Metres per unit as a COLLADA file states it, which coal ignores; 1 for the other formats."""
+def stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
+    """Metres per unit as a COLLADA file states it, which coal ignores and RViz and Gazebo do not; 1 for other formats.
+
+    Args:
+        path: Of the file.
+        data: What it holds.
+
+    Raises:
+        InputError: If it is no XML, or states no number greater than 0.
+    """
     if Path(path).suffix.lower() != ".dae":
         return 1.0
     try:
-        root = ElementTree.fromstring(data)
-        unit = root.find("{*}asset/{*}unit")
+        asset = _asset(data)
+        unit = None if asset is None else asset.find("{*}unit")
         metres = 1.0 if unit is None else float(unit.get("meter", "1"))
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # LookupError: an encoding nobody knows
         raise InputError(f"{path}: not a usable mesh: {error}; export it again as STL, OBJ or DAE") from error
     if not 0.0 < metres < float("inf"):
         raise InputError(f"{path}: its unit must be greater than 0 metres, found {metres:g}; export it again")
     return metres
+
+
+def _asset(data: bytes) -> ElementTree.Element | None:
+    """What a COLLADA file says of itself, as a rule at its beginning: the megabytes behind it are not parsed."""
+    depth = 0
+    for event, element in ElementTree.iterparse(BytesIO(data), ("start", "end")):
+        depth += 1 if event == "start" else -1
+        if event == "end" and depth == 1 and element.tag.rpartition("}")[2] == "asset":
+            return element
+    return None
 
 
 def _volume(mesh: Mesh) -> float:

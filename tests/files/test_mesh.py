@@ -97,6 +97,27 @@ def test_the_unit_of_a_collada_file_is_honoured(tmp_path):
     np.testing.assert_allclose(load_mesh(tmp_path / "part.dae", 2.0).vertices.max(axis=0), [0.02, 0.04, 0.06])
 
 
+LINK_WITH_A_MESH = """<robot name="arm"><link name="base"/>
+<link name="link"><collision>{mesh}</collision><visual>{mesh}</visual></link>
+<joint name="joint" type="revolute"><parent link="base"/><child link="link"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("name", GOOD)
+@pytest.mark.parametrize("unit", ["1", "0.001", "0.0254", "2"])
+def test_a_mesh_has_the_same_size_as_an_obstacle_as_a_solid_of_a_link_and_as_what_is_drawn(tmp_path, name, unit):
+    data = dae(unit) if name.endswith(".dae") else GOOD[name]
+    (tmp_path / name).write_bytes(data)
+    expected = 2.0 * np.array(CORNERS, dtype=float).max(axis=0) * (float(unit) if name.endswith(".dae") else 1.0)
+    mesh = f'<geometry><mesh filename="{name}" scale="2 2 2"/></geometry>'
+    robot = robot_from_urdf_text(LINK_WITH_A_MESH.format(mesh=mesh), folder=tmp_path)
+    found = [load_mesh(tmp_path / name, 2.0).vertices]
+    found += [geometry.geometryObjects[0].geometry.vertices() for geometry in (robot.collision, robot.visual)]
+    for vertices in found:
+        np.testing.assert_allclose(vertices.max(axis=0), expected, rtol=1e-6)
+        np.testing.assert_allclose(vertices.min(axis=0), 0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize(("name", "data"), [("part.stl", stl_text(FACES[:, ::-1])), ("part.obj", obj(FACES[:, ::-1]))])
 def test_an_inside_out_solid_is_turned(tmp_path, name, data):
     (tmp_path / name).write_bytes(data)
