@@ -118,8 +118,9 @@ def build_robot(
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
     chain = _chain(model, actuated, ties)
     whole = chain.whole_turns()
-    limited |= _periods(name, limited, actuated, ties, whole)
-    bounds = _limits(name, [movable[joint] for joint in actuated], limited)
+    moving = [movable[joint] for joint in actuated]
+    limited |= _periods(name, moving, limited, ties, whole)
+    bounds = _limits(name, moving, limited)
     named = {
         key: frozen(_turned_inside(np.array([values[j] for j in actuated]), bounds, whole))
         for key, values in (postures or {}).items()
@@ -298,26 +299,27 @@ def _cut(leader: Mapping[str, float], follower: Mapping[str, float], tie: Mimic)
 
 def _periods(
     name: str,
+    joints: Iterable[Joint],
     limits: Mapping[str, Mapping[str, float]],
-    actuated: tuple[str, ...],
     ties: Mapping[str, Mimic],
     whole: Mask,
 ) -> dict[str, dict[str, float]]:
-    """Limits of actuated joints without any whose whole turns are other postures, as something follows at a fraction.
+    """Limits of actuated joints that have none but whose whole turns are other postures: another follows at a fraction.
 
     They may turn to either side until all that follows has made whole turns too; a warning says so.
     """
     found = {}
-    for joint, turns_alike in zip(actuated, whole, strict=True):
-        own = limits[joint]
-        if turns_alike or np.isfinite(own["lower"]) or np.isfinite(own["upper"]):
+    for joint, turns_alike in zip(joints, whole, strict=True):
+        own = limits[joint.name]
+        limited = np.isfinite(own["lower"]) or np.isfinite(own["upper"])
+        if turns_alike or limited or joint.kind == "prismatic":
             continue
-        following = {tie.joint: tie.multiplier for tie in ties.values() if tie.source == joint}
+        following = {tie.joint: tie.multiplier for tie in ties.values() if tie.source == joint.name}
         turns = _turns_of(following.values())
-        found[joint] = {**own, "lower": -turns * TAU, "upper": turns * TAU}
+        found[joint.name] = {**own, "lower": -turns * TAU, "upper": turns * TAU}
         fraction = next(each for each, gain in following.items() if gain != round(gain))
         message = (
-            f"robot '{name}': joint '{joint}' turns without end, but '{fraction}' follows it as "
+            f"robot '{name}': joint '{joint.name}' turns without end, but '{fraction}' follows it as "
             f"{following[fraction]:g} x, so that a whole turn is another posture: it is taken to turn by up to {turns} "
             f"{'turn' if turns == 1 else 'turns'} to either side; joint_limits=FILE can say otherwise"
         )

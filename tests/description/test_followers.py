@@ -267,3 +267,15 @@ def test_a_posture_is_turned_into_the_limits_only_if_it_stays_the_same(gain):
     robot = robot_from_urdf_text(text, tip="b_link", postures={"far": {"a": TAU - 0.5}})
     given = places_by_pinocchio(text, gain, robot.posture("far"))
     assert np.allclose(given, places_by_pinocchio(text, gain, TAU - 0.5))
+
+
+@pytest.mark.parametrize("gain", [1, 0.5])
+def test_a_slide_without_limits_is_refused_whatever_follows_it(tmp_path, gain):
+    file = tmp_path / "slides.xml"
+    file.write_text(
+        '<mujoco><worldbody><body name="u"><joint name="a" type="slide"/><geom size=".1"/>'
+        '<body name="v"><joint name="b" type="slide"/><geom size=".1"/></body></body></worldbody>'
+        f'<equality><joint joint1="b" joint2="a" polycoef="0 {gain} 0 0 0"/></equality></mujoco>'
+    )
+    with pytest.raises(InputError, match="prismatic joint 'a' needs finite limits"):
+        load_robot(file)

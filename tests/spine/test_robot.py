@@ -79,9 +79,11 @@ def test_a_robot_cannot_be_changed(mixed):
         mixed.lower[0] = 0.0
 
 
-def test_a_posture_outside_the_limits_by_a_full_turn_is_turned_inside():
-    robot = robot_from_urdf_text(MIXED, postures={"far": {"turn": 9.0, "slide": 0.5, "bend": 1.0 - 2 * np.pi}})
-    np.testing.assert_allclose(robot.posture("far"), [9.0, 0.5, 1.0])
+@pytest.mark.parametrize(("gain", "bend"), [("-1", 1.0), ("-1.5", 1.0 - 2 * np.pi)])
+def test_a_posture_outside_the_limits_by_a_full_turn_is_turned_inside_if_what_follows_turns_fully_too(gain, bend):
+    text = MIXED.replace('multiplier="-1.5"', f'multiplier="{gain}"')
+    robot = robot_from_urdf_text(text, postures={"far": {"turn": 9.0, "slide": 0.5, "bend": 1.0 - 2 * np.pi}})
+    np.testing.assert_allclose(robot.posture("far"), [9.0, 0.5, bend])
 
 
 @pytest.mark.parametrize(
