@@ -24,6 +24,7 @@ from bench.shared.parts import Parts
 from bench.truth.robot_files import CASES, MENTIONED, misspelt, mjcf_arm, srdf_of, urdf_arm
 from rrtik_bench.report.page import Report
 from rrtik_ompl import InputError, Robot, World, load_robot
+from rrtik_ompl.arrays import TAU
 from rrtik_ompl.errors import DescriptionWarning
 
 ARMS, BATCH, POSTURES = 400, 20, 200
@@ -189,6 +190,24 @@ def _contacts(world: World, Q: Any, depth: Callable[[Robot, Any], float]) -> dic
     }
 
 
+def _joined(root: ElementTree.Element) -> set[frozenset[str]]:
+    """Pairs of links of a URDF that one joint joins, where frames without solids are part of the link beside them."""
+    solid = {link.get("name", "") for link in root.findall("link") if link.find("collision") is not None}
+    ends = {
+        (joint.find("parent").get("link"), joint.find("child").get("link")): joint.get("type") == "fixed"  # type: ignore[union-attr]
+        for joint in root.findall("joint")
+    }
+
+    def beside(link: Any, seen: frozenset[Any]) -> set[Any]:
+        if link in solid:
+            return {link}
+        near = {other for pair, fixed in ends.items() if fixed and link in pair for other in pair} - seen
+        return {each for other in near for each in beside(other, seen | near)}
+
+    both = [(beside(a, frozenset((a,))), beside(b, frozenset((b,)))) for (a, b), fixed in ends.items() if not fixed]
+    return {frozenset(one | other) for one, other in both if len(one) == len(other) == 1}
+
+
 class _UrdfJudge:
     """A URDF as Pinocchio reads it; who follows whom is read here."""
 
@@ -205,6 +224,7 @@ class _UrdfJudge:
                 gain, offset = (float(tie.get(key, "0")) for key in ("multiplier", "offset"))
                 self.ties[joint.get("name", "")] = (tie.get("joint", ""), gain, offset)
         self.leaders = [name for name in list(self.model.names)[1:] if name not in self.ties]
+        self.joined = _joined(root)
         self.apart: set[frozenset[str]] = set()
         self.asked: set[frozenset[str]] = set()
 
@@ -268,11 +288,10 @@ class _UrdfJudge:
         return deepest
 
     def _pairs(self) -> Iterator[tuple[Any, Any]]:
-        parents = list(self.model.parents)
         for a, b in combinations(self.solids.geometryObjects, 2):
             names = frozenset(self.model.frames[each.parentFrame].name for each in (a, b))
-            near = parents[a.parentJoint] == b.parentJoint or parents[b.parentJoint] == a.parentJoint
-            if a.parentJoint != b.parentJoint and names not in self.apart and (not near or names in self.asked):
+            near = names in self.joined and names not in self.asked
+            if a.parentJoint != b.parentJoint and names not in self.apart and not near:
                 yield a, b
 
     def _place(self, robot: Robot, q: Any) -> None:
@@ -333,9 +352,13 @@ class _MjcfJudge:
         return found
 
     def limits(self, robot: Robot, rng: np.random.Generator) -> tuple[int, int]:
-        """Allowed postures that some joint's own limits forbid, and forbidden ones that all of them allow."""
+        """Allowed postures that some joint's own limits forbid, and forbidden ones that all of them allow.
+
+        Joints that turn without end have whole turns for limits, if others follow them at a fraction: none beyond.
+        """
         passed = cut = 0
-        for q in 1.3 * rng.uniform(*robot.finite_range(), (POSTURES, robot.dof)):
+        turns = robot.upper == np.rint(robot.upper / TAU) * TAU
+        for q in np.where(turns, 1.0, 1.3) * rng.uniform(*robot.finite_range(), (POSTURES, robot.dof)):
             self._place(robot.joint_names, q)
             allowed = bool(robot.within_limits([q], 0.0)[0])
             passed += allowed and not self._legal(LEGAL)

@@ -116,6 +116,7 @@ def stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
 def _asset(data: bytes) -> ElementTree.Element | None:
     """What a COLLADA file says of itself, as a rule at its beginning: the megabytes behind it are not parsed."""
     depth = 0
+    element: ElementTree.Element
     for event, element in ElementTree.iterparse(BytesIO(data), ("start", "end")):
         depth += 1 if event == "start" else -1
         if event == "end" and depth == 1 and element.tag.rpartition("}")[2] == "asset":
