@@ -101,7 +101,7 @@ class Session:
         self._check = ArmCheck()
         self.past, self._recorded = past, recorded
         self._trouble, self._seen_at = "", dict[str, float]()
-        self._fault_at = -np.inf
+        self._fault, self._fault_at = "", -np.inf  # what the arm has done that it was not told, as of the last tick
         self._record = record or Record(None)
         self._commands: dict[str, Callable[..., Answer]] = {
             "select": self._select, "jog": self.held.jog, "move": self.held.move, "go": self.held.go,
@@ -143,6 +143,7 @@ class Session:
         if not self._recorded:
             self.say(expired)
             self.say(self.held.watch())
+        self._fault = self.held.drive.supervisor.fault
         self._watch()
         self.say(self.guide.watch())
         if ended := self._record.news():
@@ -187,8 +188,8 @@ class Session:
     @property
     def known(self) -> Knowledge:
         """What is known now of the arm and of the picture."""
-        age, fault = self.time - self.picture_time, self.held.drive.supervisor.fault
-        return Knowledge(self.arm.lost, age, self.past, self._check.off, self.unusable, fault, self.sight)
+        age = self.time - self.picture_time
+        return Knowledge(self.arm.lost, age, self.past, self._check.off, self.unusable, self._fault, self.sight)
 
     @property
     def message(self) -> str:
@@ -261,10 +262,12 @@ class Session:
 
     def _stop(self) -> Answer:
         """Stop the arm; a fault that the pilot has had time to read is acknowledged."""
-        supervisor, said = self.held.drive.supervisor, self._end_motion()
-        if supervisor.fault and self.time - self._fault_at <= READ_SECONDS:
-            return alarm(f"stopped; {supervisor.fault}; {ACKNOWLEDGE}")
-        supervisor.acknowledge()
+        said = self._end_motion()
+        if self._fault and self.time - self._fault_at <= READ_SECONDS:
+            return alarm(f"stopped; {self._fault}; {ACKNOWLEDGE}")
+        if self._fault:  # one of this moment, which nobody has read, stays
+            self._fault = ""
+            self.held.drive.supervisor.acknowledge()
         return news(said)
 
     def _end_motion(self) -> str:
@@ -301,9 +304,8 @@ class Session:
         self._trouble = trouble
         if trouble == before:
             return
-        fault = self.held.drive.supervisor.fault
-        how = f"; {ACKNOWLEDGE}" if fault == trouble else ""
-        if fault == trouble:
+        how = f"; {ACKNOWLEDGE}" if self._fault == trouble else ""
+        if self._fault == trouble:
             self._fault_at = self.time
         if not trouble:
             self.say(news("picture and arm are known again; the arm stands still"))

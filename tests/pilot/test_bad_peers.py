@@ -196,10 +196,12 @@ def test_a_connection_that_cannot_be_taken_does_not_end_the_server(monkeypatch):
     joint=JSON,
     target=JSON,
     q=JSON | st.lists(st.floats(-4, 4), min_size=6, max_size=6),
+    seconds=JSON | st.floats(0, 1),
 )
-def test_whatever_a_request_says_the_arm_stays_where_an_arm_can_be(do, joint, target, q):
+def test_whatever_a_request_says_the_arm_stays_where_an_arm_can_be(do, joint, target, q, seconds):
     arm = SimulatedArm(ROBOT, START)
-    fault = LineServer._execute(ServerOf(arm), {"do": do, "joint": joint, "target": target, "q": q})
+    request = {"do": do, "joint": joint, "target": target, "q": q, "seconds": seconds}
+    fault = LineServer._execute(ServerOf(arm), request)
     assert fault == "" or fault.isprintable()
     moves = do == "move" and type(joint) is int and type(target) in (int, float) and fault == ""
     assert (arm.moving is not None) == moves

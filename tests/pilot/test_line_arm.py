@@ -2,6 +2,8 @@
 
 import json
 import socket
+import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ import pytest
 from rrtik_ompl import load_problem
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
-from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
+from rrtik_ompl.pilot.devices.line_arm import UNSEEN_SECONDS, LineArm, LineServer
 from rrtik_ompl.pilot.session import Session
 from rrtik_tests.waiting import until
 
@@ -84,3 +86,70 @@ def test_the_server_answers_nonsense_with_one_line():
             lines.flush()
             assert word in json.loads(lines.readline())["error"], asked
         assert server.arm.read() == pytest.approx(START)
+
+
+def test_a_set_point_holds_only_for_as_long_as_it_says():
+    rate = np.radians(10.0)
+    with (
+        LineServer(SimulatedArm(ROBOT, START)) as server,
+        socket.create_connection(("127.0.0.1", server.port), timeout=5) as connection,
+    ):
+        lines = connection.makefile("rw")
+        lines.readline()
+
+        def ask(**words):
+            lines.write(json.dumps(words) + "\n")
+            lines.flush()
+            return json.loads(lines.readline())
+
+        far = float(START[0]) + 0.5
+        ask(do="move", joint=0, target=far, seconds=0.05)
+        time.sleep(0.2)
+        assert ask(do="read")["q"][0] - START[0] == pytest.approx(0.05 * rate)
+        ask(do="follow", q=[far, *START[1:]], seconds=0.05)
+        time.sleep(0.2)
+        assert ask(do="read")["q"][0] - START[0] == pytest.approx(0.1 * rate)
+        assert server.arm.moving is None
+        for seconds in (0, -1.0, "1", True, float("nan"), None, 1e999):
+            assert "seconds above 0" in ask(do="move", joint=0, target=far, seconds=seconds)["error"]
+
+
+class Recording:
+    """A judge that counts what it is given, and finds what it is told to find."""
+
+    def __init__(self):
+        self.fault, self.share, self.readings = "", 1.0, 0
+
+    def read(self, q, time):
+        self.readings += 1
+
+    def room(self):
+        return self.share
+
+
+def test_an_arm_with_a_judge_is_told_nothing_but_to_stop_while_there_is_a_fault(monkeypatch):
+    asked, execute = [], LineServer._execute
+
+    def noting(server, request):
+        asked.append(request)
+        return execute(server, request)
+
+    monkeypatch.setattr(LineServer, "_execute", noting)
+    with LineServer(SimulatedArm(ROBOT, START)) as server:
+        arm = LineArm(ROBOT, "127.0.0.1", server.port)
+        judge = arm.judge = Recording()
+        arm.move(0, float(START[0]) + 0.5)
+        until(lambda: asked[-1]["do"] == "stop")  # nobody has renewed it
+        told = [request for request in asked if request["do"] == "move"]
+        assert len(told) > 1
+        assert all(0.0 < request["seconds"] <= 0.5 * UNSEEN_SECONDS for request in told)
+        holds = [request["seconds"] for request in told]
+        assert all(first + second <= UNSEEN_SECONDS + 1e-9 for first, second in pairwise(holds))
+        assert judge.readings > 1
+        judge.fault = "it has gone elsewhere"
+        until(lambda: asked[-1]["do"] == "stop")
+        asked.clear()
+        arm.move(0, float(START[0]) + 0.5)
+        until(lambda: len(asked) > 5)
+        assert {request["do"] for request in asked} == {"stop"}
+        arm.close()

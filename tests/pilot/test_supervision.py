@@ -1,6 +1,7 @@
 """An arm that does another thing than it is told is stopped within a degree and named; so it is over slow lines."""
 
 import re
+import time
 
 import numpy as np
 import pytest
@@ -144,6 +145,28 @@ def test_a_page_that_does_not_say_what_it_shows_or_shows_old_pictures_drives_not
         pilot.page.say(name="jog", direction=1.0, press=91, seen=pilot._seen, picture=old)
         assert "the picture on the page is stale: 0.7" in pilot.look(0.2)["message"]
         assert (pilot.arm._q == before).all()
+
+
+@pytest.mark.parametrize("fault", ["other", "reverse"])
+@pytest.mark.parametrize("late", ["the session", "the thread that reads the arm"])
+def test_an_arm_behind_a_line_goes_a_degree_at_most_however_late_a_thread_is(fault, late, monkeypatch):
+    with Pilot(line=True) as pilot:
+        pilot.hold(0.5)
+        rng, arm = np.random.default_rng(1), pilot.session.arm
+        owner, name = (pilot.session, "tick") if late == "the session" else (arm, "_exchange")
+        work = getattr(owner, name)
+
+        def working_late(*given):
+            time.sleep(rng.uniform(0.1, 0.2))
+            return work(*given)
+
+        monkeypatch.setattr(owner, name, working_late)
+        there = pilot.arm._q.copy()
+        pilot.arm.fault = fault
+        pilot.go_on(0.8)
+        while not (pilot.arm._q != there).any():  # a press that lapsed on a busy machine is made again
+            pilot.hold(0.5)
+        assert np.abs(degrees(pilot.arm, there)).max() <= 1.0
 
 
 # --- the supervisor alone ------------------------------------------------------------------------------------------

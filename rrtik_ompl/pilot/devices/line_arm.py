@@ -9,11 +9,18 @@ The protocol is one JSON object a line, UTF-8, at most 64 kB. Joints are in the 
 - ``{"do": "follow", "q": [..]}`` sends all joints to set points, for trajectories; answered by ``{"q": [..]}``
 - ``{"do": "grip", "closed": true}`` closes or opens the gripper; answered by ``{"q": [..]}``
 - ``{"do": "stop"}`` stops at once; answered by ``{"q": [..]}``
+- ``"seconds": 0.04`` in a move or a follow is for how long it holds: if no next one comes, the arm stops then
 - a request that cannot be fulfilled is answered by ``{"error": "one line"}``
 
 The client requests the joints about 30 times a second. A server stops the arm when its client has gone, or has sent
 no whole request for half a second; a client counts the line as lost when no whole answer comes in that time, or one
 that is none: too long, too deep, joints that the arm cannot have.
+
+An arm that a pilot drives has a judge. It is asked in the thread that talks to the arm, so that nothing else delays it:
+each reading is judged when it comes, and while there is a fault every request is a stop. What was told last is sent
+again until the next comes, for `RENEW_SECONDS` at most, then the arm is stopped. Each time it holds for no longer
+than an arm at its rate takes, together with what was sent before it, to be off by as much as the judge allows. So an
+arm that does another thing than it is told stops by itself where this machine is too busy to stop it.
 """
 
 from __future__ import annotations
@@ -23,7 +30,7 @@ import socket
 import threading
 import time
 from contextlib import suppress
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,10 +43,15 @@ from rrtik_ompl.robot import Robot
 
 PROTOCOL, VERSION = "rrtik-arm", 1
 POLL_SECONDS = 1.0 / 30.0  # between two requests for the joints
+DRIVEN_POLL_SECONDS = 0.02  # the same while an arm with a judge is driven
+RENEW_SECONDS = 0.1  # for as long is the last set point sent again: an arm that does what it is told is there by then
+UNSEEN_SECONDS = 0.09  # of motion between the last reading that was judged and the end of what was sent, at most
+SHORTEST_SECONDS = 0.005  # that a set point holds
 TIMEOUT_SECONDS = 0.5  # for a whole answer
 LIMIT_SLACK = 0.2  # [rad] or [m]; an arm may have passed a limit by as much
 RETRY_SECONDS = 1.0
 MAX_LINE_BYTES = 64 * 1024
+SET_POINTS = ("move", "follow")
 
 
 class Line:
@@ -80,11 +92,28 @@ class Line:
         self._socket.close()
 
 
+class Judge(Protocol):
+    """Compares readings of an arm with what it was told. Called by the thread that reads the arm.
+
+    Attributes:
+        fault: What the arm has done that it was not told; "" if nothing.
+    """
+
+    fault: str
+
+    def read(self, q: Vector, time: float) -> None:
+        """Judge a reading, shape (dof,), of a time by ``time.monotonic()``."""
+
+    def room(self) -> float:
+        """By how much of what is allowed the arm may yet be off, 0 to 1."""
+
+
 class LineArm:
     """An arm that a server offers. When the connection is lost it keeps the last known joints, and tries again.
 
     Attributes:
         robot: The robot that the arm is.
+        judge: Of its readings; an arm without one is not judged.
         lost: Why the connection is lost; "" if it is not.
         reported: When its thread reported last, by ``time.monotonic()``.
     """
@@ -102,7 +131,10 @@ class LineArm:
         """
         self.robot, self._address, self.lost = robot, (host, port), ""
         self.reported = time.monotonic()
+        self.judge: Judge | None = None
         self._request: dict[str, Any] | None = None
+        self._set_point: dict[str, Any] | None = None  # what the arm was told last, if it was not a stop
+        self._told_at, self._holds = -np.inf, 0.0  # when that was, and for how long what was sent last holds
         self._grip: dict[str, Any] | None = None  # goes first, and no move takes its place
         self._lock, self._ended, self._wake = threading.Lock(), threading.Event(), threading.Event()
         try:
@@ -164,6 +196,8 @@ class LineArm:
     def _send_later(self, message: dict[str, Any]) -> None:
         with self._lock:
             self._request = message
+            self._set_point = message if message["do"] in SET_POINTS else None
+            self._told_at = time.monotonic()
         self._wake.set()
 
     def _connect(self) -> Line:
@@ -183,7 +217,7 @@ class LineArm:
             raise ConnectionError(f"it has the joints {joints}, not those of '{self.robot.name}'")
 
     def _exchange(self, message: dict[str, Any]) -> Vector:
-        """Send a message and receive the joint values."""
+        """Send a request and receive the joint values."""
         self._line.send(**message)
         answer = self._line.receive()
         if "error" in answer:
@@ -196,23 +230,55 @@ class LineArm:
             raise ConnectionError(f"an answer with joints that the arm cannot have: {self.robot.limit_fault(q)}")
         return q
 
+    def _next_request(self) -> dict[str, Any]:
+        """What is sent next: what was asked for, or else the last set point while it is young, or else a reading."""
+        with self._lock:
+            message, self._grip = self._grip, None
+            if message is None:
+                message, self._request = self._request, None
+            if message is None and self.judge is not None and self._set_point is not None:
+                young = time.monotonic() - self._told_at < RENEW_SECONDS
+                message = self._set_point if young else {"do": "stop"}
+                self._set_point = self._set_point if young else None
+        message = message or {"do": "read"}
+        if self.judge is None:
+            return message
+        if self.judge.fault:
+            message = {"do": "stop"}
+        if message["do"] == "stop":
+            self._holds = 0.0
+        if message["do"] not in SET_POINTS:
+            return message
+        left = UNSEEN_SECONDS * self.judge.room() - self._holds  # what was sent before still holds
+        self._holds = max(min(left, 0.5 * UNSEEN_SECONDS), SHORTEST_SECONDS)
+        return message | {"seconds": self._holds}
+
+    def _judge(self, q: Vector) -> None:
+        """Have a reading judged; the next request follows at once if that is a stop."""
+        if self.judge is None:
+            return
+        known = self.judge.fault
+        self.judge.read(q, time.monotonic())
+        if self.judge.fault and not known:
+            self._wake.set()
+
     def _communicate(self) -> None:
         """Request the joints and send moves, until the end; connect again when the connection is lost."""
         while True:
-            self._wake.wait(POLL_SECONDS)
+            self._wake.wait(DRIVEN_POLL_SECONDS if self._holds else POLL_SECONDS)
             self._wake.clear()
-            with self._lock:
-                message, self._grip = self._grip, None
-                if message is None:
-                    message, self._request = self._request or {"do": "read"}, None
+            message = self._next_request()
             try:
                 if self.lost:
                     self._line, message = self._connect(), {"do": "read"}  # a move from before is out of date
                 q = self._exchange(message)
+                self._judge(q)
                 with self._lock:
                     self._q, self.lost = q, ""
             except Exception as error:  # nothing that comes over the line ends this thread
                 self._line.close()
+                with self._lock:
+                    self._set_point = None
                 why = getattr(error, "strerror", None) or error
                 self.lost = printable(f"the connection to the arm is lost: {why}; the joints are the last known ones")
                 self._ended.wait(RETRY_SECONDS)
@@ -266,18 +332,27 @@ class LineServer:
             line.close()
 
     def _answer(self, line: Line) -> None:
-        before = time.monotonic()
+        before, until = time.monotonic(), np.inf
         while not self._ended.is_set():
             request = line.receive()
             now = time.monotonic()
+            if now > until:
+                self.arm.advance(until - before)
+                self.arm.stop()
+                before, until = until, np.inf
             self.arm.advance(now - before)
             before = now
             fault = self._execute(request)
+            if request.get("do") in SET_POINTS and not fault:
+                until = now + request.get("seconds", np.inf)
             line.send(**({"error": fault} if fault else {"q": self.arm.read().tolist()}))
 
     def _execute(self, request: dict[str, Any]) -> str:
         """Execute a request; returns what is wrong with it, "" if nothing is."""
         what, joint, target = request.get("do"), request.get("joint"), request.get("target")
+        seconds = request.get("seconds", 1.0)
+        if what in SET_POINTS and not (type(seconds) in (int, float) and 0.0 < seconds < LARGEST):
+            return f"{what} needs seconds above 0, if any"
         if what == "stop":
             self.arm.stop()
         elif what == "move":

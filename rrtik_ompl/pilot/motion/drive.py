@@ -6,10 +6,13 @@ a renewal, whatever the reason (the key is released, the page or the line hangs)
 
 from __future__ import annotations
 
+import time as clock
+
 import numpy as np
 
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.pilot.devices.arm import Arm
+from rrtik_ompl.pilot.devices.line_arm import LineArm
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
 from rrtik_ompl.robot import Robot
 
@@ -26,6 +29,7 @@ class Drive:
         goal: Where the drive ends [rad or m].
         leading: Whether all joints are led to set points.
         supervisor: Compares what the arm does with what it was told.
+        read_by_arm: Whether the arm's own thread gives its readings to the supervisor.
     """
 
     def __init__(self, robot: Robot, arm: Arm, rates: Vector) -> None:
@@ -40,6 +44,9 @@ class Drive:
         self.goal = 0.0
         self.leading = False
         self.supervisor = Supervisor(robot, rates)
+        self.read_by_arm = isinstance(arm, LineArm)
+        if isinstance(arm, LineArm):
+            arm.judge = self.supervisor
         self._arm, self._rates = arm, rates
         self._point, self._renewed = 0.0, -np.inf
 
@@ -47,6 +54,15 @@ class Drive:
     def active(self) -> bool:
         """Whether the arm is driven."""
         return self.leading or self.joint is not None
+
+    def read(self, q: Vector, time: float) -> None:
+        """Give a reading to the supervisor, shape (dof,) [rad or m], unless the arm itself does."""
+        if not self.read_by_arm:
+            self.supervisor.read(q, time)
+
+    def standing(self, time: float) -> tuple[int, float, float] | None:
+        """A driven joint that does not move; see `Supervisor.standing`."""
+        return self.supervisor.standing(self._arms_time(time))
 
     def renew(self, joint: int, goal: float, speed: float, q: Vector, time: float) -> float:
         """Drive a joint on towards a goal; returns the set point [rad or m].
@@ -71,7 +87,7 @@ class Drive:
         self._point = float(np.clip(self._point + step, here - leash, here + leash))
         aim, ahead = q.copy(), np.zeros(len(q))
         aim[joint], ahead[joint] = self._point, leash
-        self.supervisor.told(aim, ahead, q, time)
+        self.supervisor.told(aim, ahead, q, self._arms_time(time))
         self._arm.move(joint, self._point)
         return self._point
 
@@ -87,7 +103,7 @@ class Drive:
         if self.joint is not None:
             self.end(time)
         self.leading, self._renewed = True, max(time, self._renewed)
-        self.supervisor.told(point, speed * self._rates * LEASH_SECONDS, q, time)
+        self.supervisor.told(point, speed * self._rates * LEASH_SECONDS, q, self._arms_time(time))
         self._arm.follow(point)
 
     def expire(self, time: float) -> bool:
@@ -101,5 +117,9 @@ class Drive:
         """Stop the arm at a time [s], if it is driven."""
         if self.active:
             self.joint, self.leading = None, False
-            self.supervisor.stopped(time)
+            self.supervisor.stopped(self._arms_time(time))
             self._arm.stop()
+
+    def _arms_time(self, time: float) -> float:
+        """A time of the session [s] by the clock of whoever reads the arm."""
+        return clock.monotonic() if self.read_by_arm else time

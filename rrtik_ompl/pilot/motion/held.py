@@ -13,7 +13,7 @@ from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.guide import Guide
 from rrtik_ompl.pilot.interlock import FOLLOWING, MOVING, Sight
 from rrtik_ompl.pilot.motion.drive import HOLD_SECONDS, LEASH_SECONDS, Drive
-from rrtik_ompl.pilot.motion.supervisor import slack_of
+from rrtik_ompl.pilot.motion.supervisor import FOLLOW_SECONDS, slack_of
 from rrtik_ompl.pilot.routes.follower import MADE, Follower
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange, check_move, move_refusal, way_out
 from rrtik_ompl.pilot.routes.track import Track
@@ -95,8 +95,8 @@ class Held:
     def watch(self) -> Answer | None:
         """After a reading of the arm: end a press that does not move it; what there is to say, None if nothing."""
         session, drive = self._session, self.drive
-        drive.supervisor.read(session.q, session.time)
-        standing = drive.supervisor.standing(session.time)
+        drive.read(session.q, session.time)
+        standing = drive.standing(session.time)
         if standing is None:
             return None
         joint, moved, seconds = standing
@@ -108,7 +108,8 @@ class Held:
         self.end()
         if near:
             return refused(f"{name} comes no nearer than {amount(joint, left)}: stopped")
-        return alarm(f"{name} does not move ({amount(joint, moved)} in {seconds:.1f} s): stopped")
+        late = f"does not move ({amount(joint, moved)} in {seconds:.1f} s)"
+        return alarm(f"{name} {late}: stopped, for an arm that follows later than {FOLLOW_SECONDS:g} s is not driven")
 
     @property
     def pace(self) -> float:

@@ -1,9 +1,25 @@
 """What the arm does against what it was told, by its readings: another joint, the wrong way, a jump, no motion at all.
 
 On a route `Follower` compares the arm with the route. This one needs none: it knows the set points of the moment.
+
+How a set point and its reading go:
+
+1. the session's loop executes a held command: `Drive` tells the supervisor the set point, and gives it to the arm
+2. an arm behind a line has a thread, `LineArm`, which sends the set point on and gets a reading for it
+3. that thread gives each reading to `Supervisor.read` when it comes. On a fault its next request is a stop, at once,
+   and it sends no set point on until the fault is acknowledged: neither page, planner nor camera has a part in that
+4. the session looks for the fault in its next step: it ends what is held, and says what has happened
+
+A simulated arm has no thread, and no time but the session's: the session itself gives its readings to the supervisor.
+One lock makes each call of the supervisor whole; it holds no other lock meanwhile, and calls nobody.
+
+A thread of a machine that is busy may be late by more than the 0.1 s in which an arm moves by a degree. So a set point
+expires at the arm itself, see `Supervisor.room` and `LineArm`.
 """
 
 from __future__ import annotations
+
+import threading
 
 import numpy as np
 
@@ -31,7 +47,9 @@ def slack_of(robot: Robot) -> Vector:
 
 
 class Supervisor:
-    """Watches an arm while it is driven, and until it has come to rest.
+    """Watches an arm while it is driven, and until it has come to rest. May be called from several threads.
+
+    All times given are of one clock [s]: that of whoever reads the arm.
 
     Attributes:
         fault: What the arm has done that it was not told, with joint and amount; "" if nothing. It stays until
@@ -46,6 +64,7 @@ class Supervisor:
             rates: Of its joints at full speed, shape (dof,) [rad/s or m/s].
         """
         self.fault = ""
+        self._lock = threading.Lock()
         self._names, self._prismatic, self._rates = robot.joint_names, robot.prismatic, rates
         self._slack = slack_of(robot)
         self._q: Vector | None = None
@@ -56,6 +75,7 @@ class Supervisor:
         self._aim = zeros.copy()  # where each joint is told to be
         self._ahead = zeros.copy()  # how far at most the set point is ahead of the arm
         self._back = zeros.copy()  # how far a joint has gone against its way
+        self._used = 0.0  # share of the slack by which the worst joint is off at the last reading
         self._changes = 0  # of the readings, since the arm should stand
         self._room = self._slack.copy()  # how far a joint may be faster than its rate allows
         self._good_at = zeros.copy()  # when each joint was last where it should be
@@ -64,7 +84,16 @@ class Supervisor:
 
     def acknowledge(self) -> None:
         """The fault is known to the pilot: the arm may be driven again."""
-        self.fault = ""
+        with self._lock:
+            self.fault = ""
+
+    def room(self) -> float:
+        """Share of the slack that is left at the last reading, 0 to 1; 0 while there is a fault.
+
+        An arm that may move only as long as it takes for that much cannot go farther than the slack unseen.
+        """
+        with self._lock:
+            return 0.0 if self.fault else max(1.0 - self._used, 0.0)
 
     def told(self, aim: Vector, ahead: Vector, q: Vector, time: float) -> None:
         """The arm was sent to a set point.
@@ -75,55 +104,59 @@ class Supervisor:
             q: Where the arm is.
             time: Now [s].
         """
-        if not self._active:
-            self._begin(q, time)
-        away = aim - q
-        way = np.where(np.abs(away) > 0.0, np.sign(away), self._way)
-        turned = (way != self._way) & (self._way != 0.0)
-        new = way != self._way
-        self._coasts_until[turned] = time + COAST_SECONDS
-        self._back[new], self._good_at[new] = 0.0, time
-        self._mark[new], self._mark_time[new] = q[new], time
-        self._way, self._ahead = way, ahead
-        self._aim = np.where(way != 0.0, aim, self._aim)
+        with self._lock:
+            if not self._active:
+                self._begin(q, time)
+            away = aim - q
+            way = np.where(np.abs(away) > 0.0, np.sign(away), self._way)
+            turned = (way != self._way) & (self._way != 0.0)
+            new = way != self._way
+            self._coasts_until[turned] = time + COAST_SECONDS
+            self._back[new], self._good_at[new] = 0.0, time
+            self._mark[new], self._mark_time[new] = q[new], time
+            self._way, self._ahead = way, ahead
+            self._aim = np.where(way != 0.0, aim, self._aim)
 
     def stopped(self, time: float) -> None:
         """The arm was told to stop; what was driven comes to rest."""
-        if not self._active:
-            return
-        self._coasts_until[self._way != 0.0] = time + COAST_SECONDS
-        self._active, self._rest_until, self._changes = False, time + REST_SECONDS, 0
-        self._way[:] = 0.0
+        with self._lock:
+            if not self._active:
+                return
+            self._coasts_until[self._way != 0.0] = time + COAST_SECONDS
+            self._active, self._rest_until, self._changes = False, time + REST_SECONDS, 0
+            self._way[:] = 0.0
 
     def read(self, q: Vector, time: float) -> None:
         """Compare a reading, shape (dof,), with what the arm was told; sets `fault`."""
-        before, self._q = self._q, q.copy()
-        back_in_time, self._time = time < self._time, time
-        watched = self._active or time <= self._rest_until
-        if before is None or back_in_time or not watched:
-            self._begin(q, time, active=self._active)
-            return
-        gap = min(time - self._changed, LONGEST_GAP)
-        if (q != before).any():
-            self._changed = time
-            self._changes += int((time >= self._coasts_until).all())
-        found = self._too_fast(q - before, gap)
-        if found and not self._active:  # at rest an arm may be put elsewhere
-            self._begin(q, time, active=False)
-            return
-        self.fault = self.fault or found or self._elsewhere(q, q - before, time)
-        self._note_motion(q, time)
+        with self._lock:
+            before, self._q = self._q, q.copy()
+            back_in_time, self._time = time < self._time, time
+            watched = self._active or time <= self._rest_until
+            if before is None or back_in_time or not watched:
+                self._begin(q, time, active=self._active)
+                return
+            gap = min(time - self._changed, LONGEST_GAP)
+            if (q != before).any():
+                self._changed = time
+                self._changes += int((time >= self._coasts_until).all())
+            found = self._too_fast(q - before, gap)
+            if found and not self._active:  # at rest an arm may be put elsewhere
+                self._begin(q, time, active=False)
+                return
+            self.fault = self.fault or found or self._elsewhere(q, q - before, time)
+            self._note_motion(q, time)
 
     def standing(self, time: float) -> tuple[int, float, float] | None:
         """A driven joint that does not move: its number, by how much it has moved, and in what time; None if none."""
-        if not self._active or self._q is None:
-            return None
-        patience = np.maximum(FOLLOW_SECONDS, 0.4 * NOISE * self._slack / np.maximum(self._ahead, 1e-9))
-        late = (self._way != 0.0) & (time - self._mark_time > patience)
-        if not late.any():
-            return None
-        joint = int(np.flatnonzero(late)[0])
-        return joint, float(abs(self._q[joint] - self._mark[joint])), float(time - self._mark_time[joint])
+        with self._lock:
+            if not self._active or self._q is None:
+                return None
+            patience = np.maximum(FOLLOW_SECONDS, 0.4 * NOISE * self._slack / np.maximum(self._ahead, 1e-9))
+            late = (self._way != 0.0) & (time - self._mark_time > patience)
+            if not late.any():
+                return None
+            joint = int(np.flatnonzero(late)[0])
+            return joint, float(abs(self._q[joint] - self._mark[joint])), float(time - self._mark_time[joint])
 
     def amount(self, joint: int, value: float) -> str:
         """A way of a joint in words: "0.6 deg"."""
@@ -136,7 +169,7 @@ class Supervisor:
             self._q = q.copy()
         self._aim = np.where(self._way != 0.0, self._aim, q)
         self._back[:], self._good_at[:] = 0.0, time
-        self._room = self._slack.copy()
+        self._room, self._used = self._slack.copy(), 0.0
         self._changed, self._active = time, active
         self._mark, self._mark_time = q.copy(), np.full(len(q), time)
 
@@ -165,10 +198,11 @@ class Supervisor:
         speed = wrong / np.maximum(time - self._good_at, READING_SECONDS)
         reaction = np.where(self._way != 0.0, HUNTING_SECONDS, REACTION_SECONDS)
         excess = np.where(wrong > NOISE * self._slack, wrong + reaction * speed, 0.0) / self._slack
+        over = np.where(coasts, 0.0, self._way * (q - self._aim)) / self._slack
+        self._used = float(max((wrong / self._slack).max(), over.max()))
         joint = int(excess.argmax())
         if excess[joint] > 1.0 and (self._active or self._changes >= GOING_ON):
             return self._says(joint, float(wrong[joint]))
-        over = np.where(coasts, 0.0, self._way * (q - self._aim)) / self._slack
         joint = int(over.argmax())
         if over[joint] > 1.0:
             return f"{self._names[joint]} went {self.amount(joint, float(q[joint] - self._aim[joint]))} too far"
