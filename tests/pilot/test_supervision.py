@@ -207,6 +207,22 @@ def test_a_joint_that_sags_slowly_by_half_a_degree_is_let_be_and_a_fast_one_is_n
     assert when <= 1.0 + 2.1 * STEP
 
 
+@pytest.mark.parametrize("press", [0.08, 0.12])
+def test_an_arm_that_goes_the_wrong_way_does_so_for_a_degree_at_most_however_often_the_key_is_let_go(press):
+    watching, gone, time_ = Supervisor(ROBOT, RATES), 0.0, 0.0
+    while not watching.fault:
+        assert gone <= 0.7
+        time_ += STEP
+        if time_ % (press + 0.2) < press:
+            gone += 10.0 * STEP
+            q = PROBLEM.start + along(-gone)
+            watching.told(q + along(1.0), np.abs(along(1.0)), q, time_)
+        else:
+            watching.stopped(time_)
+        watching.read(PROBLEM.start + along(-gone), time_)
+    assert "azimuth goes the wrong way" in watching.fault
+
+
 def test_a_joint_that_is_faster_than_its_rate_allows_is_named():
     watching, when = driven(lambda time_: along(10.0 * min(time_, 1.0) + 40.0 * max(time_ - 1.0, 0.0)))
     assert "azimuth moves faster than 15.0 deg/s" in watching.fault

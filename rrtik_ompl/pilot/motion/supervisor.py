@@ -80,6 +80,7 @@ class Supervisor:
         self._room = self._slack.copy()  # how far a joint may be faster than its rate allows
         self._good_at = zeros.copy()  # when each joint was last where it should be
         self._coasts_until = np.full(robot.dof, -np.inf)
+        self._coast_way = zeros.copy()  # in which a joint that coasts was driven
         self._mark, self._mark_time = zeros.copy(), zeros.copy()  # where each joint has moved last, and when
 
     def acknowledge(self) -> None:
@@ -105,14 +106,18 @@ class Supervisor:
             time: Now [s].
         """
         with self._lock:
+            back = self._back.copy()
             if not self._active:
                 self._begin(q, time)
             away = aim - q
             way = np.where(np.abs(away) > 0.0, np.sign(away), self._way)
             turned = (way != self._way) & (self._way != 0.0)
             new = way != self._way
+            again = (time < self._coasts_until) & (way == self._coast_way)  # what it did before the stop still counts
             self._coasts_until[turned] = time + COAST_SECONDS
-            self._back[new], self._good_at[new] = 0.0, time
+            self._coast_way[turned] = self._way[turned]
+            self._coasts_until[again] = -np.inf
+            self._back[new], self._good_at[new] = np.where(again, back, 0.0)[new], time
             self._mark[new], self._mark_time[new] = q[new], time
             self._way, self._ahead = way, ahead
             self._aim = np.where(way != 0.0, aim, self._aim)
@@ -122,7 +127,9 @@ class Supervisor:
         with self._lock:
             if not self._active:
                 return
-            self._coasts_until[self._way != 0.0] = time + COAST_SECONDS
+            driven = self._way != 0.0
+            self._coasts_until[driven] = time + COAST_SECONDS
+            self._coast_way[driven] = self._way[driven]
             self._active, self._rest_until, self._changes = False, time + REST_SECONDS, 0
             self._way[:] = 0.0
 
@@ -191,16 +198,20 @@ class Supervisor:
     def _elsewhere(self, q: Vector, change: Vector, time: float) -> str:
         """Whether a joint would be farther than the slack from where it should be before the arm could stand."""
         coasts = time < self._coasts_until
-        self._aim = np.where(coasts & (self._way == 0.0), q, self._aim)
-        self._back = np.where(coasts, 0.0, np.maximum(self._back - self._way * change, 0.0))
-        wrong = np.where(self._way != 0.0, self._back, np.abs(q - self._aim))
+        stops, turns = coasts & (self._way == 0.0), coasts & (self._way != 0.0)
+        self._aim = np.where(stops, q, self._aim)
+        way = np.where(stops, self._coast_way, self._way)
+        self._back = np.where(turns, 0.0, np.maximum(self._back - way * change, 0.0))
+        wrong = np.where(way != 0.0, self._back, np.abs(q - self._aim))
         self._good_at[wrong <= NOISE * self._slack] = time
         speed = wrong / np.maximum(time - self._good_at, READING_SECONDS)
-        reaction = np.where(self._way != 0.0, HUNTING_SECONDS, REACTION_SECONDS)
+        reaction = np.where(way != 0.0, HUNTING_SECONDS, REACTION_SECONDS)
         excess = np.where(wrong > NOISE * self._slack, wrong + reaction * speed, 0.0) / self._slack
         over = np.where(coasts, 0.0, self._way * (q - self._aim)) / self._slack
         self._used = float(max((wrong / self._slack).max(), over.max()))
         joint = int(excess.argmax())
+        if excess[joint] > 1.0 and way[joint] != 0.0:
+            return f"{self._names[joint]} goes the wrong way, by {self.amount(joint, float(wrong[joint]))}"
         if excess[joint] > 1.0 and (self._active or self._changes >= GOING_ON):
             return self._says(joint, float(wrong[joint]))
         joint = int(over.argmax())
@@ -210,8 +221,6 @@ class Supervisor:
 
     def _says(self, joint: int, wrong: float) -> str:
         name, far = self._names[joint], self.amount(joint, wrong)
-        if self._way[joint] != 0.0:
-            return f"{name} goes the wrong way, by {far}"
         if not self._active:
             return f"{name} moved on by {far} after the stop"
         driven = [each for each, way in zip(self._names, self._way, strict=True) if way != 0.0]
