@@ -24,12 +24,14 @@ class Followed(NamedTuple):
         plans: How often the route was planned anew.
         presses: How often "next" was pressed.
         moving: For how long the links moved [s].
+        refused: How many presses ended because the arm follows too late to be driven.
     """
 
     rows: Matrix
     plans: int
     presses: int
     moving: float
+    refused: int
 
 
 def follow_route(session: Session, arm: WrongArm, *, hasty: bool = False) -> Followed:
@@ -40,16 +42,17 @@ def follow_route(session: Session, arm: WrongArm, *, hasty: bool = False) -> Fol
         arm: Its arm.
         hasty: Each move is let go a degree before its end once, and made to its end by a second press.
     """
-    rows, plans, press, moving = [arm.links()], 0, 0, 0.0
+    rows, plans, press, moving, refused = [arm.links()], 0, 0, 0.0, 0
     _plan(session, "plan")
     while press < PRESSES and session.follower is not None and session.mode == "following":
         moving += hold_next(session, arm, press, early=hasty and press % 2 == 0)
         press += 1
+        refused += "is not driven" in session.message
         rows.append(arm.links())
         if "off the route" in session.message or session.guide.withdrawn:
             plans += 1
             _plan(session, "replan")
-    return Followed(np.array(rows), plans, press, moving)
+    return Followed(np.array(rows), plans, press, moving, refused)
 
 
 def hold_next(session: Session, arm: WrongArm, press: int, *, early: bool = False) -> float:

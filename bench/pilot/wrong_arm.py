@@ -17,6 +17,7 @@ from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
 from rrtik_ompl.pilot.devices.wrong_arm import Faults, WrongArm
+from rrtik_ompl.pilot.motion.supervisor import FOLLOW_SECONDS
 from rrtik_ompl.pilot.session import Session
 
 DEGREE = np.pi / 180.0
@@ -35,21 +36,24 @@ KINDS: dict[str, Mapping[str, float]] = {
         "lag": 0.2, "stick": 0.2 * DEGREE, "overshoot": 0.5 * DEGREE, "backlash": 0.3 * DEGREE, "offset": 0.3 * DEGREE,
     },
 }  # fmt: skip
-HEADS = ("the arm", "hands", "routes", "done [%]", "plans anew, mean", "links touched something [%]",
-         "tip from the end of its route [mm], median", "worst")  # fmt: skip
+HEADS = ("the arm", "hands", "routes", "done [%]", "refused by name [%]", "plans anew, mean",
+         "links touched something [%]", "tip from the end of its route [mm], median", "worst")  # fmt: skip
 KNOWN = ("none", "lag 0.2 s", "lag 0.5 s", "sticks below 0.5 deg", "overshoot 0.5 deg", "overshoot 2 deg")
 INTRO = (
     'TITAN-4 from the bay to the button. A simulated pilot holds "next" until the move is made (patient), or lets go '
     "1 degree before its end and has to press again (hasty), and plans anew where the tool asks for it. "
     "Judged by where the links truly are. Play and wrong angles are what an arm does not know of itself: the tool "
-    "cannot see them, and only what is left free beside the route forgives them."
+    "cannot see them, and only what is left free beside the route forgives them. An arm that follows later than "
+    f"{FOLLOW_SECONDS:g} s is not driven: its presses end with a line that says so. A route that is not done, and "
+    "during which that was said, is refused by name."
 )
 
 
 class Driven(NamedTuple):
-    """How a route was followed: to its end, what was said last, plans anew, contacts, tip from its end [m]."""
+    """How a route was followed: to its end, or refused by name, what was said last, plans anew, contacts, tip [m]."""
 
     done: bool
+    refused: bool
     said: str
     plans: int
     touched: bool
@@ -66,17 +70,19 @@ def driven(amounts: Mapping[str, float], seed: int, hasty: bool = False) -> Driv
     touched = not WORLD.motion_valid_batch(rows[:-1], rows[1:]).all()
     end = PROBLEM.start if session.route is None else session.route.path.end
     away = float(np.linalg.norm(ROBOT.fk(arm.links()).translation - ROBOT.fk(end).translation))
-    return Driven(done, session.message, followed.plans, touched, away if done else np.nan)
+    refused = not done and followed.refused > 0
+    return Driven(done, refused, session.message, followed.plans, touched, away if done else np.nan)
 
 
 def row(kind: str, hasty: bool, count: int) -> list[str]:
     """One row of the table."""
     found = [driven(KINDS[kind], seed, hasty) for seed in range(count)]
-    done, touched = (100.0 * float(np.mean([getattr(each, word) for each in found])) for word in ("done", "touched"))
+    words = ("done", "refused", "touched")
+    shares = {word: f"{100.0 * np.mean([getattr(each, word) for each in found]):.0f}" for word in words}
     away = 1e3 * np.array([each.away for each in found if each.done] or [np.nan])
     plans = float(np.mean([each.plans for each in found]))
-    return [kind, "hasty" if hasty else "patient", str(count), f"{done:.0f}", f"{plans:.1f}", f"{touched:.0f}",
-            f"{np.median(away):.2f}", f"{away.max():.2f}"]  # fmt: skip
+    return [kind, "hasty" if hasty else "patient", str(count), shares["done"], shares["refused"], f"{plans:.1f}",
+            shares["touched"], f"{np.median(away):.2f}", f"{away.max():.2f}"]  # fmt: skip
 
 
 def main() -> None:
@@ -92,10 +98,14 @@ def main() -> None:
     for cells in rows:
         if cells[0] == "none":
             ends = f"{cells[0]}, {cells[1]}: tip from the end of its route, worst"
-            report.bar(ends, "<= 0.5 mm", f"{cells[7]} mm", float(cells[7]) <= 0.5)
+            report.bar(ends, "<= 0.5 mm", f"{cells[8]} mm", float(cells[8]) <= 0.5)
         if cells[0] in KNOWN:
             name = f"{cells[0]}, {cells[1]}: routes on which links touch something"
-            report.bar(name, "0 %", f"{cells[5]} %", cells[5] == "0")
+            report.bar(name, "0 %", f"{cells[6]} %", cells[6] == "0")
+            ends = f"{cells[0]}, {cells[1]}: routes done, or refused by name"
+            late = KINDS[cells[0]].get("lag", 0.0) > FOLLOW_SECONDS
+            measured = f"{cells[3]} % done, {cells[4]} % refused"
+            report.bar(ends, "100 % refused" if late else "100 % done", measured, cells[4 if late else 3] == "100")
     report.table("What became of the routes", HEADS, rows)
     report.note("How", INTRO)
     report.finish(options.out)

@@ -1,9 +1,11 @@
 """An arm that is wrong by stated amounts, and what the pilot's tool does with it."""
 
+import re
+
 import numpy as np
 import pytest
 
-from bench.pilot.hands import follow_route
+from bench.pilot.hands import follow_route, hold_next
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle
@@ -134,6 +136,20 @@ def test_who_lets_go_before_the_end_of_moves_touches_nothing_and_ends_at_the_sam
     away = np.linalg.norm(ROBOT.fk(arm.links()).translation - ROBOT.fk(made.route.path.end).translation)
     assert (made.message == "all moves are done") == (away <= 5e-4)
     assert away <= 5e-4 or f"{1e3 * away:.1f} mm" in made.message
+
+
+def test_an_arm_that_follows_too_late_is_not_driven_and_one_line_says_why():
+    arm = wrong(lag=0.5)
+    made = Session(PROBLEM, arm, seed=1, past=True)
+    followed = follow_route(made, arm)
+    assert made.mode == "following"
+    assert followed.refused >= 0.9 * followed.presses
+    assert np.abs(np.diff(followed.rows, axis=0)).max() <= np.deg2rad(1.0) + 1e-9  # of one press, after all
+    hold_next(made, arm, followed.presses)
+    assert re.fullmatch(
+        r"\w+ does not move \(0\.0 deg in 0\.4 s\): stopped, for an arm that follows later than 0\.4 s is not driven",
+        made.message,
+    )
 
 
 def test_the_file_of_a_simulated_vehicle_says_how_wrong_its_arm_is(tmp_path):
