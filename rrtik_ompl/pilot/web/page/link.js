@@ -1,7 +1,7 @@
 // The connection: pictures and states in, commands out. It comes back by itself; the session goes on meanwhile.
 "use strict";
 
-const RECONNECT_MS = 700, STALE_S = 0.5;
+const RECONNECT_MS = 700, STALE_S = 0.5, DECODE_MS = 1000;
 const token = new URLSearchParams(location.search).get("token") || "";
 const pageName = sessionStorage.getItem("rrtik-page") || crypto.randomUUID?.() || String(Math.random());
 sessionStorage.setItem("rrtik-page", pageName);
@@ -81,16 +81,25 @@ function measureAnswer(number) {
 
 const CANVASES = { C: "camera", O: "outside" };
 
-async function onFrame(data) {
+// A picture that hangs in the browser's decoder does not hold up those that come after it: the server sends no more than
+// two that were not answered.
+async function onFrame(data, line = socket) {
   const kind = String.fromCharCode(new Uint8Array(data, 0, 1)[0]), taken = new DataView(data).getFloat64(1, true);
   const stamp = Number.isFinite(taken) ? taken : null;  // there may be no picture yet
+  let answered = false;
+  const answer = () => { if (!answered && line === socket) shown("frame"); answered = true; };
+  const patience = setTimeout(answer, DECODE_MS);
   try {
     const image = await createImageBitmap(new Blob([new Uint8Array(data, 9)], { type: "image/jpeg" }));
-    const canvas = byId(CANVASES[kind]);
-    if (canvas.width !== image.width) { canvas.width = image.width; canvas.height = image.height; }
-    canvas.getContext("2d").drawImage(image, 0, 0);
+    if (line === socket && (kind !== "C" || picture === null || stamp >= picture)) draw(kind, stamp, image);
     image.close();
-    if (kind === "C") picture = stamp;
-    window.measured.frames[kind] += 1;
-  } finally { shown("frame"); }
+  } finally { clearTimeout(patience); answer(); }
+}
+
+function draw(kind, stamp, image) {
+  const canvas = byId(CANVASES[kind]);
+  if (canvas.width !== image.width) { canvas.width = image.width; canvas.height = image.height; }
+  canvas.getContext("2d").drawImage(image, 0, 0);
+  if (kind === "C") picture = stamp;
+  window.measured.frames[kind] += 1;
 }
