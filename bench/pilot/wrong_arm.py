@@ -79,10 +79,11 @@ def row(kind: str, hasty: bool, count: int) -> list[str]:
     found = [driven(KINDS[kind], seed, hasty) for seed in range(count)]
     words = ("done", "refused", "touched")
     shares = {word: f"{100.0 * np.mean([getattr(each, word) for each in found]):.0f}" for word in words}
-    away = 1e3 * np.array([each.away for each in found if each.done] or [np.nan])
+    away = [1e3 * each.away for each in found if each.done]
+    ends = [f"{np.median(away):.2f}", f"{max(away):.2f}"] if away else ["-", "-"]
     plans = float(np.mean([each.plans for each in found]))
     return [kind, "hasty" if hasty else "patient", str(count), shares["done"], shares["refused"], f"{plans:.1f}",
-            shares["touched"], f"{np.median(away):.2f}", f"{away.max():.2f}"]  # fmt: skip
+            shares["touched"], *ends]  # fmt: skip
 
 
 def main() -> None:
@@ -98,7 +99,7 @@ def main() -> None:
     for cells in rows:
         if cells[0] == "none":
             ends = f"{cells[0]}, {cells[1]}: tip from the end of its route, worst"
-            report.bar(ends, "<= 0.5 mm", f"{cells[8]} mm", float(cells[8]) <= 0.5)
+            report.bar(ends, "<= 0.5 mm", f"{cells[8]} mm", cells[8] != "-" and float(cells[8]) <= 0.5)
         if cells[0] in KNOWN:
             name = f"{cells[0]}, {cells[1]}: routes on which links touch something"
             report.bar(name, "0 %", f"{cells[6]} %", cells[6] == "0")
