@@ -179,7 +179,8 @@ def _drive(pilot: Any, direction: float) -> None:
 
 def _held(pilot: Any, direction: float) -> dict[str, Any]:
     """Hold on until the arm is named; a press that lapses on a busy machine is made again, as a pilot does."""
-    end, state = time.monotonic() + 2.0, pilot.go_on(0.5, until=_named)
+    end = time.monotonic() + 2.0
+    state: dict[str, Any] = pilot.go_on(0.5, until=_named)
     while not _named(state) and time.monotonic() < end:
         state = pilot.go_on(0.3, until=_named)
         if not state["driving"] and not _named(state):
