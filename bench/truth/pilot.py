@@ -38,7 +38,7 @@ NAMED = {
     "reverse": "the wrong way",
     "jump": "jumped by",
     "dead": "does not move",
-    "runaway": "after the stop|too far",
+    "runaway": "after the stop|too far|the wrong way",
 }
 LATE = ("the session", "the thread that reads the arm")
 LATE_SECONDS = 0.1, 0.2  # between these, each time

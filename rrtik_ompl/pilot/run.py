@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import time as clock
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
-from rrtik_ompl.pilot.interlock import Sight
+from rrtik_ompl.pilot.interlock import MOVING, Sight
 from rrtik_ompl.pilot.web.handlers import MAX_PAGES
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.world.motion_queries import Stop, no_stop
@@ -21,6 +21,15 @@ from rrtik_ompl.world.motion_queries import Stop, no_stop
 PERIOD_SECONDS = 1.0 / 32.0  # a little less than a camera's, so that none of its pictures is left out
 CAMERA, OUTSIDE = "C", "O"
 MAX_SEQUENCE = 2**53  # the largest number that a page counts to
+
+Sent: TypeAlias = tuple[int, dict[str, Any]]  # number of a page, and its command
+
+
+def _renews(after: Sent, before: Sent) -> bool:
+    """Whether a command that is held is the one before it once more, which then need not be executed."""
+    names = quoted(after[1].get("name")), quoted(before[1].get("name"))
+    same = after[0] == before[0] and names[0] == names[1] and after[1].get("press") == before[1].get("press")
+    return same and names[0] in MOVING
 
 
 class Loop:
@@ -88,15 +97,21 @@ class Loop:
             self._server.show_state(state, self._answered)
 
     def _execute_all(self) -> None:
+        """Execute what waits now, and no more: a key that is held would leave a slow machine no time for pictures."""
         self._engine.watch(self.time)
-        while not self._server.commands.empty():
+        for _ in range(self._server.commands.qsize()):
             self._execute_one(0.0)
 
     def _execute_one(self, patience: float) -> None:
         """Execute the next command and show its result at once; wait for one at most ``patience`` [s]."""
+        commands = self._server.commands
         try:
-            client, command = self._server.commands.get(block=patience > 0.0, timeout=patience or None)
-        except queue.Empty:
+            client, command = commands.get(block=patience > 0.0, timeout=patience or None)
+        except queue.Empty:  # a stop has left out what waited
+            return
+        with commands.mutex:
+            after = commands.queue[0] if commands.queue else None
+        if after is not None and _renews(after, (client, command)):
             return
         sequence = command.pop("seq", None)
         sight = Sight(self._age(command.pop("seen", None)), self._age(command.pop("picture", None)))

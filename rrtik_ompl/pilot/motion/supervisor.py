@@ -113,7 +113,7 @@ class Supervisor:
             way = np.where(np.abs(away) > 0.0, np.sign(away), self._way)
             turned = (way != self._way) & (self._way != 0.0)
             new = way != self._way
-            again = (time < self._coasts_until) & (way == self._coast_way)  # what it did before the stop still counts
+            again = (time <= self._rest_until) & (way == self._coast_way)  # what it did before the stop still counts
             self._coasts_until[turned] = time + COAST_SECONDS
             self._coast_way[turned] = self._way[turned]
             self._coasts_until[again] = -np.inf
