@@ -207,15 +207,14 @@ def test_a_joint_that_sags_slowly_by_half_a_degree_is_let_be_and_a_fast_one_is_n
     assert when <= 1.0 + 2.1 * STEP
 
 
-@pytest.mark.parametrize("pause", [0.2, 0.6])
-@pytest.mark.parametrize("press", [0.04, 0.08])
-def test_an_arm_that_goes_the_wrong_way_does_so_for_a_degree_at_most_however_often_the_key_is_let_go(press, pause):
-    watching, gone, time_ = Supervisor(ROBOT, RATES), 0.0, 0.0
+@pytest.mark.parametrize("every", [5, 20])
+def test_an_arm_that_goes_the_wrong_way_does_so_for_a_degree_at_most_however_often_the_key_is_let_go(every):
+    watching, gone, k = Supervisor(ROBOT, RATES), 0.0, 0
     while not watching.fault:
         assert gone <= 0.7
-        time_ += STEP
-        if time_ % (press + pause) < press:
-            gone += 10.0 * STEP
+        time_, k = k * STEP, k + 1
+        if k % every == 0:
+            gone += 0.25
             q = PROBLEM.start + along(-gone)
             watching.told(q + along(1.0), np.abs(along(1.0)), q, time_)
         else:
