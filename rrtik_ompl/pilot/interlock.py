@@ -1,7 +1,8 @@
 """Which commands are refused, by what is known of the picture, of the arm, and of the route.
 
 The rule: nothing moves, is planned or accepted on a picture that is stale or on joints that are not read any more, and
-no route is followed that was not accepted. Commands that stop, choose or leave are never refused here.
+no route is followed that was not accepted. Where the vehicle moves, no route is proposed or followed past what was not
+seen lately; driving by hand remains. Commands that stop, choose or leave are never refused here.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ from typing import Final
 MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
 MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
 STALE_SECONDS = 0.5  # a picture older than that does not show the present
+UNSEEN_SECONDS = 2.0  # what has been out of view for longer is no basis of a route, where the vehicle moves
 LATE_SECONDS = 0.3  # a pilot who sees what the arm does later than that does not drive it
 
 ACKNOWLEDGE: Final = "STOP acknowledges that"
 MOVING: Final = ("jog", "go", "next", "servo", "lead")  # held: the arm moves only as long as they are renewed
 # What needs the arm and a picture of now:
 PRESENT: Final = (*MOVING, "move", "plan", "replan", "accept", "back", "close", "open", "lift", "together")
+# What leads past things without the pilot's judgement, and so needs all of them seen:
+GUIDED: Final = ("plan", "replan", "accept", "back", "together", "lift", "next", "servo")
 ALWAYS: Final = ("stop", "release", "halt", "select", "speed", "object", "grasp", "reject", "settle")
 
 _MANUAL = (MANOEUVRE, CHOOSING, PROPOSED), "a route is being followed: 'next' makes its next move, 'stop' leaves it"
@@ -62,6 +66,7 @@ class Knowledge:
         unusable: Why the last photograph or picture of a film could not be used; "" if it could.
         fault: What the arm has done that it was not told; "" if nothing, or the pilot has acknowledged it.
         sight: What the pilot sees; None without a page.
+        unseen: What the scene stands on and the camera has not shown lately, in one line; "" if there is no such thing.
     """
 
     arm_lost: str
@@ -71,6 +76,7 @@ class Knowledge:
     unusable: str = ""
     fault: str = ""
     sight: Sight | None = None
+    unseen: str = ""
 
     @property
     def trouble(self) -> str:
@@ -112,4 +118,6 @@ def refusal(verb: str, mode: str, known: Knowledge) -> str:
         return otherwise
     if verb in PRESENT and known.trouble:
         return f"refused: {known.trouble}" + (f"; {ACKNOWLEDGE}" if known.trouble == known.fault else "")
+    if verb in GUIDED and known.unseen:
+        return f"refused: {known.unseen}; bring it into view, or drive by hand"
     return f"refused: {known.blind}" if verb in MOVING and known.blind else ""

@@ -7,6 +7,7 @@ free; assisted teleoperation chooses a grasp, plans a route, and guides the pilo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -27,11 +28,12 @@ from rrtik_ompl.pilot.interlock import (
     MANOEUVRE,
     MOVING,
     PROPOSED,
+    UNSEEN_SECONDS,
     Knowledge,
     Sight,
     refusal,
 )
-from rrtik_ompl.pilot.lamps import Lamp
+from rrtik_ompl.pilot.lamps import AMBER, GREEN, Lamp
 from rrtik_ompl.pilot.motion.hand import Hand
 from rrtik_ompl.pilot.motion.held import Held
 from rrtik_ompl.pilot.motion.leading import Leading
@@ -68,6 +70,7 @@ class Session:
         recorded: bool = False,
         structure: Structure | None = None,
         master: Arm | None = None,
+        patience: float | None = None,
     ) -> None:
         """Begin in manoeuvre.
 
@@ -81,6 +84,8 @@ class Session:
             recorded: The arm moves as a record says, whatever it is told: it is not compared with that.
             structure: To what the problem's obstacles are fixed; None if they move with the arm's base.
             master: An arm whose joints `lead` follows.
+            patience: For how long routes stand on what is out of view [s]; None for 2 s with a structure, and for ever
+                without one, where the vehicle stands still.
         """
         self.problem, self.robot, self.arm, self.seed = problem, problem.robot, arm, seed
         self.rates: Vector = joint_rates(self.robot, rates)
@@ -100,7 +105,8 @@ class Session:
         self.leading = Leading(self, master)
         self._check = ArmCheck()
         self.past, self._recorded = past, recorded
-        self._trouble, self._seen_at = "", dict[str, float]()
+        self._trouble, self._unseen, self._seen_at = "", "", dict[str, float]()
+        self._patience = (np.inf if structure is None else UNSEEN_SECONDS) if patience is None else patience
         self._fault, self._fault_at = "", -np.inf  # what the arm has done that it was not told, as of the last tick
         self._record = record or Record(None)
         self._commands: dict[str, Callable[..., Answer]] = {
@@ -119,6 +125,8 @@ class Session:
         """Update the surroundings by the objects of a picture."""
         self.time, self.picture_time, self.unusable = max(self.time, time), time, ""
         self._seen_at |= {each.object.name: time for each in objects}
+        if self.hand.holds:
+            self._seen_at[self.hand.holds] = time  # it is where the arm is
         if self.surroundings.see(objects):
             self._record.write("seen", time, objects=self.surroundings.places())
             if self.target is None:
@@ -145,6 +153,7 @@ class Session:
             self.say(self.held.watch())
         self._fault = self.held.drive.supervisor.fault
         self._watch()
+        self._watch_view()
         self.say(self.guide.watch())
         if ended := self._record.news():
             self.say(alarm(ended))
@@ -188,8 +197,9 @@ class Session:
     @property
     def known(self) -> Knowledge:
         """What is known now of the arm and of the picture."""
-        age = self.time - self.picture_time
-        return Knowledge(self.arm.lost, age, self.past, self._check.off, self.unusable, self._fault, self.sight)
+        age, fault = self.time - self.picture_time, self._fault
+        off, unseen = self._check.off, self._out_of_view()
+        return Knowledge(self.arm.lost, age, self.past, off, self.unusable, fault, self.sight, unseen)
 
     @property
     def message(self) -> str:
@@ -227,8 +237,11 @@ class Session:
         return self.surroundings.world_at(self.q, self.target)
 
     def lamps(self) -> tuple[Lamp, ...]:
-        """Lamps of the chosen object where it is and for where the arm is."""
-        return self.feasibility.lamps(self.target, self.q)
+        """Lamps of the chosen object where it is and for where the arm is; none is green if no route can be led."""
+        found, unseen = self.feasibility.lamps(self.target, self.q), self.known.unseen
+        if not unseen:
+            return found
+        return tuple(replace(each, color=AMBER, reason=unseen) if each.color == GREEN else each for each in found)
 
     def lamp(self) -> Lamp | None:
         """The lamp of the grasp that is chosen."""
@@ -237,7 +250,7 @@ class Session:
     def fault(self) -> str:
         """What is wrong with the grasp that is chosen: by how much it is out of reach, what touches; "" if nothing."""
         lamp = self.lamp()
-        return "" if lamp is None else self.feasibility.fault(str(self.target), lamp, self.q)
+        return "" if lamp is None else self.known.unseen or self.feasibility.fault(str(self.target), lamp, self.q)
 
     def joint_range(self) -> JointRange:
         """The range in which the selected joint can be driven now."""
@@ -246,6 +259,17 @@ class Session:
     def unseen(self, name: str) -> float:
         """For how long an object has not been in view, by the pictures taken since [s]."""
         return max(self.picture_time - self._seen_at.get(name, self.picture_time), 0.0)
+
+    def _out_of_view(self) -> str:
+        """What the world stands on and was not seen for longer than patience allows, in words; "" if nothing."""
+        if self.past or self._patience == np.inf or self.picture_time == -np.inf:
+            return ""
+        for name in self.surroundings.basis:
+            if name not in self._seen_at:
+                return f"'{name}' was not seen yet"
+            if self.unseen(name) > self._patience:
+                return f"'{name}' has not been in view for {self.unseen(name):.0f} s"
+        return ""
 
     # --- commands ------------------------------------------------------------------------------------------------
 
@@ -315,6 +339,20 @@ class Session:
         else:
             self.arm.stop()
             self.say(alarm(trouble + how))
+
+    def _watch_view(self) -> None:
+        """Leave the route when something that it stands on has been out of view for too long, and say so."""
+        unseen, before = self.known.unseen, self._unseen
+        self._unseen = unseen
+        if bool(unseen) == bool(before):
+            return
+        if not unseen:
+            self.say(news("all that routes stand on is in view"))
+        elif self.mode == FOLLOWING:
+            self._record.write("command", self.time, name="stop", arguments={})
+            self.say(alarm(f"{unseen}: {self._end_motion()}"))
+        else:
+            self.say(alarm(f"{unseen}: no route is led past it, and by hand it may be elsewhere"))
 
     def _check_motion(self) -> None:
         """After a change of the scene: stop if what is driven, followed or proposed is not free any more."""

@@ -98,8 +98,9 @@ def open_session(options: SessionOptions) -> OpenSession:
     past = isinstance(options.source, Path)
     master = None if options.master is None else _line_arm(problem, options.master, "--master")
     session = Session(
-        problem, arm, record=record, seed=options.seed, past=past, structure=_structure(vehicle), master=master
-    )
+        problem, arm, record=record, seed=options.seed, past=past, structure=_structure(vehicle), master=master,
+        patience=None if vehicle is None else vehicle.patience,
+    )  # fmt: skip
     simulated = [each for each in (arm, source) if isinstance(each, SimulatedArm | SimulatedSource)]
     closing, reports = [perception.close, record.close], perception.reports()
     if master is not None:

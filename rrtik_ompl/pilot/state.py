@@ -40,6 +40,7 @@ def state_document(session: Session) -> dict[str, Any]:
         "aim": _aim(session),
         "arm_lost": session.arm.lost,
         "trouble": session.known.trouble,
+        "unseen": session.known.unseen,
         "speed": session.held.speed,
         "gripper": {"closed": session.hand.closed, "holds": session.hand.holds or session.hand.fixed},
         "driving": session.held.drive.active,
@@ -121,7 +122,7 @@ def _route(session: Session) -> dict[str, Any] | None:
         "robustness": round(route.robustness, 2),
         "share": 0.0 if progress is None else progress.share,
         "advice": "" if progress is None else progress.advice,
-        "withdrawn": session.guide.withdrawn,
+        "withdrawn": session.guide.withdrawn or session.known.unseen,
     }
 
 

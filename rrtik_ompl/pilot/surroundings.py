@@ -64,6 +64,12 @@ class Surroundings:
         """The objects seen now or earlier."""
         return tuple(self._seen.values())
 
+    @property
+    def basis(self) -> tuple[str, ...]:
+        """Names of the objects by whose places the world is made: the structure, and all that was seen."""
+        fixed = () if self._structure is None else (self._structure.name,)
+        return tuple(dict.fromkeys((*fixed, *self._seen)))
+
     def named(self, name: str) -> SeenObject | None:
         """An object as it was seen last, None if it was never seen."""
         return self._seen.get(name)

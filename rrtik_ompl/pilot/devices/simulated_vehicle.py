@@ -19,6 +19,7 @@ from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.pilot.devices.base_motion import BaseMotion
 from rrtik_ompl.pilot.devices.further_cameras import Mount
 from rrtik_ompl.pilot.devices.wrong_arm import Faults
+from rrtik_ompl.pilot.interlock import UNSEEN_SECONDS
 from rrtik_ompl.problem_files.scene import PoseEntry
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.camera_file import load_camera
@@ -41,6 +42,7 @@ class SimulatedVehicle:
         base_motion: How the vehicle moves; None if it stands still.
         further: Cameras beside the first one.
         structure: Name of the object to which the problem's obstacles are fixed; None if they move with the vehicle.
+        patience: For how long routes stand on what is out of view [s]; None for that of the session.
     """
 
     camera: Camera
@@ -51,6 +53,7 @@ class SimulatedVehicle:
     base_motion: BaseMotion | None = None
     structure: str | None = None
     further: tuple[Mount, ...] = ()
+    patience: float | None = None
 
 
 class FurtherEntry(Section):
@@ -110,6 +113,9 @@ class VehicleFile(Section):
     places: Annotated[list[PlaceEntry], Field(min_length=1)]
     base_motion: BaseMotionEntry | None = Field(None, description="drift [m/s] and sway [m] of the vehicle")
     structure: Name | None = Field(None, description="the object to which the problem's obstacles are fixed")
+    patience: Length | None = Field(
+        None, description="for how long routes stand on what is out of view [s]; 2 where the vehicle moves"
+    )
     further_cameras: list[FurtherEntry] = Field([], description="a second camera, a camera at the wrist")
     arm: FaultsEntry | None = Field(None, description="by how much the simulated arm is wrong")
 
@@ -141,7 +147,8 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
         if len({each.name for each in further}) < len(further):
             raise InputError("two further cameras have the same name; give each its own")
     camera, T = load_camera(folder / entry.camera), entry.camera_pose.build()
-    return SimulatedVehicle(camera, marker_map, places, T, faults, motion, structure, further)
+    patience = UNSEEN_SECONDS if entry.patience is None and motion is not None else entry.patience
+    return SimulatedVehicle(camera, marker_map, places, T, faults, motion, structure, further, patience)
 
 
 def find_vehicle(problem: str) -> Path:

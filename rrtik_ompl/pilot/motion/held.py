@@ -11,7 +11,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.pilot.answers import Answer, alarm, news, refused
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.guide import Guide
-from rrtik_ompl.pilot.interlock import FOLLOWING, MOVING, Sight
+from rrtik_ompl.pilot.interlock import FOLLOWING, MOVING, Knowledge, Sight
 from rrtik_ompl.pilot.motion.drive import HOLD_SECONDS, LEASH_SECONDS, Drive
 from rrtik_ompl.pilot.motion.supervisor import FOLLOW_SECONDS, slack_of
 from rrtik_ompl.pilot.routes.follower import MADE, Follower
@@ -39,6 +39,10 @@ class Driven(Protocol):
     guide: Guide
     answer: Answer
     sight: Sight | None
+
+    @property
+    def known(self) -> Knowledge:
+        """What is known now of the arm and of the picture."""
 
     @property
     def world(self) -> World:
@@ -157,7 +161,9 @@ class Held:
         if not check.allowed:
             raise InputError(move_refusal(session.world, session.q, joint, float(target), check))
         session.desired = self._with(joint, float(target))
-        return news("; ".join((f"{self._place(joint, float(target))}: hold Enter to drive there", *check.warnings)))
+        warnings = (*check.warnings, session.known.unseen)
+        place = f"{self._place(joint, float(target))}: hold Enter to drive there"
+        return news("; ".join(filter(None, (place, *warnings))))
 
     def go(self, press: float) -> Answer:
         """Drive the selected joint to where it is to go."""

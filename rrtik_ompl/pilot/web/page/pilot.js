@@ -131,9 +131,10 @@ function showAge() {
   if (state.arm_lost) reasons.push(`${state.arm_lost}`);
   if (!reasons.length && silent > STALE_S && !past) reasons.push(`No news from the server for ${fixed(silent)} s. The arm stops where it hears nothing from this page.`);
   else if (!reasons.length && stale && age !== null) reasons.push(state.stale ? "The picture is stale: nothing moves." : `The picture comes late: it is up to ${fixed(age)} s old.`);
+  if (state.unseen && !past) reasons.push(`${inWords(state.unseen)}: no route is led past it, and by hand it may be elsewhere.`);
   byId("camera_banner").hidden = !reasons.length;
   set(byId("camera_banner"), reasons.join(" "));
-  alertOnce(reasons.join(" ").replace(/\d+\.\d+ s/, "some time"));  // said once, not each tenth of a second
+  alertOnce(reasons.join(" ").replaceAll(/\d+(\.\d+)? s\b/g, "some time"));  // said once, not each tenth of a second
   showLink();
 }
 setInterval(showAge, 100);
@@ -307,8 +308,9 @@ function showButtons() {
   byId("pause").hidden = !state.replay || role.role !== "pilot";
   set(byId("pause").firstChild, state.paused ? "Go on" : "Pause");
   const mine = role.role === "pilot" && !state.replay && !state.trouble, at = (...modes) => mine && modes.includes(state.mode);
-  for (const [id, good] of [["accept", at("proposed") && !state.route?.withdrawn], ["reject", role.role === "pilot" && state.mode === "proposed"], ["next", at("following")], ["plan", mine],
-    ["together", at("proposed")], ["servo", at("manoeuvre", "choosing", "proposed") && Boolean(state.choice)], ["replan", mine && Boolean(state.route)], ["back", mine && Boolean(state.route)], ["stop", !state.replay],
+  const led = mine && !state.unseen;
+  for (const [id, good] of [["accept", at("proposed") && !state.route?.withdrawn], ["reject", role.role === "pilot" && state.mode === "proposed"], ["next", at("following")], ["plan", led],
+    ["together", led && at("proposed")], ["servo", led && at("manoeuvre", "choosing", "proposed") && Boolean(state.choice)], ["replan", led && Boolean(state.route)], ["back", led && Boolean(state.route)], ["stop", !state.replay],
     ...["minus", "plus", "go"].map((id) => [id, at("manoeuvre", "choosing", "proposed")])]) byId(id).disabled = !good;
   for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || state.mode !== "proposed";
 }
@@ -320,7 +322,7 @@ function showGripper() {
   set(byId("holds"), holds ? `holds ${holds}` : closed ? "closed, empty" : "open");
   const free = role.role === "pilot" && !state.replay && !state.trouble && state.mode !== "following";
   byId("grip").disabled = !free;
-  byId("lift").disabled = !free || !holds;
+  byId("lift").disabled = !free || !holds || Boolean(state.unseen);
 }
 
 function showViews() {
