@@ -1,5 +1,6 @@
 """Routes for a pilot: few moves, a place before the object that few joints lead on from, and room for small errors."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -17,9 +18,11 @@ from rrtik_ompl.pilot.routes.follower import slack
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import route_to, route_to_grasp
 from rrtik_ompl.pilot.routes.route_search import GraspRoute, RouteSearch
+from rrtik_ompl.pilot.routes.track import together
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import proof
+from rrtik_tests.distances import least_distances
 
 PROBLEM = load_problem("titan4_sdu")
 ROBOT, RATES = PROBLEM.robot, joint_rates(PROBLEM.robot)
@@ -150,3 +153,18 @@ def test_of_several_ways_one_that_forgives_errors_is_taken():
     best = search.robustness(search.find([[goal[None]]]))
     assert min(shares) + 0.1 < best
     assert best > max(shares) - 0.06  # ways are compared in tenths: below that fewer moves count
+
+
+@pytest.mark.parametrize(("kind", "level"), [("straight", 1), ("straight", 2), ("aslant", 2)])
+def test_a_route_is_as_far_from_everything_as_it_says_one_joint_at_a_time_and_all_at_once(kind, level):
+    world, holding, _, route = grasp(kind, level)
+    for made in (route, together(route, world, RATES, 1)):
+        assert made.proven
+        said = re.search(r"at least (\d+) mm away|less than 1 mm to spare", made.summary())
+        assert 1e-3 * int(said[1] or 0) == pytest.approx(made.clearance)
+        rows = made.path.waypoints
+        before = least_distances(ROBOT, world.scene, rows[: made.grasp_from + 1])
+        after = least_distances(ROBOT, holding.scene, rows[made.grasp_from :])
+        grasped = {("gripper", solid) for solid in VALVE.solid_names}
+        apart = [*before.values(), *(away for pair, away in after.items() if pair not in grasped)]
+        assert made.clearance <= min(apart) < made.clearance + 2e-3

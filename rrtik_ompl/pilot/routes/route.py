@@ -16,14 +16,12 @@ from rrtik_ompl.errors import ProblemError
 from rrtik_ompl.ik.batch import solve_ik_batch
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.pilot.routes.approach import approaches
-from rrtik_ompl.pilot.routes.clearance import closest_pair
 from rrtik_ompl.pilot.routes.moves import planned
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, RouteSearch, Tail
 from rrtik_ompl.poses import apart
 from rrtik_ompl.world import World
 
-CLEARANCE_SAMPLES = 100  # along a route
 END_OFFSET, END_TURN = 2e-4, np.deg2rad(0.04)  # [m], [rad] of the tip from its grasp, at the end of a route
 MAX_END_OFFSET, MAX_END_TURN = 5e-4, np.deg2rad(0.1)  # the same of an arm that has followed it
 MAX_BEGINNINGS = 6  # configurations in front of the object that are tried
@@ -38,7 +36,8 @@ class Route:
         grasp_from: Number of the first move that leads from the pose before the object to the object.
         travel: Sum of all moves [rad and m].
         seconds: Sum of all moves' times at the joints' rates.
-        clearance: Least distance to anything, at samples along it [m].
+        clearance: What it is proven to keep from every obstacle beside its margin, in whole millimetres [m]; 0 if it is
+            not proven, +inf if no obstacle is near. What the gripper may touch is no obstacle.
         joints: Names of the joints that move.
         robustness: Share of executions that touch nothing although every move ends with an error of up to a degree.
         proven: Whether every move is proven free for its whole length; else some are checked in steps.
@@ -57,15 +56,21 @@ class Route:
 
     def summary(self) -> str:
         """The head of the list in one line, with a warning where a small error may touch something."""
-        clear = "nothing near" if np.isinf(self.clearance) else f"at least {1e3 * self.clearance:.0f} mm away"
         head = "all joints at once" if self.together else f"{len(self.path.moves())} moves"
-        line = f"{head}, {self.seconds:.0f} s, {clear}"
-        line += "" if self.proven else ", not proven free: checked in steps"
+        line = f"{head}, {self.seconds:.0f} s, {self._clear()}"
         if self.robustness >= MIN_ROBUSTNESS or self.together:
             return line
         return (
             f"{line}; narrow: with errors of 1 deg {100 * (1 - self.robustness):.0f} of 100 executions touch something"
         )
+
+    def _clear(self) -> str:
+        """How far it stays from obstacles, as far as that is proven."""
+        if not self.proven:
+            return "not proven free: checked in steps"
+        if np.isinf(self.clearance):
+            return "nothing near"
+        return f"at least {1e3 * self.clearance:.0f} mm away" if self.clearance > 0.0 else "less than 1 mm to spare"
 
 
 def route_to(world: World, q: Vector, goal: Vector, rates: Vector, seed: int) -> Route | NoRoute:
@@ -138,10 +143,9 @@ def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates
         return found
     path = JointPath.of(world.robot, found.rows)
     moves, names = path.moves(), list(path.joint_names)
-    nearest = closest_pair(holding, path.resample(max(path.length / CLEARANCE_SAMPLES, 1e-3)).waypoints)
-    clearance = np.inf if nearest is None else nearest.distance
     seconds = sum(abs(move.change) / rates[names.index(move.joint)] for move in moves)
     used = tuple(name for name in names if any(move.joint == name for move in moves))
     travel = sum(abs(move.change) for move in moves)
     robustness, proven = search.robustness(found), search.proven(found)
-    return Route(path, found.grasp_from, travel, float(seconds), float(clearance), used, robustness, proven)
+    clearance = search.clearance(found) if proven else 0.0
+    return Route(path, found.grasp_from, travel, float(seconds), clearance, used, robustness, proven)

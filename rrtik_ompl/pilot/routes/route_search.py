@@ -9,7 +9,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.pilot.routes.clearance import executions, free_rows
+from rrtik_ompl.pilot.routes.clearance import executions, free_rows, proven_clearance
 from rrtik_ompl.pilot.routes.follower import path_fault, slack
 from rrtik_ompl.pilot.routes.moves import detours, direct_routes, moved_aside, planned
 from rrtik_ompl.pilot.routes.no_route import NoRoute
@@ -77,6 +77,10 @@ class RouteSearch:
     def proven(self, route: GraspRoute) -> bool:
         """Whether all moves of a route are proven free for their whole length."""
         return all(world.prove(rows).proven for world, rows in self._parts(route) if len(rows) > 1)
+
+    def clearance(self, route: GraspRoute) -> float:
+        """What a route is proven to keep from obstacles [m]; see `proven_clearance`."""
+        return proven_clearance(self._parts(route))
 
     def _provable(self, tail: Tail) -> bool:
         """Whether there may be a proven route: not without kernels, nor where an end cannot be proven."""

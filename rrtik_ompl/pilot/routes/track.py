@@ -12,6 +12,7 @@ import numpy as np
 from rrtik_ompl.arrays import Vector
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.path import JointPath, Move
+from rrtik_ompl.pilot.routes.clearance import proven_clearance
 from rrtik_ompl.pilot.routes.follower import MADE, TOLERANCE, Progress, slack
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route
@@ -138,5 +139,6 @@ def together(route: Route, world: World, rates: Vector, seed: int) -> Route | No
     return replace(
         route, path=whole, grasp_from=len(path.waypoints) - 1, seconds=Track(whole, rates).seconds, joints=used,
         travel=float(np.abs(np.diff(whole.waypoints, axis=0)).sum()),
+        clearance=min(proven_clearance([(world, path.waypoints)]), route.clearance),
         proven=bool(world.prove(path.waypoints).proven) and route.proven, together=True,
     )  # fmt: skip
