@@ -1,4 +1,4 @@
-"""The clearance of a free motion, the one that is proven, and whether it stays free if every move ends with a small error."""
+"""The clearance of free motions, what of it is proven, and whether they stay free if moves end with small errors."""
 
 from __future__ import annotations
 
