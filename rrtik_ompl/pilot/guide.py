@@ -21,7 +21,7 @@ from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.proposal import propose
 from rrtik_ompl.pilot.routes.route import MAX_END_OFFSET, MAX_END_TURN, Route
 from rrtik_ompl.pilot.routes.track import Track, together
-from rrtik_ompl.pilot.surroundings import Surroundings
+from rrtik_ompl.pilot.surroundings import MAX_SHIFT, MAX_TURN, Surroundings
 from rrtik_ompl.poses import apart
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
@@ -30,7 +30,6 @@ from rrtik_ompl.world import World
 
 WITHDRAWN = "the route is withdrawn: {}; 'replan' finds another"
 MADE = "all moves are done"
-MAX_SHIFT, MAX_TURN = 5e-3, np.deg2rad(1.0)  # [m], [rad]; a target that has moved farther is not where the route ends
 
 
 class Guided(Protocol):
@@ -100,7 +99,8 @@ class Guide:
             advice = escape_advice(session.world, session.q) or otherwise
             return refused(f"no route: {session.fault() or found}; {advice}")
         aimed = session.surroundings.named(session.target) if session.target and session.choice else None
-        return self.propose(found, aimed)
+        said = self.propose(found, aimed)
+        return said if aimed is None else news(said.text + session.surroundings.not_compared(aimed.object.name))
 
     def propose(self, route: Route, aimed: SeenObject | None = None) -> Answer:
         """Propose a route that begins where the arm is.

@@ -145,7 +145,8 @@ class Session:
         before, self.q = self.q, frozen(self.arm.read())
         if not np.array_equal(before, self.q):
             self._record.write("joints", time, q=self.q.tolist())
-            self.surroundings.settle(self.q)
+            if self.surroundings.settle(self.q):
+                self._check_motion()
         self._check.read(self.q, time)
         expired = self.held.expire()
         if not self._recorded:

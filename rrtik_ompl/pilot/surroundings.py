@@ -4,20 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.arrays import Vector
+from rrtik_ompl.collision.bodies import deepest_contact
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import apart
 from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene, Touching
 from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.tasks.contact_life import (
+    DEEPER,
+    Nearness,
+    allowed,
+    left_inside,
+    parted,
+    touching_at,
+    with_contacts,
+)
 from rrtik_ompl.world import World
 
+MAX_SHIFT, MAX_TURN = 5e-3, np.deg2rad(1.0)  # [m], [rad]; a target that has moved farther is not where a route ends
 MIN_SHIFT, MIN_ROTATION = 1e-3, np.deg2rad(0.2)  # [m], [rad]; smaller changes are noise
 
 
@@ -34,11 +46,23 @@ class Structure(NamedTuple):
 
 
 class HeldObject(NamedTuple):
-    """What the gripper holds: as it was seen last, its place in the gripper, what it may touch until it is clear."""
+    """What the gripper holds: as it was seen last, its place in the gripper, and what it has not parted from."""
 
     seen: SeenObject
     T_tip_object: pin.SE3
-    rests: tuple[tuple[str, str], ...]
+    rests: tuple[Touching, ...]
+
+
+class Grip(NamedTuple):
+    """What the gripper, with what it holds, may touch of an object.
+
+    Attributes:
+        contacts: How far each part of it and each solid of the object may overlap.
+        buried: Pairs that overlap so deep at a grasp that no depth keeps them from passing through: not compared.
+    """
+
+    contacts: tuple[Touching, ...]
+    buried: tuple[tuple[str, str], ...]
 
 
 class Surroundings:
@@ -58,6 +82,8 @@ class Surroundings:
         self.held: HeldObject | None = None
         self._seen: dict[str, SeenObject] = {}
         self._holding: dict[str, World] = {}
+        self._grips: dict[str, Grip] = {}
+        self._let_go: dict[str, pin.SE3] = {}  # where the tip stood in what was put down, T_object_tip
 
     @property
     def seen(self) -> tuple[SeenObject, ...]:
@@ -106,15 +132,22 @@ class Surroundings:
         self._renew()
         return True
 
-    def hold(self, seen: SeenObject, T_tip_object: pin.SE3, q: Vector) -> None:
-        """An object moves with the gripper from now on; what it touches at q, (dof,), it may until it is clear."""
+    def hold(self, seen: SeenObject, T_tip_object: pin.SE3, q: Vector) -> tuple[Touching, ...]:
+        """An object moves with the gripper from now on; what it touches at q, (dof,), it may until the two have parted.
+
+        Returns:
+            How far it and what it touches may overlap: a millimetre more than now.
+        """
         self._seen.pop(seen.object.name, None)
         self.held = HeldObject(seen, T_tip_object, ())
-        mine = set(seen.object.solid_names)
-        touching = [(c.first, c.second) for c in self._with(()).contacts(q)]
-        rests = tuple(pair for pair in touching if mine & set(pair))
-        self.held = HeldObject(seen, T_tip_object, rests)
+        self._grips.clear()
+        world, mine = self._with(()), seen.object.solid_names
+        near = [frozenset((contact.first, contact.second)) for contact in world.contacts(q)]
+        rests = {pair: allowed(world.bodies, *sorted(pair)) for pair in near if pair & set(mine)}
+        rests |= {each.pair: each.going_on() for name in mine for each in touching_at(world, q, name)}
+        self.held = HeldObject(seen, T_tip_object, tuple(rests.values()))
         self._renew()
+        return self.held.rests
 
     def release(self, T_base_tip: pin.SE3) -> None:
         """What is held stays where it is for a pose of the tip."""
@@ -123,14 +156,29 @@ class Surroundings:
         held, self.held = self.held, None
         place = T_base_tip * held.T_tip_object
         self._seen[held.seen.object.name] = replace(held.seen, T_base_object=place, sighting=None)
+        self._let_go[held.seen.object.name] = held.T_tip_object.inverse()
+        self._grips.clear()
         self._renew()
 
-    def settle(self, q: Vector) -> None:
-        """What is held may not touch again what it has left, by an arm at q, shape (dof,)."""
+    def settle(self, q: Vector) -> bool:
+        """What is held may not touch again what it has parted from with an arm at q, shape (dof,); True if it has."""
         held = self.held
-        if held is not None and held.rests and self._with(()).valid(q):
-            self.held = held._replace(rests=())
-            self._renew()
+        if held is None or not held.rests:
+            return False
+        rests = tuple(contact for contact in held.rests if not parted(self.world, q, contact))
+        if rests == held.rests:
+            return False
+        self.held = held._replace(rests=rests)
+        self._renew()
+        return True
+
+    def left_inside(self, q: Vector) -> str:
+        """What is held would be left deep inside something by an arm at q, shape (dof,), in words; "" if not."""
+        names = () if self.held is None else self.held.seen.object.solid_names
+        around = {each.name for each in self.world.scene.obstacles}
+        touching = [near for name in names for near in touching_at(self.world, q, name) if near.second in around]
+        deepest = min(touching, key=lambda near: near.distance, default=None)
+        return left_inside(deepest) if deepest is not None and deepest.too_deep else ""
 
     def held_solids(self, T_base_tip: pin.SE3) -> tuple[Obstacle, ...]:
         """The solids of what is held, for a pose of the tip."""
@@ -140,12 +188,54 @@ class Surroundings:
     def holding(self, name: str) -> World:
         """The world in which the gripper may touch an object."""
         if name not in self._holding:
-            solids = [solid.name for solid in self._seen[name].solids()]
-            mine = () if self.held is None else self.held.seen.object.solid_names
-            touching = (*gripper_links(self.world.robot), *mine)
-            pairs = [(link, solid) for link in touching for solid in solids]
-            self._holding[name] = self._with((*pairs, *self._rests()))
+            grip = self._grip(name)
+            self._holding[name] = self._with((*grip.contacts, *self._rests()), grip.buried)
         return self._holding[name]
+
+    def not_compared(self, name: str) -> str:
+        """Which solids of an object are so deep in the gripper at a grasp that they are not compared; "" if none."""
+        solids = sorted({solid for _, solid in self._grip(name).buried})
+        return f" (the gripper is not compared with {', '.join(solids)})" if solids else ""
+
+    def _grip(self, name: str) -> Grip:
+        """What the gripper may touch of an object, and what it holds: no deeper than at one of the object's grasps.
+
+        What it holds may come a millimetre nearer than there. The gripper itself may be as far off as an object may
+        have moved before a route to it is withdrawn.
+        """
+        if name in self._grips:
+            return self._grips[name]
+        near, links = self._at_grasps(name), gripper_links(self._given.robot)
+        contacts, buried = [], []
+        for pair, each in near.items():
+            part, solid = pair
+            leeway = DEEPER + MAX_SHIFT if part in links else DEEPER
+            if each.distance < -each.deepest and part in links:
+                buried.append(pair)
+            else:
+                contacts.append(Touching(part, solid, max(min(each.distance, 0.0) - leeway, -each.deepest)))
+        self._grips[name] = Grip(tuple(contacts), tuple(buried))
+        return self._grips[name]
+
+    def _at_grasps(self, name: str) -> dict[tuple[str, str], Nearness]:
+        """How near each part of the gripper, and of what it holds, comes to each solid of an object at its grasps."""
+        seen, robot, attached = self._seen[name], self._given.robot, tuple(self._attached())
+        thing, parts = seen.object, (*gripper_links(robot), *(item.name for item in attached))
+        q = robot.clamp(np.zeros((1, robot.dof)))[0]
+        tip = robot.fk(q)
+        tips = [level for grasp in thing.grasps for level in grasp.levels]
+        found: dict[tuple[str, str], Nearness] = {}
+        for T_object_tip in (*tips, *([self._let_go[name]] if name in self._let_go else [])):
+            there = replace(seen, T_base_object=tip * T_object_tip.inverse())
+            world = self._given.with_scene(Scene(there.solids(), attached))
+            for part, solid in product(parts, thing.solid_names):
+                apart = Nearness(part, solid, np.inf, deepest_contact(world.bodies, part, solid))
+                found.setdefault((part, solid), apart)
+            for near in (near for solid in thing.solid_names for near in touching_at(world, q, solid)):
+                pair = near.second, near.first
+                if pair in found and near.distance < found[pair].distance:
+                    found[pair] = near
+        return found
 
     def world_at(self, q: Vector, target: str | None) -> World:
         """The world for an arm at q, shape (dof,): its gripper may touch the target if that alone is what it touches.
@@ -165,12 +255,12 @@ class Surroundings:
         wider = max(_margins(new), default=0.0) - max(_margins(old), default=0.0)
         return shifted > MIN_SHIFT or turned > MIN_ROTATION or abs(wider) > MIN_SHIFT
 
-    def _with(self, allowed: Sequence[tuple[str, str]]) -> World:
+    def _with(self, contacts: Sequence[Touching], buried: Sequence[tuple[str, str]] = ()) -> World:
         given = self._fixed_scene()
         scene = scene_with(given, [solid for each in self._seen.values() for solid in each.solids()])
         attached = (*given.attached, *self._attached())
-        changed = replace(scene, attached=attached, allowed_collisions=(*given.allowed_collisions, *allowed))
-        return self._given.with_accuracy("exact").with_scene(changed)
+        changed = replace(scene, attached=attached, allowed_collisions=(*given.allowed_collisions, *buried))
+        return self._given.with_accuracy("exact").with_scene(with_contacts(changed, contacts))
 
     def _renew(self) -> None:
         """After a change: worlds are made anew."""
@@ -178,7 +268,7 @@ class Surroundings:
         self._holding.clear()
         self.version += 1
 
-    def _rests(self) -> tuple[tuple[str, str], ...]:
+    def _rests(self) -> tuple[Touching, ...]:
         return () if self.held is None else self.held.rests
 
     def _attached(self) -> list[AttachedObject]:

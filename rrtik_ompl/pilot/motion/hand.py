@@ -14,7 +14,7 @@ from rrtik_ompl.arrays import Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.ik.solve import solve_ik
-from rrtik_ompl.pilot.answers import Answer, news, refused
+from rrtik_ompl.pilot.answers import Answer, alarm, news, refused
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.guide import Guide
 from rrtik_ompl.pilot.interlock import MANOEUVRE, MOVING
@@ -94,8 +94,9 @@ class Hand:
             return news(f"closed on {name}")
         session.guide.leave()
         session.target, session.choice, session.mode = None, None, MANOEUVRE
-        session.surroundings.hold(seen, tip.actInv(seen.T_base_object), session.q)
-        return news(f"closed: {name} is held; 'lift' takes it up, or choose where it goes")
+        rests = session.surroundings.hold(seen, tip.actInv(seen.T_base_object), session.q)
+        until = "".join(f"; {contact} until they part" for contact in rests)
+        return news(f"closed: {name} is held{until}; 'lift' takes it up, or choose where it goes")
 
     def open(self) -> Answer:
         """Open the gripper; what was held stays where it is."""
@@ -107,9 +108,10 @@ class Hand:
         if not name:
             return news("open")
         session.guide.leave()
+        inside = session.surroundings.left_inside(session.q)
         session.surroundings.release(session.robot.fk(session.q))
         session.target, session.choice, session.mode = name, None, MANOEUVRE
-        return news(f"open: {name} is put down")
+        return alarm(f"open: {inside}") if inside else news(f"open: {name} is put down")
 
     def lift(self) -> Answer:
         """Propose a route straight up from where something was taken."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +82,13 @@ def executions(path: JointPath, slack: Vector, count: int, rng: np.random.Genera
         errors = rng.uniform(-slack[joint], slack[joint], (count, 1))
         rows[:, number:, joint] = move.end + errors
     return rows
+
+
+def forgiving(world: World) -> World:
+    """The same world where what is in contact is not compared: only to count what else errors would touch."""
+    scene = world.scene
+    pairs = (*scene.allowed_collisions, *(contact.names for contact in scene.contacts))
+    return world.with_scene(replace(scene, contacts=(), allowed_collisions=pairs)) if scene.contacts else world
 
 
 def free_rows(world: World, rows: Matrix) -> NDArray[np.bool_]:

@@ -20,6 +20,7 @@ from rrtik_ompl.pilot.routes.moves import planned
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, RouteSearch, Tail
 from rrtik_ompl.poses import apart
+from rrtik_ompl.scene import Touching
 from rrtik_ompl.world import World
 
 END_OFFSET, END_TURN = 2e-4, np.deg2rad(0.04)  # [m], [rad] of the tip from its grasp, at the end of a route
@@ -37,11 +38,12 @@ class Route:
         travel: Sum of all moves [rad and m].
         seconds: Sum of all moves' times at the joints' rates.
         clearance: What it is proven to keep from every obstacle beside its margin, in whole millimetres [m]; 0 if it is
-            not proven, +inf if no obstacle is near. What the gripper may touch is no obstacle.
+            not proven, +inf if no obstacle is near. What the gripper or what it holds may touch does not count.
         joints: Names of the joints that move.
         robustness: Share of executions that touch nothing although every move ends with an error of up to a degree.
         proven: Whether every move is proven free for its whole length; else some are checked in steps.
         together: Whether all joints move at once, for an arm under position control (`routes.track`).
+        contacts: Of what is held with what it has not parted from.
     """
 
     path: JointPath
@@ -53,11 +55,12 @@ class Route:
     robustness: float
     proven: bool
     together: bool = False
+    contacts: tuple[Touching, ...] = ()
 
     def summary(self) -> str:
         """The head of the list in one line, with a warning where a small error may touch something."""
         head = "all joints at once" if self.together else f"{len(self.path.moves())} moves"
-        line = f"{head}, {self.seconds:.0f} s, {self._clear()}"
+        line = ", ".join((f"{head}, {self.seconds:.0f} s, {self._clear()}", *map(str, self.contacts)))
         if self.robustness >= MIN_ROBUSTNESS or self.together:
             return line
         return (
@@ -148,4 +151,7 @@ def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates
     travel = sum(abs(move.change) for move in moves)
     robustness, proven = search.robustness(found), search.proven(found)
     clearance = search.clearance(found) if proven else 0.0
-    return Route(path, found.grasp_from, travel, float(seconds), clearance, used, robustness, proven)
+    return Route(
+        path, found.grasp_from, travel, float(seconds), clearance, used, robustness, proven,
+        contacts=world.scene.contacts,
+    )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.path import JointPath
-from rrtik_ompl.pilot.routes.clearance import executions, free_rows, proven_clearance
+from rrtik_ompl.pilot.routes.clearance import executions, forgiving, free_rows, proven_clearance
 from rrtik_ompl.pilot.routes.follower import path_fault, slack
 from rrtik_ompl.pilot.routes.moves import detours, direct_routes, moved_aside, planned
 from rrtik_ompl.pilot.routes.no_route import NoRoute
@@ -42,6 +42,7 @@ class RouteSearch:
 
     def __init__(self, world: World, holding: World, q: Vector, seed: int) -> None:
         self._world, self._holding, self._q, self._seed = world, holding, q, seed
+        self._forgiving = forgiving(holding)
         self._path = JointPath.of(world.robot, q[None])
         self._slack = slack(self._path)
 
@@ -69,10 +70,10 @@ class RouteSearch:
         return unproven or best or NoRoute("it comes too close to something to be sure")
 
     def robustness(self, route: GraspRoute, count: int = EXECUTIONS) -> float:
-        """Share of executions that touch nothing although every move ends with a small error."""
+        """Share of executions that touch nothing but what is grasped although every move ends with a small error."""
         made = executions(self._path.with_waypoints(route.rows), self._slack, count, np.random.default_rng(self._seed))
         before, after = made[:, : route.grasp_from + 1], made[:, route.grasp_from :]
-        return float((free_rows(self._world, before) & free_rows(self._holding, after)).mean())
+        return float((free_rows(self._world, before) & free_rows(self._forgiving, after)).mean())
 
     def proven(self, route: GraspRoute) -> bool:
         """Whether all moves of a route are proven free for their whole length."""
