@@ -211,11 +211,19 @@ def replugged(seed: int) -> Case:
         browser = browsers.Browser(Path(folder))
         try:
             browser.open(running.server.url)
-            browser.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble")
+            browser.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble && picture")
             arm = running.opened.engine.session.arm
             begin, pad = arm.read(), hands.Gamepad(browser)
             push = "pad.axes[0] = 1"
-            browser.keep(pad._enable, lambda: None, f"({push}, state.driving)")
+
+            def press() -> None:
+                """Anew each time: what was refused on a busy machine is not driven later."""
+                browser.ask(f"pad.axes[0] = 0; push({hands.ENABLE}, false); 0")
+                browser.wait("!padArmed && !held")
+                pad._enable()
+                browser.ask(push)
+
+            browser.keep(press, lambda: None, "state.driving")
             time.sleep(0.5)
             browser.ask("window.pad = null; 0")
             browser.wait("!state.driving && byId('pad').hidden")

@@ -97,8 +97,9 @@ class Knowledge:
             return "the page does not say what it has shown: reload it"
         if sight.state > LATE_SECONDS:
             return f"line too slow for driving: {sight.state:.2g} s"
-        age = "unknown" if sight.picture == float("inf") else f"{sight.picture:.2g} s"
-        return f"the picture on the page is stale: {age}"
+        if sight.picture == float("inf"):
+            return "the page shows no picture yet: press again when it does"
+        return f"the picture on the page is stale: {sight.picture:.2g} s"
 
 
 def refusal(verb: str, mode: str, known: Knowledge) -> str:

@@ -37,7 +37,7 @@ def page(tab, running):
     session.arm._q[:] = session.problem.start
     tab.call("Page.reload")
     time.sleep(0.3)
-    tab.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble")
+    tab.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble && picture")
     tab.press("r")
     return tab
 

@@ -21,7 +21,7 @@ def running():
 @pytest.fixture(scope="module")
 def page(browser, running):
     browser.open(running.server.url)
-    browser.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble")
+    browser.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble && picture")
     return browser
 
 

@@ -141,6 +141,8 @@ def test_a_page_that_does_not_say_what_it_shows_or_shows_old_pictures_drives_not
         for number, stamp in enumerate((-1.0, 1e300, float("nan"), "now", True, None)):
             pilot.page.say(name="jog", direction=1.0, press=100 + number, seen=stamp, picture=stamp)
             assert pilot.look(0.1)["level"] == "refusal"
+        pilot.page.say(name="jog", direction=1.0, press=110, seen=pilot._seen, picture=None)
+        assert pilot.look(0.2)["message"] == "refused: the page shows no picture yet: press again when it does"
         old = pilot._state["stamp"] - 0.7
         pilot.page.say(name="jog", direction=1.0, press=91, seen=pilot._seen, picture=old)
         assert "the picture on the page is stale: 0.7" in pilot.look(0.2)["message"]
