@@ -49,8 +49,9 @@ def motion_taken(world: World, a: Vector, b: Vector) -> bool:
 
 def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
     """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
-    enough = known is not None and known.proven and known.clearance >= world.settings.kept
-    proof = known if enough else world.prove(rows)
+    proof = known
+    if proof is None or not proof.proven or proof.clearance < world.settings.kept:
+        proof = world.prove(rows)
     if proof.proven:
         margins = "its margins and " if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
         kept = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""

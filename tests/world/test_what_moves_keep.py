@@ -1,6 +1,7 @@
 """Whatever moves in a world keeps what the world keeps: every function that makes motions, judged by coal alone."""
 
 import inspect
+from itertools import pairwise
 
 import coal
 import numpy as np
@@ -16,9 +17,9 @@ ROUNDING = 1e-6  # [m]
 SHARES = np.linspace(0.0, 1.0, 8)
 
 UR5 = rrtik.load_robot("ur5")
-LINE = pin.SE3(UR5.fk(HERE).rotation, UR5.fk(HERE).translation + [0.0, 0.3, 0.0])
-POST = tuple(UR5.fk(0.5 * (HERE + THERE)).translation + [0.0, 0.0, 0.3]), (0.06, 0.06, 0.8)
-BLOCK = tuple(UR5.fk(HERE).translation + [0.06, 0.15, -0.018]), (0.06, 0.06, 0.06)  # some 3 cm beside the line
+LINE = pin.SE3(UR5.fk(HERE).rotation, np.add(UR5.fk(HERE).translation, [0.0, 0.3, 0.0]))
+POST = np.add(UR5.fk(0.5 * (HERE + THERE)).translation, [0.0, 0.0, 0.3]), (0.06, 0.06, 0.8)
+BLOCK = np.add(UR5.fk(HERE).translation, [0.06, 0.15, -0.018]), (0.06, 0.06, 0.06)  # some 3 cm beside the line
 LIMITS = rrtik.RateLimits([1.0] * 6, [5.0] * 6)
 
 
@@ -131,7 +132,7 @@ def least(rows, thing):
     place, size = thing
     box, there = coal.Box(*size), coal.Transform3s(np.eye(3), np.asarray(place))
     found = np.inf
-    for a, b in zip(rows[:-1], rows[1:], strict=True):
+    for a, b in pairwise(rows):
         for q in UR5.pinocchio_configuration(a + SHARES[:, None] * (b - a)):
             pin.updateGeometryPlacements(model, data, links, placed, q)
             for link, pose in zip(links.geometryObjects, placed.oMg, strict=True):
