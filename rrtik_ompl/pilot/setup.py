@@ -99,7 +99,7 @@ def open_session(options: SessionOptions) -> OpenSession:
     master = None if options.master is None else _line_arm(problem, options.master, "--master")
     session = Session(
         problem, arm, record=record, seed=options.seed, past=past, structure=_structure(vehicle), master=master,
-        patience=None if vehicle is None else vehicle.patience,
+        patience=_patience(vehicle),
     )  # fmt: skip
     simulated = [each for each in (arm, source) if isinstance(each, SimulatedArm | SimulatedSource)]
     closing, reports = [perception.close, record.close], perception.reports()
@@ -147,6 +147,11 @@ def _structure(vehicle: SimulatedVehicle | None) -> Structure | None:
     if vehicle is None or vehicle.structure is None:
         return None
     return Structure(vehicle.structure, vehicle.places[vehicle.structure])
+
+
+def _patience(vehicle: SimulatedVehicle | None) -> float | None:
+    """For how long routes stand on what is out of view [s]; None for what the session takes."""
+    return None if vehicle is None else vehicle.patience
 
 
 def _perception(

@@ -40,12 +40,10 @@ def depth(plate, rows):
 
 def plate_below(depth_there):
     """A plate into which the bar reaches so deep at Q."""
-    low, high = -0.5, 0.0
+    low, high, at = -0.5, 0.0, ROBOT.fk(Q).act(AHEAD.translation)
     for _ in range(40):
         middle = 0.5 * (low + high)
-        plate = Obstacle(
-            "plate", Box([0.3, 0.3, 0.1]), pose(np.add(ROBOT.fk(Q).act(AHEAD.translation), [0, 0, middle]))
-        )
+        plate = Obstacle("plate", Box([0.3, 0.3, 0.1]), pose(at + np.array([0.0, 0.0, middle])))
         low, high = (low, middle) if depth(plate, Q[None]) > depth_there else (middle, high)
     return plate
 
