@@ -89,7 +89,7 @@ def test_every_solid_is_in_the_picture(crane: Robot, scene: Scene) -> None:
     paths = set(window.paths)
     drawn = {path.split("/")[3] for path in paths if path.startswith("/meshcat/obstacles/")}
     assert drawn == {node_name(o.name) for o in scene.obstacles}
-    assert "/meshcat/robot/:spin/:attached hook" in paths
+    assert "/meshcat/robot/:spin/held:hook" in paths
     joints = {path.split("/")[3] for path in paths if path.startswith("/meshcat/robot/")}
     assert joints == {node_name(name) for name in crane.model.names}
     assert {p.split("/")[3] for p in paths if p.startswith("/meshcat/later/")} == {":buoy", ":door"}

@@ -42,12 +42,17 @@ class Part:
 
 
 def node_name(name: str) -> str:
-    """A name as one step of a path in the scene tree.
+    """A name as one step of a path in the scene tree; different names are different steps.
 
     It begins with a colon, as the viewer keeps nodes in objects of JavaScript's, which have names such as
     ``constructor`` of their own.
     """
-    return ":" + name.replace("/", "|")
+    return ":" + name.replace("%", "%25").replace("/", "%2F")
+
+
+def held_node_name(name: str) -> str:
+    """The same for what is held, which hangs on the same node as the links of a joint."""
+    return "held" + node_name(name)
 
 
 def joint_nodes(robot: Robot) -> list[str]:
@@ -95,7 +100,7 @@ def attached_parts(robot: Robot, attached: Sequence[AttachedObject]) -> list[Par
             )
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         placement = (frame.placement * item.pose).homogeneous
-        name = node_name(f"attached {item.name}")
+        name = held_node_name(item.name)
         parts.append(Part(name, frame.parentJoint, placement, look_of_shape(item.shape), palette.ATTACHED))
     return parts
 
