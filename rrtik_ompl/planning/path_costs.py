@@ -18,7 +18,7 @@ from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
 from rrtik_ompl.robot import Robot
 from rrtik_ompl.transitions import route_length
-from rrtik_ompl.world.clearance_curve import clearance_along
+from rrtik_ompl.world.clearance_curve import distances_at, places_along
 
 NEAREST = 1e-3  # [m] clearances below this cost no more
 DOUBLE = 0.05  # [m] the clearance at which a piece of a path counts double
@@ -45,11 +45,13 @@ def weighted_length(path: JointPath, problem: Problem) -> float:
 
     The clearance is proven at 240 places on the path, so the true one is no smaller.
     """
-    curve, rows = clearance_along(problem.world, path.waypoints), path.waypoints
+    rows = path.waypoints
+    motions, shares, places = places_along(problem.world, rows)
+    distances = distances_at(problem.world, places)
     lengths = np.append(np.linalg.norm(np.diff(rows * _weights(problem), axis=0), axis=1), 0.0)
-    ends = np.append(np.where(curve.motions[1:] == curve.motions[:-1], curve.shares[1:], 1.0), 1.0)
-    pieces = lengths[np.minimum(curve.motions, len(lengths) - 1)] * (ends - curve.shares)
-    return float(pieces @ (1.0 + DOUBLE / np.maximum(curve.distances, NEAREST)))
+    ends = np.append(np.where(motions[1:] == motions[:-1], shares[1:], 1.0), 1.0)
+    pieces = lengths[np.minimum(motions, len(lengths) - 1)] * (ends - shares)
+    return float(pieces @ (1.0 + DOUBLE / np.maximum(distances, NEAREST)))
 
 
 COSTS: Mapping[PathObjective, PathCost] = MappingProxyType(

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.arrays import Matrix, Vector, frozen
-from rrtik_ompl.world import World
+from rrtik_ompl.world import Proof, World
+from rrtik_ompl.world.proof import Gap
 
 PLACES = 240  # on a path, beside its waypoints
 NEAREST, FARTHEST = 1e-5, 2.0  # [m] of clearances that are told apart
 STEPS = 255  # between these two, in equal ratios: one is 5 % more than the one before
+NOT_PROVEN = -1  # the level of a place that is not even proven free
+LEVELS = frozen(np.append(0.0, np.geomspace(NEAREST, FARTHEST, STEPS)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,15 +53,78 @@ class ClearanceCurve:
         )
 
 
-def clearance_along(world: World, waypoints: Matrix) -> ClearanceCurve:
-    """The curve of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves.
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """A motion in pieces, such as those between the waypoints of a path, and how it is proven.
 
-    Clearances between the places are not looked at; proofs of whole motions say what is kept there.
+    Attributes:
+        motions: Number of the piece of each place that is looked at, shape (m,).
+        shares: Where on it, from 0 to 1, shape (m,).
+        at: The configurations, shape (k, dof), at some numbers and shares, shape (k,) each.
+        prove: Proves all of it with a clearance [m]; its gaps are numbered by the pieces.
     """
-    motions, shares, places = places_along(world, waypoints)
-    distances, pairs = _distances(world, places)
-    unproven = tuple(gap.motion for gap in world.prove(waypoints).unproven)
-    return ClearanceCurve(motions, frozen(shares), frozen(distances), pairs, unproven)
+
+    motions: NDArray[np.int64]
+    shares: Vector
+    at: Callable[[NDArray[np.int64], Vector], Matrix]
+    prove: Callable[[float], Proof]
+
+
+def clearance_along(world: World, waypoints: Matrix) -> ClearanceCurve:
+    """The curve of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves."""
+    return clearance_on(world, course_along(world, waypoints))
+
+
+def course_along(world: World, waypoints: Matrix) -> Course:
+    """A path, waypoints of shape (k, dof), as a course; a single one is a motion that stands still."""
+    rows = np.vstack([waypoints, waypoints]) if len(waypoints) == 1 else waypoints
+    motions, shares, _ = places_along(world, rows)
+    return Course(motions, shares, partial(_between, rows), lambda clearance: world.prove(rows, clearance=clearance))
+
+
+def clearance_on(world: World, course: Course) -> ClearanceCurve:
+    """The curve of a course.
+
+    The least distance is that of the whole course, as far as it is proven free, and not of the places alone: proofs
+    with larger clearances name the places at which these are not kept, and so does the one without.
+    """
+    proof = course.prove(0.0)
+    unproven = tuple(gap.motion for gap in proof.unproven)
+    kept, pairs = _kept_at(world, course.at(course.motions, course.shares))
+    certain = kept[~np.isin(course.motions, unproven)]
+    gaps = [(gap, NOT_PROVEN) for gap in proof.unproven]
+    gaps += _nearer(course, int(certain.min()), set(unproven)) if certain.size else []
+    gaps = [(gap, level) for gap, level in gaps if np.isfinite(gap.share)]
+    if gaps:
+        kept = np.append(kept, [level for _, level in gaps])
+        pairs = (*pairs, *((gap.first, gap.second) for gap, _ in gaps))
+        motions = np.append(course.motions, [gap.motion for gap, _ in gaps])
+        shares = np.append(course.shares, [gap.share for gap, _ in gaps])
+        order = np.lexsort((shares, motions))
+        kept, pairs = kept[order], tuple(pairs[k] for k in order)
+        course = replace(course, motions=motions[order], shares=shares[order])
+    distances = LEVELS[np.maximum(kept, 0)]
+    return ClearanceCurve(course.motions, frozen(course.shares), frozen(distances), pairs, unproven)
+
+
+def _nearer(course: Course, least: int, unproven: set[int]) -> list[tuple[Gap, int]]:
+    """Where the proven pieces are nearest, and the level that is proven there; nothing if all keep what places keep.
+
+    Args:
+        course: The course.
+        least: Number of the level that all places on proven pieces keep.
+        unproven: Numbers of the pieces that are not proven free.
+    """
+    gaps: list[Gap] = []
+    proven, refused, tried = 0, least + 1, least
+    while refused - proven > 1:
+        short = [gap for gap in course.prove(float(LEVELS[tried])).unproven if gap.motion not in unproven]
+        if short:
+            refused, gaps = tried, short
+        else:
+            proven = tried
+        tried = (proven + refused) // 2
+    return [(gap, proven) for gap in gaps]
 
 
 def places_along(world: World, waypoints: Matrix) -> tuple[NDArray[np.int64], Vector, Matrix]:
@@ -70,22 +138,32 @@ def places_along(world: World, waypoints: Matrix) -> tuple[NDArray[np.int64], Ve
     counts = np.maximum(np.ceil(PLACES * travel / max(float(travel.sum()), 1e-300)), 1.0).astype(np.int64)
     motions = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
     shares = np.append(np.concatenate([np.arange(n) / n for n in counts]), 1.0)
-    return motions, shares, (1.0 - shares)[:, None] * rows[motions] + shares[:, None] * rows[motions + 1]
+    return motions, shares, _between(rows, motions, shares)
 
 
-def _distances(world: World, places: Matrix) -> tuple[Vector, tuple[tuple[str, str], ...]]:
-    """The largest of the distances told apart that each configuration, shape (m, dof), is proven to keep; the pair."""
-    levels = np.append(0.0, np.geomspace(NEAREST, FARTHEST, STEPS))
-    kept, refused = np.full(len(places), -1), np.full(len(places), len(levels))
+def distances_at(world: World, places: Matrix) -> Vector:
+    """What each configuration, shape (m, dof), is proven to keep from obstacles, of the distances told apart [m]."""
+    return np.asarray(LEVELS[np.maximum(_kept_at(world, places)[0], 0)])
+
+
+def _between(rows: Matrix, motions: NDArray[np.int64], shares: Vector) -> Matrix:
+    """Configurations on the motions between waypoints, shape (m, dof)."""
+    found: Matrix = (1.0 - shares)[:, None] * rows[motions] + shares[:, None] * rows[motions + 1]
+    return found
+
+
+def _kept_at(world: World, places: Matrix) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
+    """The largest level that each configuration, shape (m, dof), is proven to keep, -1 for none; the nearest pair."""
+    kept, refused = np.full(len(places), -1), np.full(len(places), len(LEVELS))
     pairs = [("", "")] * len(places)
     while (open_ := np.flatnonzero(refused - kept > 1)).size:
         tried = (kept[open_] + refused[open_]) // 2
         for level in np.unique(tried).tolist():
             group = open_[tried == level]
-            gaps = world.prover.still_gaps(places[group], clearance=float(levels[level]))
+            gaps = world.prover.still_gaps(places[group], clearance=float(LEVELS[level]))
             far = np.ones(len(group), dtype=bool)
             for gap in gaps:
                 far[gap.motion] = False
                 pairs[group[gap.motion]] = (gap.first, gap.second)
             kept[group[far]], refused[group[~far]] = level, level
-    return levels[np.maximum(kept, 0)], tuple(pairs)
+    return kept, tuple(pairs)
