@@ -287,11 +287,16 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
         sliding = None if units is None else [unit == "m" for unit in units]
         turning = None if names is None or endless is None else [joint in endless for joint in names]
         found = JointPath(document["waypoints"], names, sliding, name, turning)
-        return found if robot is None else _fitted(found, robot)
+        return found if robot is None else fitted(found, robot)
     except InputError as error:
         raise in_file(path, error) from None
 
 
-def _fitted(path: JointPath, robot: Robot) -> JointPath:
+def fitted(path: JointPath, robot: Robot) -> JointPath:
+    """A path as one of a robot, onto whose limits it is put.
+
+    Raises:
+        InputError: If it moves other joints, or names them in another order; names that nobody gave do not count.
+    """
     require_joints(robot, path.joint_names, "path")
     return JointPath.of(robot, path.waypoints)

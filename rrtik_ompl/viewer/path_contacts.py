@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.collision.contacts import Contact
 from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import places_along
@@ -36,7 +36,11 @@ def contacts_along(world: World, waypoints: Matrix) -> tuple[PathContact, ...]:
     is no check of it.
     """
     motions, shares, places = places_along(world, waypoints)
-    at = motions + shares
+    return contacts_at(world, motions + shares, places)
+
+
+def contacts_at(world: World, at: Vector, places: Matrix) -> tuple[PathContact, ...]:
+    """The contacts at configurations, shape (m, dof), that stand at places, shape (m,), in their order."""
     bad = np.flatnonzero(~world.valid_batch(places))
     touching = {int(k): found for k in bad if (found := world.contacts(places[k]))}
     names = {k: frozenset(name for c in found for name in (c.first, c.second)) for k, found in touching.items()}

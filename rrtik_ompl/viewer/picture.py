@@ -45,7 +45,7 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
         draw_goal(vis, subject.goal, frame)
         draw_constraints(vis, subject.held, frame)
         if len(subject.waypoints) > 1:
-            doubtful = () if subject.curve is None else subject.curve.unproven
+            doubtful = () if subject.verdict is None else subject.verdict.unproven
             beads = subject.run is None and subject.times is None
             goal = subject.goal
             arms = [arm for arm, _ in goal.each(robot)] if isinstance(goal, MultiGoal) else [robot]

@@ -7,6 +7,7 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from rrtik_ompl.arrays import Matrix, Vector
 from rrtik_ompl.poses import pose_row
@@ -31,7 +32,7 @@ def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[
     return {
         "groups": _motions(run.ticks) if run.planner == TASK else _groups(run.ticks),
         "outcome": run.outcome + (f": {run.reason}" if run.reason else ""),
-        "moving": {node_name(name): _places(scene.obstacle(name), run.ticks, frame) for name in moved},
+        "moving": {node_name(name): _places(scene.obstacle(name), run, frame) for name in moved},
         "lines": lines,
         "line": numbers,
         "replaced": _replaced(run, numbers),
@@ -56,12 +57,23 @@ def _motions(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     return [{**group, "event": "motion", "text": group["reason"]} for group in _groups(ticks)]
 
 
-def _places(obstacle: Obstacle, ticks: list[Tick], frame: Frame) -> dict[str, Any]:
+def _places(obstacle: Obstacle, run: ReplanRun, frame: Frame) -> dict[str, Any]:
     """Where an obstacle is drawn in its own frame, and where that frame is in each tick."""
     _, own = obstacle_look(obstacle, frame)
-    rest = pose_row(obstacle.pose)
-    poses = np.array([tick.poses.get(obstacle.name, rest) for tick in ticks])
+    poses = [pose_row(place) for place in _stated(obstacle.name, run)] or [
+        tick.poses.get(obstacle.name, pose_row(obstacle.pose)) for tick in run.ticks
+    ]
     return {"placement": own.ravel().tolist(), "poses": np.round(poses, DIGITS).tolist()}
+
+
+def _stated(name: str, run: ReplanRun) -> list[pin.SE3]:
+    """Where an obstacle is in each tick by its own motion, if the scene of the run states one."""
+    if not run.scenes or not run.scenes[0].stated:
+        return []
+    obstacle = run.scenes[0].scene.obstacle(name)
+    if obstacle.motion is None:
+        return []
+    return [obstacle.motion.pose_at(obstacle.pose, tick.time) for tick in run.ticks]
 
 
 def _lines(run: ReplanRun, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:

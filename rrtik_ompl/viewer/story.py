@@ -25,6 +25,7 @@ from rrtik_ompl.viewer.page_tips import tip_entry
 from rrtik_ompl.viewer.path_contacts import PathContact
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
+from rrtik_ompl.viewer.verdict import Verdict
 from rrtik_ompl.world.clearance_curve import FARTHEST, ClearanceCurve
 
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
@@ -54,6 +55,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "moves": [] if robot is None else _moves(subject.waypoints),
         "times": [] if robot is None else _numbers(_times(subject, robot, frame)),
         "timed": subject.times is not None,
+        "proof": None if subject.verdict is None else _proof(subject.verdict),
         "clearance": None if robot is None or subject.curve is None else _clearance(subject.curve),
         "contacts": [] if robot is None else [_contact(contact, robot, subject.scene) for contact in subject.contacts],
         "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene, frame),
@@ -75,8 +77,12 @@ def _clearance(curve: ClearanceCurve) -> dict[str, Any]:
         "distances": [round(d, DIGITS) if ok else None for d, ok in zip(curve.distances.tolist(), near, strict=True)],
         "pairs": [list(pair) for pair in curve.pairs],
         "least": curve.least,
-        "unproven": list(curve.unproven),
     }
+
+
+def _proof(verdict: Verdict) -> dict[str, Any]:
+    """What is proven, and the numbers of the moves that are not."""
+    return {"proven": verdict.proven, "text": verdict.text, "unproven": list(verdict.unproven)}
 
 
 def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]:

@@ -12,16 +12,18 @@ from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.goal import Goal, JointGoal, MultiGoal
-from rrtik_ompl.path import JointPath
+from rrtik_ompl.path import JointPath, fitted
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.robot import Robot, require_joints
 from rrtik_ompl.scene import Scene
 from rrtik_ompl.trajectory import Trajectory
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.fingers import Fingers
-from rrtik_ompl.viewer.path_contacts import PathContact, contacts_along
+from rrtik_ompl.viewer.path_contacts import PathContact
+from rrtik_ompl.viewer.run_verdict import judged_run
+from rrtik_ompl.viewer.verdict import Judged, Verdict, frames_of, judged_motion, judged_path
 from rrtik_ompl.world import World
-from rrtik_ompl.world.clearance_curve import ClearanceCurve, clearance_along
+from rrtik_ompl.world.clearance_curve import ClearanceCurve
 
 
 class HasWorld(Protocol):
@@ -47,6 +49,7 @@ class Subject:
         ghosts: Configurations drawn like tinted glass, shape (m, dof), or None.
         marks: Further bodies.
         run: The run whose ticks the waypoints are, or None.
+        verdict: What is proven of the motion that is played; None where there is none, or no world for it.
         curve: How far the path stays from obstacles, or None if that is not known.
         times: When the waypoints of a timed motion are reached [s], shape (k,), or None.
         held: Regions of path constraints, and the configurations, shape (dof,), in which they begin to be held.
@@ -64,6 +67,7 @@ class Subject:
     ghosts: Matrix | None = None
     marks: tuple[Mark, ...] = ()
     run: ReplanRun | None = None
+    verdict: Verdict | None = None
     curve: ClearanceCurve | None = None
     times: Vector | None = None
     held: tuple[tuple[HeldRegion, Vector], ...] = ()
@@ -122,9 +126,6 @@ class Shown:
 Showable: TypeAlias = HasWorld | Shown | World | Robot | Scene
 ShownPath: TypeAlias = JointPath | Trajectory | ArrayLike
 
-FRAME_RATE = 30.0  # [1/s] of a timed motion
-MOST_FRAMES = 900
-
 
 def _drawn(marks: tuple[Mark, ...]) -> tuple[Mark, ...]:
     """The marks that have something to draw."""
@@ -167,32 +168,62 @@ def subject_of(
         if not isinstance(getattr(world, "robot", None), Robot) or not isinstance(getattr(world, "scene", None), Scene):
             raise InputError(f"view: cannot show a {type(shown).__name__}; give a problem, world, robot or scene")
         robot, scene = world.robot, world.scene
-    goal, regions = getattr(shown, "goal", None), _held(getattr(shown, "world", shown))
+    subject = _posture(shown, robot, scene)
+    if ghosts is not None:
+        subject = replace(subject, ghosts=_waypoints(robot, ghosts))
+    subject = replace(subject, marks=marks)
+    if path is None:
+        return subject
+    earlier = None if before is None else _waypoints(robot, before)
+    return replace(_moving(subject, getattr(shown, "world", shown), path), before=earlier)
+
+
+def _posture(shown: Any, robot: Robot, scene: Scene) -> Subject:
+    """A robot at its start, and its goal."""
     named = getattr(shown, "name", "problem")
     name = robot.name if named == "problem" else str(named)
-    tinted = None if ghosts is None else _waypoints(robot, ghosts)
-    if path is not None:
-        earlier = None if before is None else _waypoints(robot, before)
-        times, path = _timed(robot, path)
-        rows = _waypoints(robot, path)
-        curve = _curve(getattr(shown, "world", shown), rows)
-        touching = _contacts(shown, rows, curve)
-        held = tuple((region, rows[0]) for region in regions)
-        return Subject(
-            name, robot, scene, goal, rows, True, earlier, tinted, marks, None, curve, times, held, contacts=touching
-        )
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
-    held = tuple((region, posture) for region in regions)
-    rows = frozen(posture[None])
+    world = getattr(shown, "world", shown)
+    regions = () if not isinstance(world, World) or world.constraints is None else world.constraints.regions
     return Subject(
-        name, robot, scene, goal, rows, False, None, tinted, marks, held=held, contacts=_contacts(shown, rows)
+        name,
+        robot,
+        scene,
+        getattr(shown, "goal", None),
+        frozen(posture[None]),
+        False,
+        held=tuple((region, posture) for region in regions),
+        contacts=shown.contacts if isinstance(shown, Shown) else (),
     )
 
 
-def _held(world: object) -> tuple[HeldRegion, ...]:
-    """The regions of path constraints that a world holds."""
-    return () if not isinstance(world, World) or world.constraints is None else world.constraints.regions
+def _moving(subject: Subject, world: object, path: ShownPath) -> Subject:
+    """A subject on a path or a timed motion, and what is proven of that in its world, if it has one."""
+    robot = subject.robot
+    assert robot is not None, "a path has one"
+    judged: Judged | None = None
+    times: Vector | None = None
+    if isinstance(path, Trajectory):
+        require_joints(robot, path.joint_names, "trajectory")
+        if isinstance(world, World):
+            times, judged = judged_motion(world, path)
+        else:
+            times = frames_of(path, np.empty(0))
+        rows = frozen(path(times).positions)
+    else:
+        rows = _waypoints(robot, path)
+        judged = judged_path(world, rows) if isinstance(world, World) else None
+    found = replace(
+        subject,
+        waypoints=rows,
+        is_path=True,
+        times=times,
+        held=tuple((region, rows[0]) for region, _ in subject.held),
+    )
+    if judged is None:
+        return found
+    return replace(found, verdict=judged.verdict, curve=judged.curve, contacts=judged.contacts)
 
 
 def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
@@ -201,55 +232,42 @@ def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
     Raises:
         InputError: If it is no run, or not one of that problem's robot.
     """
+    subject = played(problem, run)
+    scene = run.scenes[0].scene if run.scenes else subject.scene  # a feed may begin elsewhere than the problem
+    scene = replace(subject.scene, obstacles=tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles))
+    for name in {name for tick in run.ticks for name in tick.poses}:
+        scene.obstacle(name)  # or it is a run of another problem
+    judged = judged_run(problem, run)
+    return replace(subject, scene=scene, verdict=judged.verdict, contacts=judged.contacts)
+
+
+def played(shown: Showable, run: ReplanRun) -> Subject:
+    """A robot that is where it was in each tick of a run, in the scene that it is shown in.
+
+    Raises:
+        InputError: If it is no run, or not one of that robot.
+    """
     require(run, ReplanRun, "run to show", "use replan() or load_run(file)")
     if len(run.ticks) == 0:
         raise InputError("run to show: it has no tick")
-    robot = subject_of(problem).robot
+    subject = subject_of(shown)
+    robot, rows = subject.robot, run.configurations
     if robot is None or robot.joint_names != run.joint_names:
         raise InputError(f"run to show: one of robot '{run.robot}' with other joints; give the problem that was run")
-    shown = replace(subject_of(problem, run.configurations[:1]), waypoints=_waypoints(robot, run.configurations))
-    scene = shown.scene
-    still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
-    for name in {name for tick in run.ticks for name in tick.poses}:
-        scene.obstacle(name)  # or it is a run of another problem
-    return replace(shown, scene=replace(scene, obstacles=still), run=run, contacts=())
-
-
-def _curve(world: object, rows: Matrix) -> ClearanceCurve | None:
-    """The clearance along a path of a world that has obstacles and in which something is proven."""
-    if not isinstance(world, World) or len(rows) < 2 or not world.scene.obstacles:
-        return None
-    found = clearance_along(world, rows)
-    return found if any(first for first, _ in found.pairs) else None
-
-
-def _contacts(shown: Showable, rows: Matrix, curve: ClearanceCurve | None = None) -> tuple[PathContact, ...]:
-    """Where bodies touch along a path, or in a posture that is known to be one in collision."""
-    if isinstance(shown, Shown):
-        return shown.contacts
-    world = getattr(shown, "world", shown)
-    proven = curve is not None and not curve.unproven
-    return contacts_along(world, rows) if isinstance(world, World) and len(rows) > 1 and not proven else ()
-
-
-def _timed(robot: Robot, path: ShownPath) -> tuple[Vector | None, ShownPath]:
-    """Times and frames of a timed motion; a path has no times."""
-    if not isinstance(path, Trajectory):
-        return None, path
-    require_joints(robot, path.joint_names, "trajectory")
-    count = int(np.clip(np.ceil(FRAME_RATE * path.duration), 2, MOST_FRAMES))
-    clock = np.linspace(0.0, path.duration, count + 1)
-    return clock, path(clock).positions
+    held = tuple((region, rows[0]) for region, _ in subject.held)
+    return replace(subject, waypoints=_waypoints(robot, rows), is_path=True, run=run, held=held)
 
 
 def _waypoints(robot: Robot, path: ShownPath) -> Matrix:
+    """The waypoints of a path, shape (k, dof); one that names its joints names those of the robot."""
     given: Any = path
-    if isinstance(path, JointPath | Trajectory):
-        require_joints(robot, path.joint_names, "path")
+    for part in ("path", "trajectory", "run"):
+        if isinstance(getattr(given, part, None), JointPath | Trajectory | ReplanRun):
+            raise InputError(f"view: cannot play a {type(given).__name__}; give its {part}")
     rows = finite_array(getattr(given, "waypoints", given), (None, None), "path")
     if len(rows) == 0 or rows.shape[1] != robot.dof:
         raise InputError(
             f"path: robot '{robot.name}' has {robot.dof} joints ({', '.join(robot.joint_names)}), "
             f"but the path has shape {rows.shape}"
         )
-    return frozen(rows)
+    return fitted(path, robot).waypoints if isinstance(path, JointPath) else frozen(rows)

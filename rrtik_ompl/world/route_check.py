@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.errors import InputError
+from rrtik_ompl.scene import Scene
 from rrtik_ompl.transitions import in_parts, subdivided
 from rrtik_ompl.world import FINEST_RESOLUTION, Proof, World
 
@@ -47,6 +48,13 @@ def motion_taken(world: World, a: Vector, b: Vector) -> bool:
     return not route_violations(world, np.stack([a, b]), verification_resolution(world))
 
 
+def as_it_stands(scene: Scene) -> str:
+    """A clause for what is said of a scene as if it stood still: "" where nothing in it moves by itself."""
+    if all(obstacle.motion is None for obstacle in scene.obstacles):
+        return ""
+    return ", with moving obstacles as they stand at time 0 (replan and plan_in_time go by their motion)"
+
+
 def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
     """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
     proof = known
@@ -55,11 +63,12 @@ def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
     if proof.proven:
         margins = "its margins and " if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
         kept = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""
-        return f"proven free at every configuration{kept}"
+        return f"proven free at every configuration{kept}{as_it_stands(world.scene)}"
     sampled, first = len(proof.unproven), proof.unproven[0]
     where = f", first motion {first.motion + 1}" + (f" ('{first.first}' and '{first.second}')" if first.second else "")
     step = f"checked every {1e3 * verification_resolution(world):g} mm"
-    return f"{proof.motions - sampled} of {proof.motions} motions proven free, the others {step}{where}"
+    proven = f"{proof.motions - sampled} of {proof.motions} motions proven free"
+    return f"{proven}, the others {step}{where}{as_it_stands(world.scene)}"
 
 
 def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Violation, ...]:

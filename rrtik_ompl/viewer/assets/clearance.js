@@ -1,4 +1,4 @@
-// The distance from obstacles along the path: a curve with the present place, the least value, and what is not proven.
+// The distance from obstacles along the path: a curve with the present place, the least value, and what is not proven; and what is proven, in words.
 const CURVE = { left: 56, right: 382, top: 8, bottom: 68 };
 const DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1];  // [m]
 
@@ -12,8 +12,16 @@ function drawn(tag, attributes, text = "") {
 
 const millimetres = (metres) => `${Number((1000 * metres).toPrecision(3))} mm`;
 
+/** What the library says of the motion that is played. */
+function sayProof() {
+  document.getElementById("proof-section").hidden = false;
+  const note = document.getElementById("proof-note");
+  note.textContent = story.proof.text;
+  note.className = story.proof.proven ? "proven" : "doubtful";
+}
+
 function buildClearance(goTo) {
-  const { motions, shares, distances, pairs, least, unproven } = story.clearance;
+  const { motions, shares, distances, pairs, least } = story.clearance;
   const total = story.times[story.times.length - 1] || 1;
   const timeAt = (k) => story.times[motions[k]] + shares[k] * (story.times[motions[k] + 1] - story.times[motions[k]]);
   const far = Math.max(...distances.map((d) => d ?? 0), 1e-3);
@@ -24,9 +32,7 @@ function buildClearance(goTo) {
   const height = (d) => Math.log(Math.min(Math.max(d ?? high, low), high) / low) / Math.log(high / low);
   const y = (d) => CURVE.bottom - (CURVE.bottom - CURVE.top) * height(d);
   document.getElementById("clearance-section").hidden = false;
-  document.getElementById("clearance-note").textContent =
-    `from obstacles${unproven.length ? `; ${count(unproven.length, "move")} not proven free (violet)` : "; every move is proven free"}`;
-  for (const k of unproven) {
+  for (const k of story.proof.unproven) {
     const [begin, end] = [x(story.times[k]), x(story.times[k + 1])];
     drawn("rect", { class: "unproven", x: begin, width: end - begin, y: CURVE.top, height: CURVE.bottom - CURVE.top });
   }

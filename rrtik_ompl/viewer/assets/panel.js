@@ -185,7 +185,7 @@ function buildLegend() {
     addSwitch("way gone", colors.trail, 0.45, toggles("trail"), false);
   } else if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
   if (story.contacts.length) addSwitch("in collision", colors.touching, 1, (on) => setVisible(["contact"], on));
-  if (story.clearance && story.clearance.unproven.length) addSwitch("not proven free", colors.unproven, 1, () => {});
+  if (story.proof && story.proof.unproven.length) addSwitch("not proven free", colors.unproven, 1, () => {});
   if (story.before) addSwitch(`before: ${story.before}`, colors.before, 1, toggles("before"), true, "wide");
   if (story.attached.length) addSwitch(`held: ${story.attached.join(", ")}`, colors.attached, 1, () => {});
   if (story.obstacles.length) {

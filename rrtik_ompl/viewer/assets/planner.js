@@ -98,6 +98,7 @@ function replacePath(rows) {
   story.times = rows.length ? pathTimes(rows) : [];
   drawTrail(rows);
   document.getElementById("clearance-section").hidden = true;
+  document.getElementById("proof-section").hidden = true;
   showClearance = () => {};
   newPath();
   askOpinion();

@@ -156,6 +156,7 @@ function followAddress() {
 if (robot) {
   buildJoints();
   addPlayer();
+  if (story.proof) sayProof();
   if (story.moves.length) {
     if (run) buildEvents(goTo);
     if (story.clearance) showClearance = buildClearance(goTo);

@@ -1,0 +1,41 @@
+"""What the library says of a run: what its record calls proven, and what touches when it is judged anew."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.collision.contacts import Contact
+from rrtik_ompl.errors import InputError
+from rrtik_ompl.problem import Problem
+from rrtik_ompl.replanning.judge import RunViolation
+from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.viewer.path_contacts import PathContact
+from rrtik_ompl.viewer.verdict import Judged, Verdict
+
+NOWHERE = np.full(3, np.nan)
+
+
+def judged_run(problem: object, run: ReplanRun) -> Judged:
+    """The verdict on a run: only a problem has the world in which it is judged anew."""
+    made, proven = run.moves
+    unproven = {k for k, tick in enumerate(run.ticks) if tick.proven is False}
+    text = f"{proven} of {made} moves proven free when they were made" if made else "no move of it is called proven"
+    found: tuple[RunViolation, ...] = ()
+    if isinstance(problem, Problem):
+        try:
+            found = run.violations(problem)
+            text += "; judged anew: " + (f"{len(found)} faults, the first: {found[0]}" if found else "no fault")
+        except InputError as error:
+            text += f"; not judged anew: {error}"
+    unproven |= {each.tick for each in found}
+    ticks = len(run.ticks)
+    drawn = tuple(sorted({min(k, ticks - 2) for k in unproven} if ticks > 1 else ()))
+    contacts = tuple(_contact(each) for each in found)
+    return Judged(Verdict(made > 0 and proven == made and not found, text, drawn), None, contacts)
+
+
+def _contact(fault: RunViolation) -> PathContact:
+    """A fault as what is drawn red in its tick."""
+    contact = Contact(fault.first, fault.second, fault.distance, NOWHERE, NOWHERE, fault.kept)
+    names = frozenset((fault.first, fault.second))
+    return PathContact(float(fault.tick), float(fault.tick + 1), contact, names)
