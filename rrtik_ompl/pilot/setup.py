@@ -108,14 +108,19 @@ def open_session(options: SessionOptions) -> OpenSession:
     if isinstance(arm, LineArm):
         closing.insert(0, arm.close)
         reports["the line to the arm"] = lambda: arm.reported
-    pictures = None
-    if options.record_pictures:
-        if options.record is None:
-            raise InputError("--record-pictures: needs --record FILE, beside which the pictures are written")
-        pictures = PictureRecord(record, options.record)
+    pictures = _picture_record(options, record)
     further = _further(options, vehicle, problem, perception)
     engine = Engine(session, perception, simulated=simulated, further=further, pictures=pictures)
     return OpenSession(engine, (*closing, engine.close), reports, record)
+
+
+def _picture_record(options: SessionOptions, record: Record) -> PictureRecord | None:
+    """What writes pictures beside the record, if they are asked for."""
+    if not options.record_pictures:
+        return None
+    if options.record is None:
+        raise InputError("--record-pictures: needs --record FILE, beside which the pictures are written")
+    return PictureRecord(record, options.record)
 
 
 def _further(
