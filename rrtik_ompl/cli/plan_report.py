@@ -17,7 +17,7 @@ from rrtik_ompl.problem import Problem
 from rrtik_ompl.transitions import lower_bound
 from rrtik_ompl.units import reading, shown_unit
 from rrtik_ompl.world.clearance_curve import clearance_along
-from rrtik_ompl.world.route_check import how_checked
+from rrtik_ompl.world.route_check import as_it_stands, how_checked
 
 if TYPE_CHECKING:
     from rrtik_ompl.certificates.certificate import Certificate
@@ -218,8 +218,8 @@ def certified(problem: Problem, path: JointPath, found: Certificate) -> tuple[st
     if any(faults):
         return f"does not hold: {next(filter(None, faults))}", False
     kept = f", {1e3 * found.clearance:g} mm kept from obstacles" if found.clearance else ""
-    moves = len(found.motions)
-    return f"holds: {moves} motion{'s' * (moves != 1)} proven free{kept}, {found.entries} entries", True
+    moves, still = len(found.motions), as_it_stands(problem.world.scene)
+    return f"holds: {moves} motion{'s' * (moves != 1)} proven free{kept}, {found.entries} entries{still}", True
 
 
 def faults_of_path(problem: Problem, route: JointPath) -> list[str]:
@@ -247,10 +247,11 @@ def _too_fast(robot: Robot, motion: Trajectory) -> list[str]:
 
 def how_proven(problem: Problem, motion: Trajectory) -> str:
     """How much of a timed motion without faults is proven free, in a few words."""
-    proof = motion.prove(problem.world)
+    proof, still = motion.prove(problem.world), as_it_stands(problem.world.scene)
     if proof.proven:
-        return "proven free at every time"
-    return f"{proof.motions - len(proof.unproven)} of {proof.motions} pieces proven free, the others checked in steps"
+        return f"proven free at every time{still}"
+    proven = f"{proof.motions - len(proof.unproven)} of {proof.motions} pieces proven free"
+    return f"{proven}, the others checked in steps{still}"
 
 
 def path_lines(problem: Problem, route: JointPath, kept: str) -> list[str]:

@@ -47,6 +47,7 @@ def straight(
     from rrtik_ompl import arc, load_problem
     from rrtik_ompl import straight as follow
     from rrtik_ompl.poses import pose_from_rpy
+    from rrtik_ompl.world.route_check import as_it_stands
 
     question = load_problem(problem)
     tip = question.robot.fk(question.start)
@@ -71,7 +72,8 @@ def straight(
     if as_json:
         print(json.dumps({"fraction": made.fraction, "reason": made.reason, "waypoints": waypoints}))
     else:
-        why = f": {made.reason}" if made.reason else f", {waypoints} waypoints, proven free"
+        still = as_it_stands(question.world.scene)
+        why = f": {made.reason}" if made.reason else f", {waypoints} waypoints, proven free{still}"
         say(f"{question.name}: {100.0 * made.fraction:.4g} % of the line{why}")
         say(*(f"wrote {file}" for file in written))
         if made.path is not None:
@@ -169,8 +171,10 @@ def _document(plan: TaskPlan) -> dict[str, Any]:
 
 def _lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -> list[str]:
     """A plan for a person: a line for each motion, and its notes; ``wrong``: numbers of motions that are not valid."""
+    from rrtik_ompl.world.route_check import as_it_stands
+
     chosen = f", alternatives {', '.join(str(k + 1) for k in plan.chosen)}" if plan.chosen else ""
-    lines = [f"{name}: {len(plan.paths)} motions{chosen}"]
+    lines = [f"{name}: {len(plan.paths)} motions{chosen}{as_it_stands(plan.worlds[0].scene)}"]
     for number, (stage, path, world) in enumerate(zip(plan.stages, plan.paths, plan.worlds, strict=True)):
         names = ", ".join(item.name for item in world.scene.attached)
         proven = "not valid" if number in wrong else "proven free" if path.proven else "checked in steps"

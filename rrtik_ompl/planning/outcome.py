@@ -10,6 +10,7 @@ from rrtik_ompl.choices import ProofMode
 from rrtik_ompl.copies import as_value, in_notebook, in_one_line
 from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.route_check import as_it_stands
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +44,8 @@ class Plan:
         found: Whether there is a path.
         path: The path, or None.
         reason: A line that says why there is no path or, where not all of it is proven free, which two bodies are not
-            proven apart, where, and how far they are apart there; else "".
+            proven apart, where, and how far they are apart there (where obstacles move: as they stand at time 0); else
+            "".
         seconds: Wall time of everything: planning, restarts and re-checks [s]; without what it took to count how
             large an OMPL planner's graph has become.
         planner: Name of the planner; with "auto" of the one that found the path, or that tried last.
@@ -75,7 +77,11 @@ class Plan:
     def __post_init__(self) -> None:
         if self.path is not None:
             gaps = () if self.path.proof is None else self.path.proof.unproven
-            object.__setattr__(self, "reason", f"not proven free: {gaps[0]}" if gaps else "")
+            said = f"not proven free: {gaps[0]}" if gaps else ""
+            if self.problem is not None and gaps:
+                said += as_it_stands(self.problem.world.scene)
+            if self.problem is not None or not (gaps and self.reason.startswith(said)):  # a copy knows no scene
+                object.__setattr__(self, "reason", said)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return as_value(replace(self, problem=None))

@@ -16,7 +16,7 @@ from rrtik_ompl.errors import InputError
 from rrtik_ompl.poses import pose_row
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.timed import time_task
@@ -46,7 +46,8 @@ def subject_of_task(shown: Showable, plan: TaskPlan) -> Subject:
     kept = _kept(plan)
     run = _run(plan, rows, kept)
     places = _places(first, rows[0][1])
-    things = [*first.scene.obstacles, *(item for item in first.scene.attached if item.name not in kept)]
+    loose = [item for item in first.scene.attached if item.name not in kept]
+    things: list[Obstacle | AttachedObject] = [*first.scene.obstacles, *loose]
     scene = Scene(
         tuple(Obstacle(each.name, each.shape, places[each.name], margin=each.margin) for each in things),
         tuple(item for item in first.scene.attached if item.name in kept),

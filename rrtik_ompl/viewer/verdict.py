@@ -114,7 +114,7 @@ def moves(count: int) -> str:
 def _judged(world: World, course: Course, faults_of: Callable[[], list[Fault]]) -> tuple[Judged, list[Fault] | None]:
     """What is said of a course by its pieces, without words, and its faults; None if it is too long for its checks."""
     curve = clearance_on(world, course) if world.scene.obstacles else None
-    unproven = tuple(gap.motion for gap in course.prove(0.0).unproven) if curve is None else curve.unproven
+    unproven = tuple(gap.motion for gap in course.prove(None).unproven) if curve is None else curve.unproven
     verdict = Verdict(not unproven, "", unproven)
     if curve is not None and not any(first for first, _ in curve.pairs):
         curve = None

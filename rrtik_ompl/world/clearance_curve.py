@@ -16,7 +16,6 @@ from rrtik_ompl.world.proof import Gap
 PLACES = 240  # on a path, beside its waypoints
 NEAREST, FARTHEST = 1e-5, 2.0  # [m] of clearances that are told apart
 STEPS = 255  # between these two, in equal ratios: one is 5 % more than the one before
-NOT_PROVEN = -1  # the level of a place that is not even proven free
 LEVELS = frozen(np.append(0.0, np.geomspace(NEAREST, FARTHEST, STEPS)))
 
 
@@ -61,13 +60,13 @@ class Course:
         motions: Number of the piece of each place that is looked at, shape (m,).
         shares: Where on it, from 0 to 1, shape (m,).
         at: The configurations, shape (k, dof), at some numbers and shares, shape (k,) each.
-        prove: Proves all of it with a clearance [m]; its gaps are numbered by the pieces.
+        prove: Proves all of it with a clearance [m], that of the world if None; gaps are numbered by the pieces.
     """
 
     motions: NDArray[np.int64]
     shares: Vector
     at: Callable[[NDArray[np.int64], Vector], Matrix]
-    prove: Callable[[float], Proof]
+    prove: Callable[[float | None], Proof]
 
 
 def clearance_along(world: World, waypoints: Matrix) -> ClearanceCurve:
@@ -88,18 +87,20 @@ def clearance_on(world: World, course: Course) -> ClearanceCurve:
     The least distance is that of the whole course, as far as it is proven free, and not of the places alone: proofs
     with larger clearances name the places at which these are not kept, and so does the one without.
     """
-    proof = course.prove(0.0)
+    proof = course.prove(None)
     unproven = tuple(gap.motion for gap in proof.unproven)
     kept, pairs = _kept_at(world, course.at(course.motions, course.shares))
     certain = kept[~np.isin(course.motions, unproven)]
-    gaps = [(gap, NOT_PROVEN) for gap in proof.unproven]
+    lacking = int(np.searchsorted(LEVELS, proof.clearance)) - 1  # the last level below what is to be kept, or -1
+    gaps = [(gap, lacking) for gap in proof.unproven]
     gaps += _nearer(course, int(certain.min()), set(unproven)) if certain.size else []
     gaps = [(gap, level) for gap, level in gaps if np.isfinite(gap.share)]
     if gaps:
-        kept = np.append(kept, [level for _, level in gaps])
+        motions, shares = np.array([gap.motion for gap, _ in gaps]), np.array([gap.share for gap, _ in gaps])
+        more, _ = _kept_at(world, course.at(motions, shares))
+        kept = np.append(kept, np.minimum(more, [level for _, level in gaps]))
         pairs = (*pairs, *((gap.first, gap.second) for gap, _ in gaps))
-        motions = np.append(course.motions, [gap.motion for gap, _ in gaps])
-        shares = np.append(course.shares, [gap.share for gap, _ in gaps])
+        motions, shares = np.append(course.motions, motions), np.append(course.shares, shares)
         order = np.lexsort((shares, motions))
         kept, pairs = kept[order], tuple(pairs[k] for k in order)
         course = replace(course, motions=motions[order], shares=shares[order])

@@ -214,6 +214,7 @@ function finish(rows, searched) {
   for (let s = 0; s <= CLEARANCE_SAMPLES; s += 1) {
     least = Math.min(least, kernels.nearest(postureAt((story.times[story.times.length - 1] * s) / CLEARANCE_SAMPLES)).metres);
   }
-  const near = least === Infinity ? "" : `, at least ${Math.max(1000 * least, 1000 * planning.clearance).toFixed(1)} mm clear`;
+  const when = story.moving ? " at time 0" : "";
+  const near = least === Infinity ? "" : `, ${(1000 * least).toFixed(1)} mm clear${when} at the nearest of ${CLEARANCE_SAMPLES + 1} places`;
   planStatus(`${count(rows.length - 1, "move")}, length ${lengthOf(rows).toFixed(2)}${near}; found in ${searched.toFixed(1)} ms`);
 }
