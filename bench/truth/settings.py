@@ -79,6 +79,7 @@ SETTINGS: dict[str, Set] = {
     "self_margin": _of_world("self_margin", 0.004),
     "clearance": _of_world("clearance", 0.3),
     "proving": _of_world("proving", 0.01),
+    "inflation": _of_world("inflation", 0.1),
     "constraints": Set(
         lambda: World(_robot(), _scene(), constraints=[_region()]),
         lambda world: [each.bounds.tolist() for each in world.settings.constraints],
