@@ -234,9 +234,10 @@ def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
     """
     subject = played(problem, run)
     scene = run.scenes[0].scene if run.scenes else subject.scene  # a feed may begin elsewhere than the problem
-    scene = replace(subject.scene, obstacles=tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles))
-    for name in {name for tick in run.ticks for name in tick.poses}:
-        scene.obstacle(name)  # or it is a run of another problem
+    still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
+    for name in {obstacle.name for obstacle in still}.union(*(tick.poses for tick in run.ticks)):
+        subject.scene.obstacle(name)  # or it is a run of another problem
+    scene = replace(subject.scene, obstacles=still)
     judged = judged_run(problem, run)
     return replace(subject, scene=scene, verdict=judged.verdict, contacts=judged.contacts)
 
