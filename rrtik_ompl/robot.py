@@ -293,7 +293,8 @@ def require_joints(robot: Robot, names: Sequence[str], what: str) -> None:
     if len(names) == robot.dof and (unnamed or tuple(names) == robot.joint_names):
         return
     remedy = "put its columns in that order" if set(names) == set(robot.joint_names) else "it is another robot's"
-    own, wanted = ", ".join(names), ", ".join(robot.joint_names)
+    own = ", ".join(names)
+    wanted = ", ".join(robot.joint_names)
     raise InputError(f"the {what} moves {own}, but robot '{robot.name}' has the joints {wanted}; {remedy}")
 
 

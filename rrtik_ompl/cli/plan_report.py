@@ -218,7 +218,8 @@ def certified(problem: Problem, path: JointPath, found: Certificate) -> tuple[st
     if any(faults):
         return f"does not hold: {next(filter(None, faults))}", False
     kept = f", {1e3 * found.clearance:g} mm kept from obstacles" if found.clearance else ""
-    moves, still = len(found.motions), as_it_stands(problem.world.scene)
+    moves = len(found.motions)
+    still = as_it_stands(problem.world.scene)
     return f"holds: {moves} motion{'s' * (moves != 1)} proven free{kept}, {found.entries} entries{still}", True
 
 
@@ -247,7 +248,8 @@ def _too_fast(robot: Robot, motion: Trajectory) -> list[str]:
 
 def how_proven(problem: Problem, motion: Trajectory) -> str:
     """How much of a timed motion without faults is proven free, in a few words."""
-    proof, still = motion.prove(problem.world), as_it_stands(problem.world.scene)
+    proof = motion.prove(problem.world)
+    still = as_it_stands(problem.world.scene)
     if proof.proven:
         return f"proven free at every time{still}"
     proven = f"{proof.motions - len(proof.unproven)} of {proof.motions} pieces proven free"

@@ -105,7 +105,9 @@ class Session:
         self.leading = Leading(self, master)
         self._check = ArmCheck()
         self.past, self._recorded = past, recorded
-        self._trouble, self._unseen, self._seen_at = "", "", dict[str, float]()
+        self._trouble = ""
+        self._unseen = ""
+        self._seen_at = dict[str, float]()
         self._patience = (np.inf if structure is None else UNSEEN_SECONDS) if patience is None else patience
         self._fault, self._fault_at = "", -np.inf  # what the arm has done that it was not told, as of the last tick
         self._record = record or Record(None)
@@ -198,8 +200,10 @@ class Session:
     @property
     def known(self) -> Knowledge:
         """What is known now of the arm and of the picture."""
-        age, fault = self.time - self.picture_time, self._fault
-        off, unseen = self._check.off, self._out_of_view()
+        age = self.time - self.picture_time
+        fault = self._fault
+        off = self._check.off
+        unseen = self._out_of_view()
         return Knowledge(self.arm.lost, age, self.past, off, self.unusable, fault, self.sight, unseen)
 
     @property
@@ -239,7 +243,8 @@ class Session:
 
     def lamps(self) -> tuple[Lamp, ...]:
         """Lamps of the chosen object where it is and for where the arm is; none is green if no route can be led."""
-        found, unseen = self.feasibility.lamps(self.target, self.q), self.known.unseen
+        found = self.feasibility.lamps(self.target, self.q)
+        unseen = self.known.unseen
         if not unseen:
             return found
         return tuple(replace(each, color=AMBER, reason=unseen) if each.color == GREEN else each for each in found)
@@ -343,7 +348,8 @@ class Session:
 
     def _watch_view(self) -> None:
         """Leave the route when something that it stands on has been out of view for too long, and say so."""
-        unseen, before = self.known.unseen, self._unseen
+        unseen = self.known.unseen
+        before = self._unseen
         self._unseen = unseen
         if bool(unseen) == bool(before):
             return

@@ -141,7 +141,8 @@ class Surroundings:
         self._seen.pop(seen.object.name, None)
         self.held = HeldObject(seen, T_tip_object, ())
         self._grips.clear()
-        world, mine = self._with(()), seen.object.solid_names
+        world = self._with(())
+        mine = seen.object.solid_names
         near = [frozenset((contact.first, contact.second)) for contact in world.contacts(q)]
         rests = {pair: allowed(world.bodies, *sorted(pair)) for pair in near if pair & set(mine)}
         rests |= {each.pair: each.going_on() for name in mine for each in touching_at(world, q, name)}
@@ -205,8 +206,10 @@ class Surroundings:
         """
         if name in self._grips:
             return self._grips[name]
-        near, links = self._at_grasps(name), gripper_links(self._given.robot)
-        contacts, buried = [], []
+        near = self._at_grasps(name)
+        links = gripper_links(self._given.robot)
+        contacts = []
+        buried = []
         for pair, each in near.items():
             part, solid = pair
             leeway = DEEPER + MAX_SHIFT if part in links else DEEPER
@@ -219,8 +222,11 @@ class Surroundings:
 
     def _at_grasps(self, name: str) -> dict[tuple[str, str], Nearness]:
         """How near each part of the gripper, and of what it holds, comes to each solid of an object at its grasps."""
-        seen, robot, attached = self._seen[name], self._given.robot, tuple(self._attached())
-        thing, parts = seen.object, (*gripper_links(robot), *(item.name for item in attached))
+        seen = self._seen[name]
+        robot = self._given.robot
+        attached = tuple(self._attached())
+        thing = seen.object
+        parts = (*gripper_links(robot), *(item.name for item in attached))
         q = robot.clamp(np.zeros((1, robot.dof)))[0]
         tip = robot.fk(q)
         tips = [level for grasp in thing.grasps for level in grasp.levels]

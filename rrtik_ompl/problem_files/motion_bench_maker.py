@@ -361,7 +361,8 @@ def _refuse_unmoved(robot: Robot, wanted: JointConstraint, value: float | None, 
     name = wanted.joint_name
     if name not in robot.movable:
         raise UnknownNameError(f"joint of robot '{robot.name}'", name, robot.movable)
-    low, high = wanted.position - wanted.tolerance_below, wanted.position + wanted.tolerance_above
+    low = wanted.position - wanted.tolerance_below
+    high = wanted.position + wanted.tolerance_above
     if value is None or not low - LIMIT_TOLERANCE <= value <= high + LIMIT_TOLERANCE:
         raise InputError(
             f"joint '{name}' is none of group '{group}', so that no path brings it to {wanted.position:g}; "

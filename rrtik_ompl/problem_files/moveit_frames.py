@@ -40,7 +40,8 @@ class Frames:
     """
 
     def __init__(self, robot: Robot, q: Vector, fixed: Iterable[FixedFrame]) -> None:
-        self._robot, self._q = robot, q
+        self._robot = robot
+        self._q = q
         self._known: dict[str, _Carried] = {"": _STANDING, WORLD: _STANDING}
         for each in self._parents_first(fixed):
             parent = _bare(each.header.frame_id)
@@ -77,7 +78,8 @@ class Frames:
 
     def moves(self, name: str) -> bool:
         """Whether a frame moves with the arm."""
-        link, model = self.link(name), self._robot.model
+        link = self.link(name)
+        model = self._robot.model
         return bool(link and model.existFrame(link) and model.frames[model.getFrameId(link)].parentJoint > 0)
 
     def add(self, name: str, pose: pin.SE3, parts: Mapping[str, pin.SE3] | None = None, *, link: str = "") -> None:

@@ -270,7 +270,8 @@ def _unknown_entries(matrix: AllowedMatrix, known: Collection[str]) -> Iterator[
     Tables are often of a robot with more links, and of things that are gone. A name is therefore taken for no slip of
     the pen if the one that is most like it stands in the same list.
     """
-    stated, defaults = matrix.stated(), matrix.defaults()
+    stated = matrix.stated()
+    defaults = matrix.defaults()
     free = {name for pair, allowed in stated.items() if allowed for name in pair}
     overrides = any(defaults.values())  # so that pairs that may not touch count, too
     lists: dict[str, tuple[Sequence[str], Collection[str]]] = {

@@ -252,7 +252,8 @@ def played(shown: Showable, run: ReplanRun) -> Subject:
     if len(run.ticks) == 0:
         raise InputError("run to show: it has no tick")
     subject = subject_of(shown)
-    robot, rows = subject.robot, run.configurations
+    robot = subject.robot
+    rows = run.configurations
     if robot is None or robot.joint_names != run.joint_names:
         raise InputError(f"run to show: one of robot '{run.robot}' with other joints; give the problem that was run")
     held = tuple((region, rows[0]) for region, _ in subject.held)

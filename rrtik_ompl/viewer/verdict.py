@@ -139,7 +139,8 @@ def _with_ends(world: World, course: Course, at: Vector) -> Vector:
     for _ in range(BISECTIONS if len(turns) else 0):
         middle = 0.5 * (inside + outside)
         ok = world.valid_batch(_configurations(course, middle))
-        inside, outside = np.where(ok, inside, middle), np.where(ok, middle, outside)
+        inside = np.where(ok, inside, middle)
+        outside = np.where(ok, middle, outside)
     return np.union1d(at, inside)
 
 
@@ -177,7 +178,8 @@ def _faults_of_motion(world: World, motion: Trajectory) -> list[Fault]:
 
 def _course_of(world: World, motion: Trajectory) -> Course:
     """A timed motion as a course: its places are spread over how far the arm moves, and at its knots."""
-    h, peak = np.diff(motion.times), np.abs(motion.velocities)
+    h = np.diff(motion.times)
+    peak = np.abs(motion.velocities)
     speed = np.maximum(peak[1:], peak[:-1]) + h[:, None] * np.abs(motion.jerks * h[:, None]) / 8.0
     ways = np.append(0.0, np.cumsum(h * np.maximum(speed @ world.weights, 1e-12)))
     clock = np.interp(np.linspace(0.0, ways[-1], PLACES + 1), ways, motion.times)

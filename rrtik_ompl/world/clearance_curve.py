@@ -96,13 +96,16 @@ def clearance_on(world: World, course: Course) -> ClearanceCurve:
     gaps += _nearer(course, int(certain.min()), set(unproven)) if certain.size else []
     gaps = [(gap, level) for gap, level in gaps if np.isfinite(gap.share)]
     if gaps:
-        motions, shares = np.array([gap.motion for gap, _ in gaps]), np.array([gap.share for gap, _ in gaps])
+        motions = np.array([gap.motion for gap, _ in gaps])
+        shares = np.array([gap.share for gap, _ in gaps])
         more, _ = _kept_at(world, course.at(motions, shares))
         kept = np.append(kept, np.minimum(more, [level for _, level in gaps]))
         pairs = (*pairs, *((gap.first, gap.second) for gap, _ in gaps))
-        motions, shares = np.append(course.motions, motions), np.append(course.shares, shares)
+        motions = np.append(course.motions, motions)
+        shares = np.append(course.shares, shares)
         order = np.lexsort((shares, motions))
-        kept, pairs = kept[order], tuple(pairs[k] for k in order)
+        kept = kept[order]
+        pairs = tuple(pairs[k] for k in order)
         course = replace(course, motions=motions[order], shares=shares[order])
     distances = LEVELS[np.maximum(kept, 0)]
     return ClearanceCurve(course.motions, frozen(course.shares), frozen(distances), pairs, unproven)
@@ -117,11 +120,14 @@ def _nearer(course: Course, least: int, unproven: set[int]) -> list[tuple[Gap, i
         unproven: Numbers of the pieces that are not proven free.
     """
     gaps: list[Gap] = []
-    proven, refused, tried = 0, least + 1, least
+    proven = 0
+    refused = least + 1
+    tried = least
     while refused - proven > 1:
         short = [gap for gap in course.prove(float(LEVELS[tried])).unproven if gap.motion not in unproven]
         if short:
-            refused, gaps = tried, short
+            refused = tried
+            gaps = short
         else:
             proven = tried
         tried = (proven + refused) // 2
@@ -155,7 +161,8 @@ def _between(rows: Matrix, motions: NDArray[np.int64], shares: Vector) -> Matrix
 
 def _kept_at(world: World, places: Matrix) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
     """The largest level that each configuration, shape (m, dof), is proven to keep, -1 for none; the nearest pair."""
-    kept, refused = np.full(len(places), -1), np.full(len(places), len(LEVELS))
+    kept = np.full(len(places), -1)
+    refused = np.full(len(places), len(LEVELS))
     pairs = [("", "")] * len(places)
     while (open_ := np.flatnonzero(refused - kept > 1)).size:
         tried = (kept[open_] + refused[open_]) // 2

@@ -233,9 +233,11 @@ class LineArm:
     def _next_request(self) -> dict[str, Any]:
         """What is sent next: what was asked for, or else the last set point while it is young, or else a reading."""
         with self._lock:
-            message, self._grip = self._grip, None
+            message = self._grip
+            self._grip = None
             if message is None:
-                message, self._request = self._request, None
+                message = self._request
+                self._request = None
             if message is None and self.judge is not None and self._set_point is not None:
                 young = time.monotonic() - self._told_at < RENEW_SECONDS
                 message = self._set_point if young else {"do": "stop"}
@@ -332,14 +334,16 @@ class LineServer:
             line.close()
 
     def _answer(self, line: Line) -> None:
-        before, until = time.monotonic(), np.inf
+        before = time.monotonic()
+        until = np.inf
         while not self._ended.is_set():
             request = line.receive()
             now = time.monotonic()
             if now > until:
                 self.arm.advance(until - before)
                 self.arm.stop()
-                before, until = until, np.inf
+                before = until
+                until = np.inf
             self.arm.advance(now - before)
             before = now
             fault = self._execute(request)

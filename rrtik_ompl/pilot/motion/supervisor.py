@@ -117,9 +117,12 @@ class Supervisor:
             self._coasts_until[turned] = time + COAST_SECONDS
             self._coast_way[turned] = self._way[turned]
             self._coasts_until[again] = -np.inf
-            self._back[new], self._good_at[new] = np.where(again, back, 0.0)[new], time
-            self._mark[new], self._mark_time[new] = q[new], time
-            self._way, self._ahead = way, ahead
+            self._back[new] = np.where(again, back, 0.0)[new]
+            self._good_at[new] = time
+            self._mark[new] = q[new]
+            self._mark_time[new] = time
+            self._way = way
+            self._ahead = ahead
             self._aim = np.where(way != 0.0, aim, self._aim)
 
     def stopped(self, time: float) -> None:
@@ -130,14 +133,18 @@ class Supervisor:
             driven = self._way != 0.0
             self._coasts_until[driven] = time + COAST_SECONDS
             self._coast_way[driven] = self._way[driven]
-            self._active, self._rest_until, self._changes = False, time + REST_SECONDS, 0
+            self._active = False
+            self._rest_until = time + REST_SECONDS
+            self._changes = 0
             self._way[:] = 0.0
 
     def read(self, q: Vector, time: float) -> None:
         """Compare a reading, shape (dof,), with what the arm was told; sets `fault`."""
         with self._lock:
-            before, self._q = self._q, q.copy()
-            back_in_time, self._time = time < self._time, time
+            before = self._q
+            self._q = q.copy()
+            back_in_time = time < self._time
+            self._time = time
             watched = self._active or time <= self._rest_until
             if before is None or back_in_time or not watched:
                 self._begin(q, time, active=self._active)
@@ -176,7 +183,8 @@ class Supervisor:
             self._q = q.copy()
         self._aim = np.where(self._way != 0.0, self._aim, q)
         self._back[:], self._good_at[:] = 0.0, time
-        self._room, self._used = self._slack.copy(), 0.0
+        self._room = self._slack.copy()
+        self._used = 0.0
         self._changed, self._active = time, active
         self._mark, self._mark_time = q.copy(), np.full(len(q), time)
 
@@ -198,7 +206,8 @@ class Supervisor:
     def _elsewhere(self, q: Vector, change: Vector, time: float) -> str:
         """Whether a joint would be farther than the slack from where it should be before the arm could stand."""
         coasts = time < self._coasts_until
-        stops, turns = coasts & (self._way == 0.0), coasts & (self._way != 0.0)
+        stops = coasts & (self._way == 0.0)
+        turns = coasts & (self._way != 0.0)
         self._aim = np.where(stops, q, self._aim)
         way = np.where(stops, self._coast_way, self._way)
         self._back = np.where(turns, 0.0, np.maximum(self._back - way * change, 0.0))

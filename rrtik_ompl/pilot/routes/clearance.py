@@ -56,7 +56,8 @@ def proven_clearance(parts: Iterable[tuple[World, Matrix]]) -> float:
 
     if kept(FARTHEST):
         return float("inf")
-    low, high = 0, FARTHEST
+    low = 0
+    high = FARTHEST
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if kept(middle) else (low, middle)
