@@ -15,7 +15,7 @@ from rrtik_ompl.copies import as_value, in_notebook
 from rrtik_ompl.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
-from rrtik_ompl.robot import Robot, require_joints
+from rrtik_ompl.robot import Robot, require_joints, unnamed_joints
 from rrtik_ompl.transitions import (
     SAME,
     merge_moves,
@@ -66,7 +66,7 @@ class JointPath:
     ) -> None:
         rows = usable_waypoints(finite_array(waypoints, (None, None), "path waypoints"))
         count = rows.shape[1]
-        joint_names = (f"joint{k + 1}" for k in range(count)) if joint_names is None else joint_names
+        joint_names = unnamed_joints(count) if joint_names is None else joint_names
         names = tuple(name_of(name, "a joint of a path") for name in listed(joint_names, "joint names of a path"))
         given = (np.zeros(count) if mask is None else mask for mask in (prismatic, continuous))
         sliding, endless = (truths(mask, "mask of a path's joints") for mask in given)

@@ -278,19 +278,23 @@ class Robot:
         return _frame_number(self, self.tip if frame is None else frame)
 
 
+def unnamed_joints(count: int) -> tuple[str, ...]:
+    """What so many joints are called where nobody has named them: ``joint1, joint2, ...``."""
+    return tuple(f"joint{k + 1}" for k in range(count))
+
+
 def require_joints(robot: Robot, names: Sequence[str], what: str) -> None:
     """Refuse what moves other joints than a robot, or the same ones in another order.
 
     Args:
         robot: The robot.
-        names: Of the joints that it moves; ``joint1, joint2, ...`` stands for no names.
+        names: Of the joints that it moves; those of :func:`unnamed_joints` stand for none.
         what: What it is, such as "path".
 
     Raises:
         InputError: If the names, or their number, are not those of the robot's actuated joints.
     """
-    unnamed = tuple(names) == tuple(f"joint{k + 1}" for k in range(len(names)))
-    if len(names) == robot.dof and (unnamed or tuple(names) == robot.joint_names):
+    if len(names) == robot.dof and tuple(names) in (robot.joint_names, unnamed_joints(robot.dof)):
         return
     remedy = "put its columns in that order" if set(names) == set(robot.joint_names) else "it is another robot's"
     own = ", ".join(names)

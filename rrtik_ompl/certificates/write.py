@@ -13,7 +13,7 @@ from rrtik_ompl.collision.cloud_solid import CloudSolid
 from rrtik_ompl.collision.digests import robot_digest, scene_digest
 from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.fast.proof.log import ProofLog
-from rrtik_ompl.robot import require_joints
+from rrtik_ompl.robot import require_joints, unnamed_joints
 from rrtik_ompl.world import Proof, World
 from rrtik_ompl.world.proof import Prover
 
@@ -47,8 +47,7 @@ def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: floa
     kept, robot = not_negative(clearance, "clearance"), world.robot
     given = path.waypoints if isinstance(path, HasWaypoints) else path
     rows = finite_array(given, (None, None), "path of a certificate")
-    unnamed = [f"joint{k + 1}" for k in range(rows.shape[1])]
-    require_joints(robot, getattr(path, "joint_names", unnamed), "path")
+    require_joints(robot, getattr(path, "joint_names", unnamed_joints(rows.shape[1])), "path")
     return _made(world.prover, rows, kept)
 
 

@@ -70,9 +70,9 @@ def load_motion_bench_maker(
     message = parse(scene_document, SceneMessage)
     request = parse(request_document, RequestMessage)
     with scene_document.at(("robot_state", "joint_state")):
-        states = message.robot_state.values()
+        own_states = message.robot_state.values()
     with request_document.at(("start_state", "joint_state")):
-        states |= request.start_state.values()
+        states = own_states | request.start_state.values()
     arm = _arm(scene_document, message, request_document, request, robot, states)
     if robot is not None and message.robot_model_name not in _names_of(arm):
         line = f"the scene is of robot '{message.robot_model_name}', and is read with robot '{arm.name}'"
@@ -82,7 +82,7 @@ def load_motion_bench_maker(
     with request_document.at(("start_state", "joint_state")):
         start = _configuration(arm, states, "start")
     with scene_document.at(("robot_state", "joint_state")):
-        shown = _configuration(arm, states | message.robot_state.values(), "robot_state")
+        shown = _configuration(arm, states | own_states, "robot_state")
     with scene_document.at(("fixed_frame_transforms",)):
         frames = Frames(arm, shown, message.fixed_frame_transforms)
     reader = SceneReader(arm, frames, message)

@@ -206,9 +206,7 @@ class Trajectory:
         """
         require(world, World, "world of a trajectory's check")
         require_joints(world.robot, self.joint_names, "trajectory")
-        clock = bad_moments(self, world)
-        places = zip(clock, self(clock).positions, strict=True)
-        return tuple(f"after {t:.3f} s: {world.explain(q) or not_proven(world)}" for t, q in places)
+        return tuple(f"after {moment:.3f} s: {reason}" for moment, reason in faults_of(self, world))
 
     def prove(self, world: World, *, clearance: float | None = None) -> Proof:
         """Prove the motion itself free, at every time, not the path it was made from.
@@ -291,11 +289,26 @@ def proof_of_pieces(motion: Trajectory, world: World, clearance: float | None, f
     return proof_by_chords(times, pushes @ world.weights, lambda clock: motion(clock).positions, world, clearance)
 
 
+def greatest_speeds(motion: Trajectory) -> Matrix:
+    """Bounds of the rates of all joints on each piece, shape (m, n) [rad/s or m/s]."""
+    h = np.diff(motion.times)[:, None]
+    peak = np.abs(motion.velocities)
+    found: Matrix = np.maximum(peak[1:], peak[:-1]) + h * np.abs(motion.jerks * h) / 8.0
+    return found
+
+
+def faults_of(motion: Trajectory, world: World) -> list[tuple[float, str]]:
+    """The first fault of every piece that has one, time [s] and reason; see :meth:`Trajectory.faults`."""
+    clock = bad_moments(motion, world)
+    rows = motion(clock).positions
+    return [(moment, world.explain(q) or not_proven(world)) for moment, q in zip(clock.tolist(), rows, strict=True)]
+
+
 def bad_moments(motion: Trajectory, world: World) -> Vector:
     """Times of the first fault of every piece that has one; see :meth:`Trajectory.faults`."""
-    h, peak = np.diff(motion.times), np.abs(motion.velocities)
-    speed = np.maximum(peak[1:], peak[:-1]) + h[:, None] * np.abs(motion.jerks * h[:, None]) / 8.0
-    counts = np.ceil(h * (speed @ world.weights) * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
+    h = np.diff(motion.times)
+    ways = h * (greatest_speeds(motion) @ world.weights)
+    counts = np.ceil(ways * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
     pieces, shares = even_parts(counts)
     clock = np.append(motion.times[pieces] + shares * h[pieces], motion.duration)
     bad = np.flatnonzero(~world.certify(motion(clock).positions))

@@ -131,7 +131,7 @@ def _judged(plan: TaskPlan, rows: list[tuple[int, Vector, float]]) -> Judged:
     ticks = np.flatnonzero(np.isin(numbers[:-1], doubtful))
     text = f"{len(doubtful)} of {len(proven)} motions not proven free (violet)"
     first = next((f"motion {k + 1}: {motion[0].reason}" for k, motion in enumerate(faults) if motion), "")
-    if plan.proven:
+    if not doubtful:
         text = "every motion is proven free" + (", on the contacts that it stands on" if any(plan.contacts) else "")
     elif first:
         text += f"; {first}"
@@ -141,7 +141,7 @@ def _judged(plan: TaskPlan, rows: list[tuple[int, Vector, float]]) -> Judged:
         for contact in _contacts(worlds[k], np.flatnonzero(numbers == k), rows, [fault.q for fault in faults[k]])
     )
     text += as_it_stands(plan.worlds[0].scene)
-    return Judged(Verdict(plan.proven, text, tuple(ticks.tolist())), None, contacts)
+    return Judged(Verdict(not doubtful, text, tuple(ticks.tolist())), None, contacts)
 
 
 def _contacts(

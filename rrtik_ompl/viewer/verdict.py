@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.arrays import Matrix, Vector, frozen
 from rrtik_ompl.errors import InputError
 from rrtik_ompl.trajectory import Trajectory
-from rrtik_ompl.trajectory.motion import bad_moments
+from rrtik_ompl.trajectory.motion import faults_of, greatest_speeds
 from rrtik_ompl.viewer.path_contacts import PathContact, contacts_at
 from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import PLACES, ClearanceCurve, Course, clearance_on, course_along
@@ -170,17 +170,15 @@ def _faults_of_path(world: World, rows: Matrix) -> list[Fault]:
 
 def _faults_of_motion(world: World, motion: Trajectory) -> list[Fault]:
     """The first fault of each piece of a timed motion."""
-    clock = bad_moments(motion, world)
-    pieces, shares = _places_at(motion.times, clock)
-    rows = motion(clock).positions
-    return [(int(k), float(x), world.explain(q)) for k, x, q in zip(pieces, shares, rows, strict=True)]
+    found = faults_of(motion, world)
+    pieces, shares = _places_at(motion.times, np.array([moment for moment, _ in found]))
+    return [(k, x, reason) for k, x, (_, reason) in zip(pieces.tolist(), shares.tolist(), found, strict=True)]
 
 
 def _course_of(world: World, motion: Trajectory) -> Course:
     """A timed motion as a course: its places are spread over how far the arm moves, and at its knots."""
     h = np.diff(motion.times)
-    peak = np.abs(motion.velocities)
-    speed = np.maximum(peak[1:], peak[:-1]) + h[:, None] * np.abs(motion.jerks * h[:, None]) / 8.0
+    speed = greatest_speeds(motion)
     ways = np.append(0.0, np.cumsum(h * np.maximum(speed @ world.weights, 1e-12)))
     clock = np.interp(np.linspace(0.0, ways[-1], PLACES + 1), ways, motion.times)
     if len(motion.times) <= MOST_KNOTS:

@@ -64,12 +64,10 @@ def _rooms(world: World, clearance: float | None) -> Iterator[Room]:
     """What may be kept, the most first."""
     least = world.settings.kept
     wanted = max(CLEARANCE if clearance is None else clearance, least)
-    less = (wanted * 0.5**k for k in range(HALVINGS))
-    for searched in chain((wanted + min(wanted, SPARE),), less, (0.0,)):
-        if searched >= least:
-            yield Room(min(wanted, searched), searched)
-    if least and least < wanted:
-        yield Room(least, least)
+    halves = (wanted * 0.5**k for k in range(HALVINGS))
+    less = (half for half in halves if half > least)
+    for searched in chain((wanted + min(wanted, SPARE),), less, (least,)):
+        yield Room(min(wanted, searched), searched)
 
 
 def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> float | None:

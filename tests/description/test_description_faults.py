@@ -116,6 +116,16 @@ def test_a_state_that_lacks_a_joint_is_named(arm):
     assert "arm.srdf:12: group_state 'home' has no value of joint 'elbow' and is left out" in found
 
 
+def mjcf_at(value, folder):
+    """The file of an arm whose only joint goes from -1 to 1 rad, with a posture "home" at a value."""
+    file = folder / "arm.xml"
+    file.write_text(
+        '<mujoco><compiler angle="radian"/><worldbody><body><joint name="j" range="-1 1"/><geom size=".1"/></body>'
+        f'</worldbody><keyframe><key name="home" qpos="{value}"/></keyframe></mujoco>'
+    )
+    return file
+
+
 def test_a_posture_outside_the_limits_is_named_in_an_srdf_and_in_an_mjcf(arm, tmp_path):
     srdf = arm.with_suffix(".srdf")
     srdf.write_text(SRDF.replace('value="0.2"', 'value="2.5"'))
@@ -123,11 +133,7 @@ def test_a_posture_outside_the_limits_is_named_in_an_srdf_and_in_an_mjcf(arm, tm
     assert "arm.srdf:12: posture 'home': joint 'elbow' is at 143.239 deg, outside its limits" in found
     with pytest.raises(InputError, match="posture 'home': joint 'elbow'"):
         load_robot(arm, srdf=srdf, strict=True)
-    (tmp_path / "arm.xml").write_text(
-        '<mujoco><compiler angle="radian"/><worldbody><body><joint name="j" range="-1 1"/><geom size=".1"/></body>'
-        '</worldbody><keyframe><key name="home" qpos="1.5"/></keyframe></mujoco>'
-    )
-    [found] = said(tmp_path / "arm.xml")
+    [found] = said(mjcf_at(1.5, tmp_path))
     assert "arm.xml: key 'home': joint 'j' is at 85.9437 deg, outside its limits" in found
     with pytest.raises(InputError, match="key 'home'"):
         load_robot(tmp_path / "arm.xml", strict=True)
@@ -139,11 +145,7 @@ def test_a_posture_that_full_turns_bring_inside_the_limits_is_named_too(arm, tmp
     [found] = said(arm, srdf=srdf)
     assert "arm.srdf:12: posture 'home': joint 'elbow' is at 372.423 deg, outside its limits" in found
     assert found.endswith("; it is taken a full turn away")
-    (tmp_path / "arm.xml").write_text(
-        '<mujoco><compiler angle="radian"/><worldbody><body><joint name="j" range="-1 1"/><geom size=".1"/></body>'
-        '</worldbody><keyframe><key name="home" qpos="6.5"/></keyframe></mujoco>'
-    )
-    [found] = said(tmp_path / "arm.xml")
+    [found] = said(mjcf_at(6.5, tmp_path))
     assert "arm.xml: key 'home': joint 'j' is at 372.423 deg, outside its limits" in found
 
 
