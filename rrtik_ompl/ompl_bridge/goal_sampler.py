@@ -22,11 +22,12 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     planner has been given all of these and wants more (:class:`rrtik_ompl.ik.goal_configurations.GoalSearch`).
     Configurations that the space information refuses, being out of its bounds or invalid, are left out.
 
-    Three planners of OMPL need a single goal that is not Python's: :meth:`states` without a number. The ``solve`` of
+    Four planners of OMPL need a single goal that is not Python's: :meth:`states` without a number. The ``solve`` of
     :func:`rrtik_ompl.simple_setup` gives them that by itself. Elsewhere (OMPL's Benchmark, a ProblemDefinition of your
     own) PRM and PRMstar hang with this goal, and with several of its states: they take up further goals in a second
-    thread, which waits for the interpreter for ever, as checks are Python's and the first thread holds it. AORRTC takes
-    a second goal for a path of no length and gives up.
+    thread, which waits for the interpreter for ever, as checks are Python's and the first thread holds it. BFMT can
+    take a goal out of its queue twice, which ends the process. AORRTC takes a second goal for a path of no length and
+    gives up.
 
     Example:
         >>> problem = rrtik.load_problem("titan4_sdu")
@@ -95,7 +96,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     def states(self, most: int = 1) -> ob.GoalStates:
         """The first configurations as ``ompl.base.GoalStates``, which OMPL samples without the interpreter.
 
-        More than one are not for PRM and PRMstar outside :func:`rrtik_ompl.simple_setup`; see the class.
+        More than one are not for PRM, PRMstar and BFMT outside :func:`rrtik_ompl.simple_setup`; see the class.
         """
         si = self.getSpaceInformation()
         states, state = ob.GoalStates(si), si.allocState()

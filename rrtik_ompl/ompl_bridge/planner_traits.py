@@ -75,11 +75,14 @@ ANYTIME = PlannerTraits(anytime=True, supports_iteration_limit=False)
 #   Its graph is empty.
 # - SORRTstar finds a free straight motion, then draws from what could be shorter, which is nothing, and does not check
 #   its time meanwhile.
+# - BFMT puts every goal in its queue and then marks all but the last as unvisited, so that one can be put there again
+#   and taken out of it twice: one run in a hundred with several goals ended in a crash.
 # - BITstar's graph is never freed again (60 kB a run).
 _LISTED = {
     "AORRTC": PlannerTraits(
         anytime=True, one_goal=True, straight_first=True, has_graph=False, supports_iteration_limit=False
     ),
+    "BFMT": PlannerTraits(one_goal=True),
     "BITstar": PlannerTraits(anytime=True, has_graph=False, supports_iteration_limit=False),
     "InformedRRTstar": ANYTIME,
     "PRM": PlannerTraits(one_goal=True),

@@ -79,9 +79,9 @@ class ProblemSetup(og.SimpleSetup):  # type: ignore[misc]  # OMPL has no types
     def solve(self, *limit: Any, **named: Any) -> ob.PlannerStatus:
         """Solve as OMPL's own method does, within seconds or until a termination condition.
 
-        PRM, PRMstar and AORRTC get the first goal configuration alone, as in `plan()`: PRM takes up others in a thread
-        of its own, which waits for Python for ever; AORRTC gives up. Planners that are written in Python and derived
-        from ``ompl.base.Planner`` cannot have states freed twice.
+        PRM, PRMstar, BFMT and AORRTC get the first goal configuration alone, as in `plan()`: PRM takes up others in a
+        thread of its own, which waits for Python for ever; BFMT can crash; AORRTC gives up. Planners that are written
+        in Python and derived from ``ompl.base.Planner`` cannot have states freed twice.
 
         Raises:
             InputError: If PRM is to minimise an objective that is written in Python, for which it would wait as well.

@@ -138,6 +138,25 @@ def test_each_planner_of_ompl_ends_with_several_goals():
     assert run.stdout.splitlines()[-1] == "all ended", run.stderr[-2000:]
 
 
+@pytest.mark.parametrize("name", ["AORRTC", "BFMT", "PRM", "PRMstar"])
+def test_what_several_goals_would_crash_or_stop_searches_for_the_first(problem, name):
+    setup = rrtik.simple_setup(problem)
+    si = setup.getSpaceInformation()
+    setup.setGoal(rrtik.GoalSampler(problem, si).states(4))
+    check = si.getStateValidityChecker()
+    seen = set()
+
+    def counted(state):
+        seen.add(setup.getGoal().getStateCount())
+        return check.isValid(state)
+
+    setup.setStateValidityChecker(counted)
+    setup.setPlanner(ompl_planners()[name](si))
+    setup.solve(SECONDS)
+    assert 1 in seen  # while it searched; before and after that there are four
+    assert setup.getGoal().getStateCount() == 4
+
+
 def test_a_goal_that_gives_nothing_is_left_to_the_planner(problem):
     out_of_reach = rrtik.PositionGoal([99.0, 0.0, 0.0], tolerance=0.01)
     setup = rrtik.simple_setup(rrtik.Problem(problem.world, problem.start, out_of_reach))
