@@ -30,8 +30,8 @@ import numpy as np
 
 from bench.robustness import bad_inputs, calls, commands, spoilt_files, values
 from bench.robustness.spoilt_files import Drawn
-from rrtik_ompl.errors import RrtikError
-from rrtik_ompl.fast import warm_up
+from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.kernels import warm_up
 from rrtik_ompl.viewer.serve import PageServer
 
 BATCH = 5000  # calls of a child

@@ -32,7 +32,7 @@ from house_imports import (
 )
 
 KERNEL_DECORATORS = {"kernel", "entry", "inlined", "intrinsic", "overload", "type_callable", "lower_builtin"}
-INTRINSICS = tuple(f"rrtik_ompl/fast/simd/{name}.py" for name in ("lanes", "wide_lanes", "access"))  # kernels' words
+INTRINSICS = tuple(f"rrtik_ompl/kernels/simd/{name}.py" for name in ("lanes", "wide_lanes", "access"))  # kernels' words
 COMMANDS = REPOSITORY / LIBRARY / "cli"  # each option of a command is a parameter, and the caller is typer
 BOUNDS = {
     "cyclomatic complexity": 15,

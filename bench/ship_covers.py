@@ -14,11 +14,11 @@ from unittest.mock import patch
 
 import coal
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.catalog import list_robots, load_robot
-from rrtik_ompl.covers import cache, shipped
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.description.catalog import list_robots, load_robot
 from rrtik_ompl.files.cache import FOLDER_VARIABLE
-from rrtik_ompl.world import World
+from rrtik_ompl.geometry.covers import cache, shipped
+from rrtik_ompl.world.world import World
 
 
 def covers_of_robots() -> dict[str, Matrix]:

@@ -11,72 +11,96 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.2.0"
 
 if TYPE_CHECKING:
+    from rrtik_ompl.base.errors import InputError as InputError
+    from rrtik_ompl.base.errors import PlannerError as PlannerError
+    from rrtik_ompl.base.errors import ProblemError as ProblemError
+    from rrtik_ompl.base.errors import RrtikError as RrtikError
+    from rrtik_ompl.base.errors import UnknownNameError as UnknownNameError
+    from rrtik_ompl.base.poses import pose as pose
     from rrtik_ompl.benchmark.batch import plan_batch as plan_batch
-    from rrtik_ompl.catalog import list_problems as list_problems
-    from rrtik_ompl.catalog import list_robots as list_robots
-    from rrtik_ompl.catalog import load_robot as load_robot
-    from rrtik_ompl.certificates.certificate import Certificate as Certificate
-    from rrtik_ompl.certificates.certificate import load_certificate as load_certificate
-    from rrtik_ompl.certificates.checked import verify_certificate as verify_certificate
-    from rrtik_ompl.certificates.write import certificate_of as certificate_of
     from rrtik_ompl.constraints.shorthands import inside as inside
     from rrtik_ompl.constraints.shorthands import on_line as on_line
     from rrtik_ompl.constraints.shorthands import on_plane as on_plane
     from rrtik_ompl.constraints.shorthands import orientation_of as orientation_of
     from rrtik_ompl.constraints.shorthands import upright as upright
+    from rrtik_ompl.description.catalog import list_problems as list_problems
+    from rrtik_ompl.description.catalog import list_robots as list_robots
+    from rrtik_ompl.description.catalog import load_robot as load_robot
     from rrtik_ompl.description.joint_ranges import narrowed as narrowed
     from rrtik_ompl.description.joint_weights import weighted as weighted
     from rrtik_ompl.description.padding import padded as padded
     from rrtik_ompl.description.scaling import scaled as scaled
-    from rrtik_ompl.errors import InputError as InputError
-    from rrtik_ompl.errors import PlannerError as PlannerError
-    from rrtik_ompl.errors import ProblemError as ProblemError
-    from rrtik_ompl.errors import RrtikError as RrtikError
-    from rrtik_ompl.errors import UnknownNameError as UnknownNameError
     from rrtik_ompl.files.cloud import load_cloud as load_cloud
     from rrtik_ompl.files.cloud import save_cloud as save_cloud
     from rrtik_ompl.files.heights import load_height_field as load_height_field
     from rrtik_ompl.files.mesh import load_mesh as load_mesh
     from rrtik_ompl.files.octree import load_octree as load_octree
-    from rrtik_ompl.following.follower import Followed as Followed
-    from rrtik_ompl.following.follower import Follower as Follower
-    from rrtik_ompl.following.links import RobotLink as RobotLink
-    from rrtik_ompl.following.links import SimulatedLink as SimulatedLink
-    from rrtik_ompl.following.servo import Servo as Servo
-    from rrtik_ompl.goal import GoalSet as GoalSet
-    from rrtik_ompl.goal import JointGoal as JointGoal
-    from rrtik_ompl.goal import MultiGoal as MultiGoal
-    from rrtik_ompl.goal import PoseGoal as PoseGoal
-    from rrtik_ompl.goal import PositionGoal as PositionGoal
     from rrtik_ompl.ik.batch import IkBatch as IkBatch
     from rrtik_ompl.ik.batch import solve_ik_batch as solve_ik_batch
+    from rrtik_ompl.ik.reach.grid_map import ReachMap as ReachMap
+    from rrtik_ompl.ik.reach.grid_map import load_reach_map as load_reach_map
+    from rrtik_ompl.ik.reach.sampling import reach_map as reach_map
     from rrtik_ompl.ik.solve import IkResult as IkResult
     from rrtik_ompl.ik.solve import list_ik_methods as list_ik_methods
     from rrtik_ompl.ik.solve import solve_ik as solve_ik
     from rrtik_ompl.ik.trajectory import IkTrajectory as IkTrajectory
     from rrtik_ompl.ik.trajectory import solve_ik_trajectory as solve_ik_trajectory
-    from rrtik_ompl.moves.staircase import one_joint_moves as one_joint_moves
+    from rrtik_ompl.model.goal import GoalSet as GoalSet
+    from rrtik_ompl.model.goal import JointGoal as JointGoal
+    from rrtik_ompl.model.goal import MultiGoal as MultiGoal
+    from rrtik_ompl.model.goal import PoseGoal as PoseGoal
+    from rrtik_ompl.model.goal import PositionGoal as PositionGoal
+    from rrtik_ompl.model.robot import Robot as Robot
+    from rrtik_ompl.model.scene import AttachedObject as AttachedObject
+    from rrtik_ompl.model.scene import ConstantVelocity as ConstantVelocity
+    from rrtik_ompl.model.scene import Obstacle as Obstacle
+    from rrtik_ompl.model.scene import Scene as Scene
+    from rrtik_ompl.model.scene import TimedPoses as TimedPoses
+    from rrtik_ompl.model.scene import Touching as Touching
+    from rrtik_ompl.model.shapes import Box as Box
+    from rrtik_ompl.model.shapes import Capsule as Capsule
+    from rrtik_ompl.model.shapes import Cylinder as Cylinder
+    from rrtik_ompl.model.shapes import HalfSpace as HalfSpace
+    from rrtik_ompl.model.shapes import HeightField as HeightField
+    from rrtik_ompl.model.shapes import Mesh as Mesh
+    from rrtik_ompl.model.shapes import Octree as Octree
+    from rrtik_ompl.model.shapes import PointCloud as PointCloud
+    from rrtik_ompl.model.shapes import Prism as Prism
+    from rrtik_ompl.model.shapes import Sphere as Sphere
+    from rrtik_ompl.model.task_region import TaskRegion as TaskRegion
+    from rrtik_ompl.motion.following.follower import Followed as Followed
+    from rrtik_ompl.motion.following.follower import Follower as Follower
+    from rrtik_ompl.motion.following.links import RobotLink as RobotLink
+    from rrtik_ompl.motion.following.links import SimulatedLink as SimulatedLink
+    from rrtik_ompl.motion.following.servo import Servo as Servo
+    from rrtik_ompl.motion.trajectory import RateLimits as RateLimits
+    from rrtik_ompl.motion.trajectory import Trajectory as Trajectory
+    from rrtik_ompl.motion.trajectory import load_trajectory as load_trajectory
+    from rrtik_ompl.motion.trajectory import motion_report as motion_report
+    from rrtik_ompl.motion.trajectory import time_parameterize as time_parameterize
     from rrtik_ompl.ompl_bridge import objectives as objectives
+    from rrtik_ompl.ompl_bridge.benchmark_notes import BenchmarkNotes as BenchmarkNotes
     from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler as GoalSampler
-    from rrtik_ompl.ompl_bridge.inspection.benchmark_notes import BenchmarkNotes as BenchmarkNotes
     from rrtik_ompl.ompl_bridge.simple_setup import simple_setup as simple_setup
     from rrtik_ompl.ompl_bridge.simple_setup import space_information as space_information
-    from rrtik_ompl.path import JointPath as JointPath
-    from rrtik_ompl.path import load_path as load_path
-    from rrtik_ompl.planning import Plan as Plan
-    from rrtik_ompl.planning import list_planners as list_planners
-    from rrtik_ompl.planning import plan as plan
     from rrtik_ompl.planning.many import plan_many as plan_many
-    from rrtik_ompl.plots.joints import plot_joints as plot_joints
-    from rrtik_ompl.poses import pose as pose
-    from rrtik_ompl.problem import Problem as Problem
+    from rrtik_ompl.planning.moves.staircase import one_joint_moves as one_joint_moves
+    from rrtik_ompl.planning.plan import Plan as Plan
+    from rrtik_ompl.planning.plan import list_planners as list_planners
+    from rrtik_ompl.planning.plan import plan as plan
+    from rrtik_ompl.planning.search.roadmap import Roadmap as Roadmap
+    from rrtik_ompl.planning.search.roadmap import load_roadmap as load_roadmap
+    from rrtik_ompl.planning.shortening import MoveRules as MoveRules
+    from rrtik_ompl.planning.shortening import shorten as shorten
+    from rrtik_ompl.planning.tip_motion import StraightResult as StraightResult
+    from rrtik_ompl.planning.tip_motion import arc as arc
+    from rrtik_ompl.planning.tip_motion import linear as linear
+    from rrtik_ompl.planning.tip_motion import screw as screw
+    from rrtik_ompl.planning.tip_motion import straight as straight
     from rrtik_ompl.problem_files.problem import load_problem as load_problem
     from rrtik_ompl.problem_files.problem import save_problem as save_problem
     from rrtik_ompl.problem_files.scene import load_scene as load_scene
     from rrtik_ompl.problem_files.scene import save_scene as save_scene
-    from rrtik_ompl.reach.grid_map import ReachMap as ReachMap
-    from rrtik_ompl.reach.grid_map import load_reach_map as load_reach_map
-    from rrtik_ompl.reach.sampling import reach_map as reach_map
     from rrtik_ompl.replanning import ReplanRun as ReplanRun
     from rrtik_ompl.replanning import load_run as load_run
     from rrtik_ompl.replanning import replan as replan
@@ -84,28 +108,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.replanning.in_time import plan_in_time as plan_in_time
     from rrtik_ompl.replanning.scenario import Scenario as Scenario
     from rrtik_ompl.replanning.scenario import load_scenario as load_scenario
-    from rrtik_ompl.robot import Robot as Robot
-    from rrtik_ompl.scene import AttachedObject as AttachedObject
-    from rrtik_ompl.scene import ConstantVelocity as ConstantVelocity
-    from rrtik_ompl.scene import Obstacle as Obstacle
-    from rrtik_ompl.scene import Scene as Scene
-    from rrtik_ompl.scene import TimedPoses as TimedPoses
-    from rrtik_ompl.scene import Touching as Touching
-    from rrtik_ompl.search.roadmap import Roadmap as Roadmap
-    from rrtik_ompl.search.roadmap import load_roadmap as load_roadmap
-    from rrtik_ompl.shapes import Box as Box
-    from rrtik_ompl.shapes import Capsule as Capsule
-    from rrtik_ompl.shapes import Cylinder as Cylinder
-    from rrtik_ompl.shapes import HalfSpace as HalfSpace
-    from rrtik_ompl.shapes import HeightField as HeightField
-    from rrtik_ompl.shapes import Mesh as Mesh
-    from rrtik_ompl.shapes import Octree as Octree
-    from rrtik_ompl.shapes import PointCloud as PointCloud
-    from rrtik_ompl.shapes import Prism as Prism
-    from rrtik_ompl.shapes import Sphere as Sphere
-    from rrtik_ompl.shortening import MoveRules as MoveRules
-    from rrtik_ompl.shortening import shorten as shorten
-    from rrtik_ompl.task_region import TaskRegion as TaskRegion
     from rrtik_ompl.tasks import Alternatives as Alternatives
     from rrtik_ompl.tasks import Attach as Attach
     from rrtik_ompl.tasks import Detach as Detach
@@ -122,65 +124,63 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks.through import plan_through as plan_through
     from rrtik_ompl.tasks.timed import TimedTask as TimedTask
     from rrtik_ompl.tasks.timed import time_task as time_task
-    from rrtik_ompl.tip_motion import StraightResult as StraightResult
-    from rrtik_ompl.tip_motion import arc as arc
-    from rrtik_ompl.tip_motion import linear as linear
-    from rrtik_ompl.tip_motion import screw as screw
-    from rrtik_ompl.tip_motion import straight as straight
-    from rrtik_ompl.trajectory import RateLimits as RateLimits
-    from rrtik_ompl.trajectory import Trajectory as Trajectory
-    from rrtik_ompl.trajectory import load_trajectory as load_trajectory
-    from rrtik_ompl.trajectory import motion_report as motion_report
-    from rrtik_ompl.trajectory import time_parameterize as time_parameterize
     from rrtik_ompl.viewer import view as view
-    from rrtik_ompl.world import World as World
+    from rrtik_ompl.viewer.plots.joints import plot_joints as plot_joints
+    from rrtik_ompl.world.certificates.certificate import Certificate as Certificate
+    from rrtik_ompl.world.certificates.certificate import load_certificate as load_certificate
+    from rrtik_ompl.world.certificates.checked import verify_certificate as verify_certificate
+    from rrtik_ompl.world.certificates.write import certificate_of as certificate_of
+    from rrtik_ompl.world.path import JointPath as JointPath
+    from rrtik_ompl.world.path import load_path as load_path
+    from rrtik_ompl.world.problem import Problem as Problem
     from rrtik_ompl.world.robot_points import without_robot as without_robot
+    from rrtik_ompl.world.world import World as World
 else:
     _HOMES = {
-        "catalog": ("list_problems", "list_robots", "load_robot"),
+        "description.catalog": ("list_problems", "list_robots", "load_robot"),
         "benchmark.batch": ("plan_batch",),
-        "certificates.certificate": ("Certificate", "load_certificate"),
-        "certificates.checked": ("verify_certificate",),
-        "certificates.write": ("certificate_of",),
+        "world.certificates.certificate": ("Certificate", "load_certificate"),
+        "world.certificates.checked": ("verify_certificate",),
+        "world.certificates.write": ("certificate_of",),
         "description.joint_ranges": ("narrowed",),
         "description.joint_weights": ("weighted",),
         "description.padding": ("padded",),
         "description.scaling": ("scaled",),
         "constraints.shorthands": ("inside", "on_line", "on_plane", "orientation_of", "upright"),
-        "errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
-        "following.follower": ("Followed", "Follower"),
-        "following.links": ("RobotLink", "SimulatedLink"),
-        "following.servo": ("Servo",),
-        "goal": ("GoalSet", "JointGoal", "MultiGoal", "PoseGoal", "PositionGoal"),
+        "base.errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
+        "motion.following.follower": ("Followed", "Follower"),
+        "motion.following.links": ("RobotLink", "SimulatedLink"),
+        "motion.following.servo": ("Servo",),
+        "model.goal": ("GoalSet", "JointGoal", "MultiGoal", "PoseGoal", "PositionGoal"),
         "ik.batch": ("IkBatch", "solve_ik_batch"),
         "ik.solve": ("IkResult", "list_ik_methods", "solve_ik"),
         "ik.trajectory": ("IkTrajectory", "solve_ik_trajectory"),
         "ompl_bridge": ("objectives",),
         "ompl_bridge.goal_sampler": ("GoalSampler",),
-        "ompl_bridge.inspection.benchmark_notes": ("BenchmarkNotes",),
+        "ompl_bridge.benchmark_notes": ("BenchmarkNotes",),
         "ompl_bridge.simple_setup": ("simple_setup", "space_information"),
         "files.cloud": ("load_cloud", "save_cloud"),
         "files.heights": ("load_height_field",),
         "files.mesh": ("load_mesh",),
         "files.octree": ("load_octree",),
-        "moves.staircase": ("one_joint_moves",),
-        "path": ("JointPath", "load_path"),
-        "planning": ("Plan", "list_planners", "plan"),
+        "planning.moves.staircase": ("one_joint_moves",),
+        "world.path": ("JointPath", "load_path"),
+        "planning.plan": ("Plan", "list_planners", "plan"),
         "planning.many": ("plan_many",),
-        "plots.joints": ("plot_joints",),
-        "poses": ("pose",),
-        "problem": ("Problem",),
+        "viewer.plots.joints": ("plot_joints",),
+        "base.poses": ("pose",),
+        "world.problem": ("Problem",),
         "problem_files.problem": ("load_problem", "save_problem"),
-        "reach.grid_map": ("ReachMap", "load_reach_map"),
-        "reach.sampling": ("reach_map",),
+        "ik.reach.grid_map": ("ReachMap", "load_reach_map"),
+        "ik.reach.sampling": ("reach_map",),
         "replanning": ("ReplanRun", "load_run", "replan"),
-        "robot": ("Robot",),
+        "model.robot": ("Robot",),
         "replanning.in_time": ("TimedPlan", "plan_in_time"),
         "replanning.scenario": ("Scenario", "load_scenario"),
-        "scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses", "Touching"),
+        "model.scene": ("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses", "Touching"),
         "problem_files.scene": ("load_scene", "save_scene"),
-        "search.roadmap": ("Roadmap", "load_roadmap"),
-        "shapes": (
+        "planning.search.roadmap": ("Roadmap", "load_roadmap"),
+        "model.shapes": (
             "Box",
             "Capsule",
             "Cylinder",
@@ -192,18 +192,18 @@ else:
             "Prism",
             "Sphere",
         ),
-        "shortening": ("MoveRules", "shorten"),
-        "task_region": ("TaskRegion",),
+        "planning.shortening": ("MoveRules", "shorten"),
+        "model.task_region": ("TaskRegion",),
         "tasks": ("Alternatives", "Attach", "Detach", "Gripper", "MoveTo", "Straight", "Task", "TaskPlan"),
         "tasks.plan_file": ("load_task_plan", "save_task_plan"),
         "tasks.task_file": ("list_tasks", "load_task"),
-        "tip_motion": ("StraightResult", "arc", "linear", "screw", "straight"),
+        "planning.tip_motion": ("StraightResult", "arc", "linear", "screw", "straight"),
         "tasks.through": ("PlanThrough", "plan_through"),
         "tasks.timed": ("TimedTask", "time_task"),
-        "trajectory": ("RateLimits", "Trajectory", "load_trajectory", "motion_report", "time_parameterize"),
+        "motion.trajectory": ("RateLimits", "Trajectory", "load_trajectory", "motion_report", "time_parameterize"),
         "viewer": ("view",),
         "world.robot_points": ("without_robot",),
-        "world": ("World",),
+        "world.world": ("World",),
     }
     _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
     __all__ = sorted(_HOME_OF)

@@ -9,9 +9,9 @@ from hypothesis import settings
 from ompl import util as ou
 
 from rrtik_bench.crdt import published as crdt_published
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.fast import warm_up
-from rrtik_ompl.shapes import Mesh
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.kernels import warm_up
+from rrtik_ompl.model.shapes import Mesh
 from rrtik_tests.bent_meshes import bent_meshes_of
 
 # Machines differ and are shared: no example may fail for being slow, and an unattended run repeats the same examples.

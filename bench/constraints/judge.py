@@ -9,8 +9,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.world.problem import Problem
 
 PARTS = 50  # of a stored motion, at least, at which poses are looked at
 FINER = 5  # of the motion resolution of 10 mm, likewise

@@ -11,8 +11,8 @@ import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from bench.tip_motion.judge import Judge
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.model.robot import Robot
 
 TIPS = {"two_titan4": ("left_grip_point", "right_grip_point"), "baxter": ("left_gripper", "right_gripper")}
 REACH = {"two_titan4": 1.6, "baxter": 1.0}  # [m] of the box in which the balls are

@@ -23,7 +23,7 @@ from bench.peers.task import Region, Rows
 from rrtik_ompl.constraints.held_region import ANYWHERE
 from rrtik_ompl.ompl_bridge.attempt import quiet
 from rrtik_ompl.ompl_bridge.region_constraint import RegionConstraint
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 
 DELTA = 0.2  # [rad] of a step along OMPL's manifold; with its own default of 0.05 it is slower
 

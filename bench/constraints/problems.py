@@ -8,13 +8,13 @@ import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
 from rrtik_ompl.constraints.walls import separation
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.world.problem import Problem
 
 KINDS = ("upright", "plane", "line", "orientation")
 DRAWN = 40  # configurations at a time, until one can be used

@@ -10,8 +10,8 @@ from bench.constraints.judge import judged
 from bench.constraints.problems import generated
 from bench.shared.problems import goal_joints
 from rrtik_ompl.constraints.held_regions import held_regions
-from rrtik_ompl.fast.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.ik.held_tables import held_tables
+from rrtik_ompl.kernels.search.constrained.search import ConstrainedSearch
 
 ROUNDS = 3  # of which the quickest counts
 LIMIT = 1.0  # [s] of processor time

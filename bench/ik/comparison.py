@@ -24,17 +24,17 @@ from bench.peers.libraries.eaik import eaik_robot, turned_back
 from bench.shared.pages import add_out
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
-from rrtik_ompl.choices import IkMethod, one_of
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.ik.ik_layout import KERNELS
-from rrtik_ompl.fast.simd.library import library
+from rrtik_ompl.base.choices import IkMethod, one_of
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.goal_rows import pose_rows
 from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
 from rrtik_ompl.ik.numeric.kernel_call import KernelCall
 from rrtik_ompl.ik.serial_chain import seeded_limb_of
 from rrtik_ompl.ik.solve import list_ik_methods
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.kernels.ik.ik_layout import KERNELS
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.robot import Robot
 
 PACKAGES = ("numpy", "pin", "numba", "pytracik", "ikpy", "eaik", "roboticstoolbox-python")
 ARMS = ("ur5", "panda", "puma560", "titan4")

@@ -13,7 +13,7 @@ from rrtik_bench.genetic.runs import TRAJECTORIES, TrajectoryRun, arm, mean, med
 from rrtik_bench.report.page import Report
 from rrtik_ompl.ik.genetic.objective import manipulability
 from rrtik_ompl.ik.genetic.options import REFINED, STANDARD
-from rrtik_ompl.shapes import Sphere
+from rrtik_ompl.model.shapes import Sphere
 
 FREE = replace(STANDARD, gain=0.0)  # for five joints
 GAIN = (

@@ -19,7 +19,7 @@ from rrtik_bench.genetic.runs import JUMP, TRAJECTORIES, TrajectoryRun, arm, mea
 from rrtik_bench.report.page import Report
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD
-from rrtik_ompl.plots.joints import COLORS, save_figure, tidy
+from rrtik_ompl.viewer.plots.joints import COLORS, save_figure, tidy
 
 SLOW = replace(HISTORICAL, gene_mutation=0.005, stall=None)  # the other fit that the sources name
 D7 = (2.2, 4.0, 8.0)

@@ -15,9 +15,9 @@ import numpy as np
 import rrtik_ompl as rrtik
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
-from rrtik_ompl.goal import Goal
-from rrtik_ompl.poses import pose
-from rrtik_ompl.shapes import Box
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.model.goal import Goal
+from rrtik_ompl.model.shapes import Box
 
 PLANNERS = ("RRTConnect", "bicrdt", "fastrrtconnect")
 SECONDS = 5.0

@@ -11,11 +11,11 @@ import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from rrtik_bench.ikurt import EXAMPLES
-from rrtik_ompl.errors import ProblemError
-from rrtik_ompl.goal import JointGoal, PoseGoal
+from rrtik_ompl.base.errors import ProblemError
 from rrtik_ompl.ik.ikurt.metric import reach
+from rrtik_ompl.model.goal import JointGoal, PoseGoal
+from rrtik_ompl.model.shapes import Sphere
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.shapes import Sphere
 
 TITAN = ("titan4_regular", "titan4_wrist", "titan4_axis1", "titan4_p_axis1")  # the last three are singular
 ARMS = ("ur5", "panda", "titan4")

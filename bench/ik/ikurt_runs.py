@@ -14,10 +14,10 @@ from ompl import geometric as og
 import rrtik_ompl as rrtik
 from bench.ik import ikurt_cases as cases
 from rrtik_bench.ikurt import as_published, metric_of
-from rrtik_ompl.goal import PoseGoal
 from rrtik_ompl.ik.ikurt.metric import TipMetric
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
+from rrtik_ompl.model.goal import PoseGoal
 from rrtik_planners import IKURT, FastRRTConnect, IKURTPublished
 
 POSE_SECONDS, PANDA_SECONDS, BLOCKED_SECONDS = 2.0, 1.0, 1.0

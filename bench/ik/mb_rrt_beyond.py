@@ -26,7 +26,7 @@ from rrtik_ompl.ik.mb_rrt.search import polished
 from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.ik.solve import solve_ik
-from rrtik_ompl.shapes import Cylinder
+from rrtik_ompl.model.shapes import Cylinder
 from rrtik_planners import MBRRT, BiCRDT
 from rrtik_robots.planar import planar
 

@@ -22,7 +22,7 @@ from rrtik_bench.report.page import Report
 from rrtik_ompl.ik.mb_rrt.arc import grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links, headings_to_joints, joints_to_chain, sunflower
-from rrtik_ompl.plots.mb_rrt_tree import plot_tree
+from rrtik_ompl.viewer.plots.mb_rrt_tree import plot_tree
 
 
 def structure(rng: np.random.Generator) -> float:

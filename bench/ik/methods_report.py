@@ -14,7 +14,7 @@ import numpy as np
 import rrtik_ompl as rrtik
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.solve import IkResult, list_ik_methods
 
 POSES = ("ur5", "panda", "puma560", "titan4")

@@ -18,14 +18,14 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from bench.shared.pages import REPORTS
+from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links
-from rrtik_ompl.plots.reach import plot_slices
-from rrtik_ompl.poses import pose_from_rpy
-from rrtik_ompl.reach.sampling import reach_map
+from rrtik_ompl.ik.reach.sampling import reach_map
 from rrtik_ompl.viewer import view
 from rrtik_ompl.viewer.drawing.reach_marks import reach_marks
 from rrtik_ompl.viewer.drawing.tree_marks import tree_marks
+from rrtik_ompl.viewer.plots.reach import plot_slices
 from rrtik_ompl.viewer.subject import Shown
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 
 from bench.shared.pages import add_out
-from rrtik_ompl.plots.reach import plot_slices
+from rrtik_ompl.viewer.plots.reach import plot_slices
 from rrtik_robots.titan4.workspace import effective_slices
 
 

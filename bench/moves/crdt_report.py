@@ -20,8 +20,8 @@ from rrtik_bench.crdt.baseline import TreeRun, crdt_run, rrt_run
 from rrtik_bench.crdt.published import CRDT_TABLE, PRISM_LIST, RRT_TABLE, SDU_LIST
 from rrtik_bench.crdt.runs import STAGES, RouteRun, best_of_groups, histogram, joints_of, route_run, share
 from rrtik_bench.report.page import Report
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.transitions import lower_bound, route_length, routes, transitions
+from rrtik_ompl.model.transitions import lower_bound, route_length, routes, transitions
+from rrtik_ompl.world.problem import Problem
 
 OPTIMA = {"env_e": 4, "planar3_a": 3, "planar3_b": 4, "planar3_c": 3, "titan4_sdu": 6, "titan4_prisms": 3}
 WITH_ROOM = "planar3_a, 10 mm out"

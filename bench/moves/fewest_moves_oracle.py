@@ -22,11 +22,11 @@ from bench.shared.problems import goal_joints
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_arms import PlaneArm, PlaneGrid
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Sphere
-from rrtik_ompl.transitions import lower_bound, single_joint, transitions
-from rrtik_ompl.world import World
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Sphere
+from rrtik_ompl.model.transitions import lower_bound, single_joint, transitions
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_planners import FewestMoves
 from rrtik_robots.planar import planar
 

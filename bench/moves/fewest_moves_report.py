@@ -18,9 +18,9 @@ from bench.shared.pages import add_out
 from bench.shared.problems import goal_joints
 from rrtik_bench.crdt.runs import histogram, joints_of, share, sound
 from rrtik_bench.report.page import Report
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening.fewest_moves import grid_route, least_moves
-from rrtik_ompl.transitions import lower_bound, transitions
+from rrtik_ompl.model.transitions import lower_bound, transitions
+from rrtik_ompl.planning.shortening.fewest_moves import grid_route, least_moves
+from rrtik_ompl.world.problem import Problem
 from rrtik_planners import FewestMoves
 
 LIMITS = {"titan4_sdu": 2.0}  # [s] for a run

@@ -19,12 +19,12 @@ from bench.shared.problems import goal_joints
 from rrtik_bench.crdt.runs import histogram, sound
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
-from rrtik_ompl.choices import ShorteningMethod
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.generated_problems import FAMILIES, generated_problem
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.transitions import lower_bound
+from rrtik_ompl.base.choices import ShorteningMethod
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.transitions import lower_bound
+from rrtik_ompl.planning.generated_problems import FAMILIES, generated_problem
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
 
 ARMS = ("titan4", "ur5")
 LIMIT = 5.0  # [s] for a plan
@@ -194,7 +194,7 @@ def write(report: Report, results: dict[str, list[Scene]], options: argparse.Nam
     for arm, found in results.items():
         tables(report, arm, found)
     text = (
-        f"Scenes of `rrtik_ompl.generated_problems`, families in turns, seeds 0, 1, ...; every one has a path, found "
+        f"Scenes of `rrtik_ompl.planning.generated_problems`, families in turns, seeds 0, 1, ...; every one has a path, found "
         f"by RRT-Connect or BiCRDT, but neither a free straight motion nor a free order of moving every joint once. "
         f"Limits: {LIMIT:g} s for every planner, {MAKE_FEWER:g} s for fewest-moves as a way to shorten; times are wall "
         f"clock and include all stages; {options.jobs} at a time."

@@ -18,12 +18,12 @@ from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_worlds import PUBLISHED, Plane, generated, sampled_route
 from rrtik_ompl import load_problem, plan, shorten
-from rrtik_ompl.shortening import METHODS, Task
-from rrtik_ompl.shortening.corners import snap_corners
-from rrtik_ompl.shortening.random_cut import random_cut
-from rrtik_ompl.shortening.retraction import retract
-from rrtik_ompl.shortening.sequential import sequential_cut
-from rrtik_ompl.transitions import route_length
+from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.planning.shortening import METHODS, Task
+from rrtik_ompl.planning.shortening.corners import snap_corners
+from rrtik_ompl.planning.shortening.random_cut import random_cut
+from rrtik_ompl.planning.shortening.retraction import retract
+from rrtik_ompl.planning.shortening.sequential import sequential_cut
 
 STEP = 1.0  # of the planner in the worlds of 26 x 20
 METHODS_MEASURED: dict[str, Callable[[np.ndarray, Task], np.ndarray]] = {

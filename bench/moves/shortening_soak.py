@@ -20,12 +20,12 @@ from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, load_robot, one_joint_moves, shorten
-from rrtik_ompl.choices import ShorteningMethod
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.generated_problems import FAMILIES, generated_problem
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening import METHODS
+from rrtik_ompl.base.choices import ShorteningMethod
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.planning.generated_problems import FAMILIES, generated_problem
+from rrtik_ompl.planning.shortening import METHODS
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
 
 SHIPPED = ("planar3_boxes", "titan4_sdu", "titan4_prisms")
 ARMS = ("titan4", "ur5")

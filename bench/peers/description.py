@@ -11,14 +11,14 @@ import numpy as np
 import pinocchio as pin
 
 from bench.peers.task import BASE, GROUP, TIP, Solid, Task
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.shape_table import shape_of
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.shape_table import shape_of
 from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 

@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 Solver: TypeAlias = Callable[[np.ndarray], np.ndarray | None]
 NAMES = ("pytracik", "ikpy", "eaik", "roboticstoolbox")  # modules of bench.peers.libraries

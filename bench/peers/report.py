@@ -36,8 +36,8 @@ from bench.speed.ours import our_search, warm_up
 from rrtik_bench.report.machine import package_version
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, Problem
-from rrtik_ompl.arrays import TAU
-from rrtik_ompl.generated_problems import generated_problem
+from rrtik_ompl.base.arrays import TAU
+from rrtik_ompl.planning.generated_problems import generated_problem
 
 OURS, OWN_RULE = "rrtik_ompl, fastrrtconnect", "the same by its own, denser rule"
 PEERS = {

@@ -34,8 +34,8 @@ from bench.whole_calls.search import scene_files
 from bench.whole_calls.search_calls import problem_of, spent
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, Problem
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.generated_problems import FAMILIES, generated_problem
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.planning.generated_problems import FAMILIES, generated_problem
 
 OURS = "rrtik_ompl, plan()"
 GENERATED, SETS = ("titan4", "ur5", "panda"), ("panda", "ur5")

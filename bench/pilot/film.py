@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.shared.pages import add_out
-from rrtik_ompl.overlay.film import write_film
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle
+from rrtik_ompl.pilot.overlay.film import write_film
 from rrtik_ompl.pilot.setup import SessionOptions
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "helpers"))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.pilot.devices.wrong_arm import WrongArm
 from rrtik_ompl.pilot.session import Session
 

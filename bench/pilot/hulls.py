@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.collision.solids import hull, is_mesh
+from rrtik_ompl.geometry.collision.solids import hull, is_mesh
 
 GROWTH = 1e-3  # [m] that a hull of fewer vertices may stand out
 PLACES = 300

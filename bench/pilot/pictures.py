@@ -16,17 +16,17 @@ import pinocchio as pin
 import tornado.websocket
 
 from bench.pilot.scene import NAME, PLACE, ROBOT, seen_at
-from rrtik_ompl.overlay.augment import Augmenter
-from rrtik_ompl.overlay.virtual_camera import orbit_pose
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.model.scene import Obstacle
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.pilot.engine import Engine
+from rrtik_ompl.pilot.overlay.augment import Augmenter
+from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer
-from rrtik_ompl.poses import pose
-from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
-from rrtik_ompl.shapes import Box
 
 PICTURES, SWAY = 30, 0.03  # of the object that moves; [m]
 QUIET = 4.0  # [s] without a click, in which states are counted

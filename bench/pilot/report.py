@@ -15,7 +15,7 @@ from bench.pilot.routes import REACTION_SECONDS, REPLANNING, panel_routes, simul
 from bench.pilot.session import color_logic, preventive_checks, scripted_scenario
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
-from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
+from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS
 
 PUBLISHED = 1.08  # [s] of one route: search and shortening

@@ -8,7 +8,7 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
-from rrtik_ompl.pilot.lamps import GREEN
+from rrtik_ompl.pilot.routes.lamps import GREEN
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 

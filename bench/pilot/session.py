@@ -12,7 +12,7 @@ import pinocchio as pin
 from bench.pilot.scene import NAME, PLACE, PROBLEM, ROBOT, VALVE, WORLD, seen_at
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.pilot.devices.arm import joint_rates
-from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED, lamps, stage_poses
+from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, RED, lamps, stage_poses
 from rrtik_ompl.pilot.routes.manoeuvre import check_move
 from rrtik_ompl.pilot.routes.proposal import propose
 from rrtik_ompl.pilot.routes.route import Route

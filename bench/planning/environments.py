@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.base.arrays import Mask, Matrix
 
 SPHERES, HYPERCUBE_EDGE, CHAIN_LINKS = 30, 0.1, 10
 WHITE = 127  # of 255, above which a pixel is free

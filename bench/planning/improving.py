@@ -17,7 +17,7 @@ import numpy as np
 import rrtik_ompl as rrtik
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
 BEST = Path(__file__).resolve().parent.parent / "data" / "mbm_best.csv"

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
-from rrtik_ompl.errors import RrtikError
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
 

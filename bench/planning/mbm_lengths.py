@@ -18,11 +18,11 @@ from bench.shared.pages import add_out
 from rrtik_bench.crdt.runs import sound
 from rrtik_bench.report.page import Report
 from rrtik_ompl import one_joint_moves, plan, shorten
-from rrtik_ompl.choices import ShorteningMethod
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.choices import ShorteningMethod
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
 
 PUBLISHED = 4.90  # [rad], median after simplification; of VAMP, whose path before it has 7.76
 LIMIT = 10.0  # [s] of a plan

@@ -20,7 +20,7 @@ from ompl import util as ou
 from bench.planning.environments import Environment, environments
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, RoadmapPlanner
 
 LIMIT = 3.0  # [s] of processor time

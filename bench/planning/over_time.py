@@ -31,7 +31,7 @@ from bench.peers.host import Host
 from bench.planning.improving import JUDGED, TIMES, WORST, chosen
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ompl_bridge.setup import exact_path
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 

@@ -23,8 +23,8 @@ from ompl import util as ou
 import rrtik_ompl as rrtik
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.plots.joints import COLORS, DASHES, save_figure, tidy
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.viewer.plots.joints import COLORS, DASHES, save_figure, tidy
 from rrtik_planners import BiCRDT, FastAORRTC, FastRRTConnect, RestartShorten
 
 OURS = (RestartShorten, FastAORRTC, FastRRTConnect, BiCRDT)

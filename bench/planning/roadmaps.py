@@ -16,7 +16,7 @@ import numpy as np
 from bench.shared.pages import add_out
 from rrtik_bench.report.page import Report
 from rrtik_ompl import Problem, Roadmap, World, plan, pose
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
 WANTED = 3e-4  # [s] median of a query

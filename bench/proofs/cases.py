@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.certificates.certificate import Certificate
-from rrtik_ompl.certificates.write import certificate_of
-from rrtik_ompl.fast.tables.solid_tables import convex_solids
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.kernels.tables.solid_tables import convex_solids
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
+from rrtik_ompl.world.certificates.certificate import Certificate
+from rrtik_ompl.world.certificates.write import certificate_of
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
 
 WAYPOINTS = 7
 STEP = 0.8  # [rad] or [m] from one waypoint to the next, about

@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.certificate import Certificate
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.geometry.collision.certificate import Certificate
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
 
 FINER = 50.0  # than the world's motion resolution
 AT_ONCE = 100_000  # configurations

@@ -18,20 +18,20 @@ from numpy.typing import NDArray
 import rrtik_ompl as rrtik
 from bench.proofs.judge import deepest_cut
 from bench.shared.problems import goal_joints
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.choices import ShorteningMethod
-from rrtik_ompl.collision.bodies import Body, link_bodies
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.generated_problems import generated_problem
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.choices import ShorteningMethod
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Cylinder
 from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem, densely_checked
+from rrtik_ompl.planning.generated_problems import generated_problem
+from rrtik_ompl.planning.shortening import METHODS, Task
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Cylinder
-from rrtik_ompl.shortening import METHODS, Task
-from rrtik_ompl.world import World
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem, densely_checked
+from rrtik_ompl.world.world import World
 
 PLATE, NEEDLE = 1e-4, 2e-4  # [m] thickness, radius
 PLANNERS = ("fastrrtconnect", "bicrdt", "RRTConnect")
@@ -226,7 +226,7 @@ def benchmark_problem(file: str, urdf: str) -> Timed:
         finally:
             spent += process_time() - begin
 
-    with patch("rrtik_ompl.planning.search.attempt", timed):
+    with patch("rrtik_ompl.planning.attempts.attempt", timed):
         begin = process_time()
         found = rrtik.plan(problem, "fastrrtconnect", seed=1)
         whole = process_time() - begin

@@ -12,10 +12,10 @@ from time import process_time
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.model.robot import Chain, Robot
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.robot import Chain, Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 FEW = 2  # joints that move a pair
 DRAWN = 20_000  # configurations

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from bench.moves.fewest_moves_oracle import ROOM, drawn_arm, world_of
 from bench.proofs.measurements import by_every_method
 from rrtik_bench.shortening.plane_arms import PlaneArm
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening import METHODS
+from rrtik_ompl.planning.shortening import METHODS
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
 
 Motion: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64]]
 

@@ -10,8 +10,8 @@ from unittest.mock import patch
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.world.world import World
 from rrtik_robots.titan4.singular_samples import configurations_inside
 
 REACHED = 1e-6  # [m] and [rad] of a matrix

@@ -23,8 +23,8 @@ from bench.proofs.tampering import TAMPERINGS
 from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes, processor
 from rrtik_bench.report.page import Report
-from rrtik_ompl.generated_problems import FAMILIES
-from rrtik_ompl.shortening import METHODS
+from rrtik_ompl.planning.generated_problems import FAMILIES
+from rrtik_ompl.planning.shortening import METHODS
 
 ARMS = ("panda", "ur5", "titan4", "puma560", "planar3", "planar10", "xarm7", "ur5_gripper")
 SHORTENED_ARMS = ("panda", "ur5", "titan4", "planar3")
@@ -151,7 +151,7 @@ def _judged(own: list[Judged]) -> list[str]:
 
 HEADS = ["paths", "proven", "deepest cut of these [um]", "of the others [um]", "clearance kept, median [mm]"]
 GENERATED = (
-    "Scenes of `rrtik_ompl.generated_problems` with up to six plates of 0.1 mm and needles of 0.2 mm radius about the "
+    "Scenes of `rrtik_ompl.planning.generated_problems` with up to six plates of 0.1 mm and needles of 0.2 mm radius about the "
     "straight way; planners by turns: fastrrtconnect, bicrdt, OMPL's RRTConnect. The judge samples every path at 1/50 "
     "of the motion resolution with the discrete checks, every 100th sample with coal and numpy alone, and measures "
     "with coal how deep it is in."

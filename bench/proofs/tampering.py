@@ -12,13 +12,13 @@ import pinocchio as pin
 
 from bench.proofs.cases import Case, inner_point
 from rrtik_ompl import load_robot
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.certificates.certificate import Certificate, MotionEntries
-from rrtik_ompl.collision.contacts import Contact, measured
-from rrtik_ompl.collision.digests import robot_digest, scene_digest
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.contacts import Contact, measured
+from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.world.certificates.certificate import Certificate, MotionEntries
+from rrtik_ompl.world.world import World
 
 TOUCH = 1e-6  # [rad] or [m] by which a waypoint is moved
 SLIGHT = 1e-5  # [m] that is asked for beyond what there is

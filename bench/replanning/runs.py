@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.planning import plan
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.replanning import ReplanRun, replan
 from rrtik_ompl.replanning.connecting import PythonConnect
 from rrtik_ompl.replanning.contact_check import ContactReport, check_contacts
@@ -20,7 +21,6 @@ from rrtik_ompl.replanning.generate import moving_problem
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.loop import Loop
 from rrtik_ompl.replanning.settings import ReplanSettings
-from rrtik_ompl.scene import Scene
 from rrtik_ompl.world.motion_queries import MotionQueries
 
 ARMS = {

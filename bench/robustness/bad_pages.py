@@ -19,7 +19,7 @@ from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 
 COMMANDS = (
     '{"name": "jog", "direction": 0.5, "press": 2, "seq": 3}',

@@ -22,7 +22,7 @@ from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
 from rrtik_ompl import World
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 
 PAGE = "contact.md"
 ALLOWED = 2e-6  # [m]

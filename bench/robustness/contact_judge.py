@@ -18,10 +18,10 @@ import pinocchio as pin
 
 from bench.robustness.solid_distance import distance_to, lowest
 from rrtik_ompl import Obstacle, PointCloud, World
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.solids import bvh, is_mesh, mesh_arrays
-from rrtik_ompl.scene import AttachedObject
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.solids import bvh, is_mesh, mesh_arrays
+from rrtik_ompl.model.scene import AttachedObject
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
 
 STEPS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 100.0, 300.0, 1000.0]) * 1e-6  # [m] by which bodies are moved apart
 WAYS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])

@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl import AttachedObject, Obstacle, PointCloud, Robot, Scene, World, load_robot
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
-from rrtik_ompl.shapes.surfaces import revolved
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
+from rrtik_ompl.model.shapes.surfaces import revolved
 
 ROBOTS = (
     *("titan4", "panda", "panda_primitives", "ur5_gripper", "ur10", "kinova"),

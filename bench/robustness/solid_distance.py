@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, Mesh, Prism, Shape, Sphere
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Mesh, Prism, Shape, Sphere
 
 BLOCK = 64  # triangles whose box is looked at first
 

@@ -10,13 +10,13 @@ import pinocchio as pin
 from rrtik_bench.drrt_con import REPAIR_SECONDS, SOURCE, _kept_free
 from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.model.scene import Obstacle, TimedPoses
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.replanning import ReplanRun
 from rrtik_ompl.replanning.scenario import Scenario, load_scenario
-from rrtik_ompl.scene import Obstacle, TimedPoses
-from rrtik_ompl.shapes import Box
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 SUDDEN = 0.01  # [s], less than a tick: an obstacle is elsewhere in the next one
 NOWHERE = pin.SE3(np.eye(3), np.array([-60.0, -60.0, 0.0]))

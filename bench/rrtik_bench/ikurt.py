@@ -9,15 +9,15 @@ import numpy as np
 import rrtik_ompl as rrtik
 from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.world import World
+from rrtik_ompl.model.goal import PoseGoal, PositionGoal
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import verification_resolution
+from rrtik_ompl.world.world import World
 
 SOURCE = "[1, ch. 5.1]"
 METRIC = 1e-2  # accuracy of poses in the published metric

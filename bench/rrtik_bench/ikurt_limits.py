@@ -16,10 +16,10 @@ import rrtik_ompl as rrtik
 from rrtik_bench.ikurt import EXAMPLES, METRIC, SINGULAR, SOURCE, STEP, THRESHOLD_ANGLE, as_published
 from rrtik_bench.report.rows import Bar, Row, all_of, exactly, judged
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.ikurt.metric import TipMetric
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 
 WRIST = "titan4_wrist"
 BEYOND = 0.5  # of a joint's range

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from rrtik_bench.drrt_con import FASTEST, REPAIR_SECONDS
 from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.replanning import ReplanRun
 from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.drrt_con import points_along, without_points_between
@@ -26,7 +27,6 @@ from rrtik_ompl.replanning.feed import feed_of
 from rrtik_ompl.replanning.loop import Loop
 from rrtik_ompl.replanning.scenario import Scenario, load_scenario
 from rrtik_ompl.replanning.settings import ReplanSettings
-from rrtik_ompl.transitions import route_length
 from rrtik_ompl.world.motion_queries import MotionQueries
 
 SOURCE = "[1, ch. 5.2, figure 5.12]"

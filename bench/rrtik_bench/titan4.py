@@ -7,10 +7,10 @@ import numpy as np
 import rrtik_ompl as rrtik
 from rrtik_bench.report.rows import INFINITE, Bar, Row, about, all_of, exactly, judged, small
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 SOURCE = "[1, ch. 3, app. A to C]"
 A1, A2, A3, A4, D6 = 0.122, 0.851, 0.483, 0.127, 0.339  # [m]; no lengths are printed: drawings and the headline reach

@@ -10,8 +10,8 @@ import rrtik_ompl as rrtik
 from rrtik_bench.report.rows import Bar, Row, judged, small
 from rrtik_bench.tables import Table
 from rrtik_bench.titan4 import A1, A2, A3, A4, D6, RANK_TOLERANCE, RIGHT
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.model.robot import Robot
 
 SOURCE = "[1, ch. 3, equations 3.5 and 3.37]"
 SCREWS = (  # direction of each axis and a point on it [m], all joints at zero

@@ -10,10 +10,10 @@ import pinocchio as pin
 import rrtik_ompl as rrtik
 from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.analytic.closed_form import solutions
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 
 SOURCE = "[1, ch. 4.4.2]"
 FRAMES, HELD, RATE = 600, 600, 30.0  # frames that move, that stand at the end, [Hz]

@@ -13,8 +13,8 @@ import numpy as np
 
 from bench.scale.boxes import BUSY, PLANNER, spent
 from rrtik_ompl import Obstacle, PointCloud, Problem, ProblemError, Robot, Scene, World, load_robot, plan
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.bodies import link_bodies
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.geometry.collision.bodies import link_bodies
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
 RADIUS = 0.005  # [m] of a point

@@ -9,8 +9,8 @@ import coal
 import numpy as np
 
 from rrtik_ompl import Obstacle, PointCloud, Problem, ProblemError, Robot, Scene, World, load_robot, replan
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.bodies import link_bodies
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import link_bodies
 
 POINTS, RADIUS = 20_000, 0.005  # [m] of a point
 BALL = 0.12  # [m]

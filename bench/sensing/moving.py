@@ -22,7 +22,7 @@ from bench.sensing.stress_pictures import Trouble, facing, taken
 from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
-from rrtik_ompl.arrays import TAU
+from rrtik_ompl.base.arrays import TAU
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.sensor import Sensor
 

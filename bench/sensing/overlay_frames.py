@@ -13,13 +13,13 @@ import numpy as np
 from bench.shared.problems import goal_joints
 from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, load_robot
-from rrtik_ompl.overlay.augment import Augmenter, Ghost
-from rrtik_ompl.overlay.canvas import FARTHEST_DRAWN, Canvas
-from rrtik_ompl.overlay.figure import figure_of, placed
-from rrtik_ompl.overlay.reference_z_buffer import ROUNDING, reference_z_buffer
-from rrtik_ompl.overlay.surfaces import robot_surfaces
-from rrtik_ompl.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
+from rrtik_ompl.pilot.overlay.augment import Augmenter, Ghost
+from rrtik_ompl.pilot.overlay.canvas import FARTHEST_DRAWN, Canvas
+from rrtik_ompl.pilot.overlay.figure import figure_of, placed
+from rrtik_ompl.pilot.overlay.reference_z_buffer import ROUNDING, reference_z_buffer
+from rrtik_ompl.pilot.overlay.surfaces import robot_surfaces
+from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera

@@ -21,9 +21,9 @@ from rrtik_bench.sensing.runs import (
 )
 from rrtik_bench.sensing.tables import ACCURACY, GRIPPER, NOISE, SERIES
 from rrtik_ompl import load_robot
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.ik.analytic.closed_form import solutions
-from rrtik_ompl.overlay.virtual_camera import orbit_pose
-from rrtik_ompl.poses import pose
+from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.detection import marker_cells

@@ -18,7 +18,7 @@ from bench.sensing.stress_pictures import SIDE, Trouble, facing, taken
 from bench.shared.parts import Parts, add_options
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
-from rrtik_ompl.poses import pose
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.synthetic_camera import PUBLISHED_MATRIX
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.detection import marker_cells
 

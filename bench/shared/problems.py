@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.world.problem import Problem
 
 
 def goal_joints(problem: Problem) -> Vector:

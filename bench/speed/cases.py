@@ -14,11 +14,11 @@ import pinocchio as pin
 from ompl import geometric as og
 
 from rrtik_ompl import Obstacle, Problem, ProblemError, Scene, World, list_problems, load_problem, load_robot
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.goal_configurations import goal_configurations
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder
 from rrtik_ompl.ompl_bridge.attempt import attempt
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.shapes import Box, Capsule, Cylinder
 
 BISECTIONS = 12
 NEAR = 0.1  # [rad] from contact

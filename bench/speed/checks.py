@@ -28,8 +28,8 @@ from bench.speed.cases import (
 from bench.speed.ours import joint_values, timed
 from rrtik_bench.report.page import Report
 from rrtik_ompl import World, load_robot
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast import FREE, UNDECIDED
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.kernels import FREE, UNDECIDED
 
 STEPS = 31  # of a motion of 1 rad: 32 configurations, which fill all lanes
 REPEATS = 7

@@ -26,12 +26,12 @@ from bench.shared.problems import goal_joints
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
 from rrtik_ompl import Obstacle, Scene, World, load_robot
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.covers.spheres import inner_spheres, outer_cover, protrusion_bound
-from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld, needs_covers
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.covers.spheres import inner_spheres, outer_cover, protrusion_bound
+from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld, needs_covers
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.shapes import Box, Cylinder
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.shapes import Box, Cylinder
 
 ROBOTS = ("titan4", "panda", "ur5", "puma560", "kinova", "so101", "so100", "xarm7", "z1", "baxter_left", "ur3")
 NEAR = 0.1  # [m]

@@ -7,8 +7,8 @@ import platform
 
 from bench.speed.ours import PLANNER
 from rrtik_bench.report.machine import package_version, processor
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.simd.processor import WIDTH
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.simd.processor import WIDTH
 
 PACKAGES = ("rrtik-ompl", "numba", "llvmlite", "numpy", "ompl", "pin", "coal", "roboplan", "vamp-planner")
 

@@ -12,10 +12,10 @@ from ompl import base as ob
 from ompl import geometric as og
 
 from rrtik_ompl import Problem, World
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.goal_configurations import goal_configurations
+from rrtik_ompl.kernels.search.connect import ConnectSearch
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.ompl_bridge.attempt import attempt
 from rrtik_ompl.ompl_bridge.planner_names import find_planner, list_planners
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space

@@ -20,8 +20,8 @@ from bench.speed.cases import Options, exact_problem, family, panda_files, shipp
 from bench.speed.ours import PLANNER, ompl_overhead, our_search, timed, warm_up
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, plan
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.world.problem import Problem
 
 REPEATS = 5
 HAS_ROBOPLAN, HAS_VAMP = (find_spec(name) is not None for name in ("roboplan", "vamp"))

@@ -20,8 +20,8 @@ from bench.shared.parts import Parts, add_options
 from bench.tip_motion.judge import Judge
 from rrtik_bench.report.machine import processes, processor
 from rrtik_bench.report.page import Report
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.world.world import World
 
 SHAFT, PLAY = 0.06, 0.0005  # [m]: side of the square shaft, and room on each side of it
 LONG, DEEP, THICK = 0.30, 0.16, 0.05  # [m]: the tool, the holder along its axis, the walls of the holder

@@ -12,8 +12,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.world.world import World
 
 SAMPLES = 50  # of each motion
 POINTS = 1500  # of a line that is followed by brute force

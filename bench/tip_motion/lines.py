@@ -11,8 +11,8 @@ import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from bench.tip_motion.judge import Judge
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.world.world import World
 
 BALLS, RADIUS = 4, 0.1  # obstacles of every world, [m]
 SPREAD = 0.35  # [rad] of the joints between the begin and a configuration at the goal

@@ -23,7 +23,7 @@ from bench.tip_motion.judge import Judge
 from bench.tip_motion.lines import ROUNDS, SPREAD
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 
 ARMS = ("titan4", "ur5", "panda")
 THEIRS = {

@@ -13,7 +13,7 @@ import pinocchio as pin
 import rrtik_ompl as rrtik
 from bench.tip_motion.judge import Judge
 from rrtik_ompl.tasks.stages import Stage
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # the TITAN's tip looks along x

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from rrtik_ompl import RateLimits, load_robot, plan, solve_ik_trajectory
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.path import JointPath
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
 
 ARMS = ("panda", "ur5")
 JERK_SHARE = 10.0  # times the acceleration a second, where no jerk limit is published

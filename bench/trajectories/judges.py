@@ -12,20 +12,20 @@ from bench.shared.parts import Parts
 from bench.trajectories.cases import ARMS, planned
 from rrtik_bench.report.page import Report
 from rrtik_ompl import RateLimits, load_robot, time_parameterize
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.following.servo import Servo
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Sphere
-from rrtik_ompl.trajectory import State, Trajectory
-from rrtik_ompl.trajectory.corners import first_radii, vertices
-from rrtik_ompl.trajectory.curve import Curve
-from rrtik_ompl.trajectory.fastest import Bounds, fastest
-from rrtik_ompl.trajectory.line import along_lines
-from rrtik_ompl.trajectory.runs import along_curve
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Sphere
+from rrtik_ompl.motion.following.servo import Servo
+from rrtik_ompl.motion.trajectory import State, Trajectory
+from rrtik_ompl.motion.trajectory.corners import first_radii, vertices
+from rrtik_ompl.motion.trajectory.curve import Curve
+from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest
+from rrtik_ompl.motion.trajectory.line import along_lines
+from rrtik_ompl.motion.trajectory.runs import along_curve
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
 
 _PANDA = load_robot("panda")
 PANDA = RateLimits(_PANDA.velocity, _PANDA.acceleration, _PANDA.jerk)

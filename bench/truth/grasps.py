@@ -17,8 +17,8 @@ import pinocchio as pin
 import rrtik_ompl as rrtik
 from bench.shared.parts import Parts
 from rrtik_bench.report.page import Report
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.shapes import Shape
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.tasks.stages import Stage
 
 ARMS = ("ur5", "panda", "ur10", "xarm7", "kinova")

@@ -26,13 +26,13 @@ import numpy as np
 import rrtik_ompl as rrtik
 from bench.shared.parts import Parts
 from rrtik_bench.report.page import Report
-from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.base.errors import RrtikError
 
 LIBRARY = Path(rrtik.__file__).parent
 MARKER = "EXECUTED"
 RUNS = f"touch {MARKER}"
 OPENING = ("path", "file", "name_or_file", "name", "folder")  # first parameters of functions that open files
-NO_LOADERS = ("rrtik_ompl.fast", "rrtik_ompl.ik")  # where load_ and read_ are of tables in memory
+NO_LOADERS = ("rrtik_ompl.kernels", "rrtik_ompl.ik")  # where load_ and read_ are of tables in memory
 ENDINGS = (
     ".yaml", ".yml", ".json", ".jsonl", ".csv", ".txt", ".xml", ".mjcf", ".urdf", ".xacro", ".srdf", ".stl", ".obj",
     ".dae", ".ply", ".pcd", ".npy", ".npz", ".bt", ".ot", ".png", ".jpg", ".pkl", ".pickle", ".ipynb", ".py", ".toml",

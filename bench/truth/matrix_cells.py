@@ -37,13 +37,13 @@ import rrtik_ompl as rrtik
 import rrtik_planners
 from bench.truth.shape_kinds import kinds
 from rrtik_ompl import AttachedObject, Obstacle, Problem, Roadmap, Robot, Scene, TimedPoses, World
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.collision.certificate import Certificate
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.certificate import Certificate
+from rrtik_ompl.model.shapes import HeightField, Mesh, PointCloud, Shape
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.ompl_bridge.motion_checker import SpaceChecker, WorldChecker
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
-from rrtik_ompl.shapes import HeightField, Mesh, PointCloud, Shape
-from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.viewer.page_planner import page_planner
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.proven_motions import ProvenMotions

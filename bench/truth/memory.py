@@ -10,8 +10,8 @@ import numpy as np
 from bench.shared.parts import Parts
 from rrtik_bench.report.page import Report
 from rrtik_ompl import Obstacle, PointCloud, Scene, World, load_robot, plan
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.shapes.point_cloud import PointCloud as Cloud
+from rrtik_ompl.model.shapes.point_cloud import PointCloud as Cloud
+from rrtik_ompl.world.problem import Problem
 
 SCANS, POINTS, EVERY = 10_000, 2_000, 500
 FLAT_MB = 5.0

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 import yaml
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 
 SLIDES = (("x", "base", "a", "1 0 0"), ("y", "a", "b", "0 1 0"), ("z", "b", "tool", "0 0 1"))
 SLIDE = """<joint name="{}" type="prismatic"><parent link="{}"/><child link="{}"/><axis xyz="{}"/>

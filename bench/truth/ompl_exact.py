@@ -19,12 +19,13 @@ from ompl import util as ou
 from bench.shared.parts import Parts
 from bench.truth import own_planners
 from rrtik_bench.report.page import Report
-from rrtik_ompl import JointPath, PoseGoal, Problem, catalog, load_problem, load_robot, simple_setup
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl import JointPath, PoseGoal, Problem, load_problem, load_robot, simple_setup
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.description import catalog
+from rrtik_ompl.model.transitions import subdivided
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
 from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners
-from rrtik_ompl.transitions import subdivided
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 PROBLEMS = ("planar3_boxes", "planar3_a", "titan4_sdu", "ur10_bin", "panda_shelf", "kinova_table")
 SEEDS = 12  # of each planner on each problem

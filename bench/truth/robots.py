@@ -24,8 +24,8 @@ from bench.shared.parts import Parts
 from bench.truth.robot_files import CASES, MENTIONED, misspelt, mjcf_arm, srdf_of, urdf_arm
 from rrtik_bench.report.page import Report
 from rrtik_ompl import InputError, Robot, World, load_robot
-from rrtik_ompl.arrays import TAU
-from rrtik_ompl.errors import DescriptionWarning
+from rrtik_ompl.base.arrays import TAU
+from rrtik_ompl.base.errors import DescriptionWarning
 
 ARMS, BATCH, POSTURES = 400, 20, 200
 FAULTS = 1000

@@ -40,10 +40,10 @@ from rrtik_ompl import (
     plan_in_time,
     replan,
 )
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.replanning import ReplanRun, Snapshot
 from rrtik_ompl.replanning.feed import Source
-from rrtik_ompl.shapes import Shape
 
 RUNS, OF_A_PART = 2000, 10
 ROBOTS = ("planar3", "ur5", "titan4")

@@ -18,12 +18,12 @@ from bench.shared.parts import Parts
 from bench.shared.problems import goal_joints
 from bench.truth.moveit_pairs import CASES, Case, configurations
 from rrtik_bench.report.page import Report
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
-from rrtik_ompl.errors import RrtikError
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.world.problem import Problem
 
 DRAWN, ALONG = 2000, 40  # random configurations of a pair of files; parts of each motion
 UNCERTAIN = 1e-6  # [m] of a contact

@@ -23,8 +23,8 @@ from bench.shared.parts import Parts
 from bench.truth.matrix_cells import found_ways
 from rrtik_bench.report.page import Report
 from rrtik_ompl import AttachedObject, ConstantVelocity, Obstacle, Problem, Robot, Scene, World
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Attach, Detach
 from rrtik_ompl.world.settings import WorldSettings

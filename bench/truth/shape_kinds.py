@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.shape_table import ROWS
-from rrtik_ompl.shapes import (
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.geometry.collision.shape_table import ROWS
+from rrtik_ompl.model.shapes import (
     SHAPES,
     Box,
     Capsule,
@@ -22,7 +22,7 @@ from rrtik_ompl.shapes import (
     Shape,
     Sphere,
 )
-from rrtik_ompl.shapes.surfaces import revolved
+from rrtik_ompl.model.shapes.surfaces import revolved
 
 Maker = Callable[[np.random.Generator, float], Shape]
 

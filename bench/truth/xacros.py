@@ -19,9 +19,9 @@ from pathlib import Path
 import xacro
 from xacro import substitution_args
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.package_path import package_folder
 from rrtik_ompl.description.xacro_text import robot_text
-from rrtik_ompl.errors import InputError
 
 REFUSALS = ("is not on the list", "not one of the functions", "outside the folders", "two underscores", "more than")
 

@@ -23,11 +23,11 @@ from ompl import util as ou
 
 import rrtik_ompl
 from rrtik_ompl import JointPath, Obstacle, Problem, ProblemError, Scene, World, load_problem, load_robot, plan
-from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.kernels.search.connect import ConnectSearch
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder
 from rrtik_ompl.planning import second_check
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.shapes import Box, Capsule, Cylinder
 from rrtik_ompl.world.proof import Prover
 
 ARMS = {"panda": "panda_arm", "ur5": "manipulator"}  # robot and group of the MotionBenchMaker sets

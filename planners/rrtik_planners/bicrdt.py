@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
-from rrtik_ompl.fast.search.crdt.search import CrdtSearch
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.kernels.search.crdt.rules import KERNELS, CrdtRules
+from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, Stop
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.crdt_stream import CrdtStream
@@ -50,7 +50,7 @@ class BiCRDT(OneJointPlanner):
 
 
 class TwoTreeSearch:
-    """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.CrdtSearch`.
+    """The search in Python, for any checker, step by step as `rrtik_ompl.kernels.search.crdt.search.CrdtSearch`.
 
     Attributes:
         iterations: Samples drawn so far.

@@ -7,14 +7,14 @@ from typing import ClassVar
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, Vector, positive
+from rrtik_ompl.base.arrays import Matrix, Vector, positive
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.walls import separation
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.constrained.layout import KERNELS
-from rrtik_ompl.fast.search.constrained.search import ConstrainedSearch
-from rrtik_ompl.fast.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ik.held_tables import HeldTables, held_tables
+from rrtik_ompl.kernels.search.constrained.layout import KERNELS
+from rrtik_ompl.kernels.search.constrained.search import ConstrainedSearch
+from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.world.motion_queries import decider, has_kernels, keeps_constraints
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree

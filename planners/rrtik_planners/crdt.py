@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.crdt.rules import KERNELS, CrdtRules
-from rrtik_ompl.fast.search.crdt.search import CrdtSearch
-from rrtik_ompl.moves.rules import Joints, PerJoint
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.search.crdt.rules import KERNELS, CrdtRules
+from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
+from rrtik_ompl.planning.moves.rules import Joints, PerJoint
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.crdt_stream import CrdtStream
 from rrtik_planners.crdt_tree import CrdtTree, Outcome
@@ -107,7 +107,7 @@ class CRDT(OneJointPlanner):
 
 
 class OneTreeSearch:
-    """The search in Python, for any checker, step by step as `rrtik_ompl.fast.search.crdt.search.CrdtSearch`.
+    """The search in Python, for any checker, step by step as `rrtik_ompl.kernels.search.crdt.search.CrdtSearch`.
 
     Attributes:
         iterations: Samples drawn so far.

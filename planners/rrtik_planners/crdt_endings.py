@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.moves.rules import long_enough
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ompl_bridge import MotionChecker
+from rrtik_ompl.planning.moves.rules import long_enough
 
 NO_ENDING = "last_joints: they cannot go straight to the goal after all others, or would have to move too little"
 

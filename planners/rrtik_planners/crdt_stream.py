@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
 
 WORD = 2**64 - 1
 # Source: splitmix64 [46].

@@ -8,8 +8,8 @@ from enum import Enum, auto
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.search.crdt.rules import CrdtRules
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.kernels.search.crdt.rules import CrdtRules
 from rrtik_ompl.ompl_bridge import MotionChecker
 from rrtik_planners.crdt_stream import Random
 

@@ -9,16 +9,16 @@ from typing import ClassVar
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, positive
-from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.connect_keeping import Searched, kept_search, solve_each
-from rrtik_ompl.fast.search.connect_layout import KERNELS
-from rrtik_ompl.fast.search.connect_lengths import connect_lengths
-from rrtik_ompl.fast.search.tree_memory import certain_tree
-from rrtik_ompl.fast.tables.memory import Table
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, positive
+from rrtik_ompl.kernels.search.connect import ConnectSearch
+from rrtik_ompl.kernels.search.connect_keeping import Searched, kept_search, solve_each
+from rrtik_ompl.kernels.search.connect_layout import KERNELS
+from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
+from rrtik_ompl.kernels.search.tree_memory import certain_tree
+from rrtik_ompl.kernels.tables.memory import Table
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.inspection.graph import Tree, without
-from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, straight_path
+from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import KernelWorld, decider, has_kernels
 from rrtik_planners.one_joint_options import iteration_limit
 

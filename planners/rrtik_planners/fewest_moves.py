@@ -9,22 +9,22 @@ from typing import Any, ClassVar, NamedTuple
 
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, not_negative, whole_number
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.moves.clearance_levels import Level, clearance_levels
-from rrtik_ompl.moves.fine_grids import FineGrids, rounds_before
-from rrtik_ompl.moves.lower_bounds import remembered
-from rrtik_ompl.moves.reach_bound import reach_bound
-from rrtik_ompl.moves.rules import Joints, PerJoint
-from rrtik_ompl.moves.search import MOST_NODES, MoveSearch, Proof
-from rrtik_ompl.moves.staircase import one_joint_moves
+from rrtik_ompl.base.arrays import Matrix, not_negative, whole_number
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.transitions import lower_bound, merge_moves, transitions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.shortening import Task
-from rrtik_ompl.shortening.random_cut import shortcut
-from rrtik_ompl.transitions import lower_bound, merge_moves, transitions
-from rrtik_ompl.world import World
+from rrtik_ompl.planning.moves.clearance_levels import Level, clearance_levels
+from rrtik_ompl.planning.moves.fine_grids import FineGrids, rounds_before
+from rrtik_ompl.planning.moves.lower_bounds import remembered
+from rrtik_ompl.planning.moves.reach_bound import reach_bound
+from rrtik_ompl.planning.moves.rules import Joints, PerJoint
+from rrtik_ompl.planning.moves.search import MOST_NODES, MoveSearch, Proof
+from rrtik_ompl.planning.moves.staircase import one_joint_moves
+from rrtik_ompl.planning.shortening import Task
+from rrtik_ompl.planning.shortening.random_cut import shortcut
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 from rrtik_planners.one_joint_planner import OneJointPlanner

@@ -7,13 +7,13 @@ from typing import ClassVar
 
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, positive, whole_number
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import Goal
+from rrtik_ompl.base.arrays import Matrix, positive, whole_number
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.ikurt.metric import JOINT_RADIUS, ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
+from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
 
 STEP, STRIDE = 0.15, 0.6  # [rad]

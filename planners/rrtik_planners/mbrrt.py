@@ -8,13 +8,13 @@ from typing import ClassVar
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import Goal, TipGoal
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.mb_rrt.aims import tree_aims
 from rrtik_ompl.ik.mb_rrt.axes import misfit
+from rrtik_ompl.model.goal import Goal, TipGoal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 from rrtik_planners.bicrdt import BiCRDT
 
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.crdt.rules import CrdtRules
-from rrtik_ompl.moves.rules import MoveRules, long_enough
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.search.crdt.rules import CrdtRules
+from rrtik_ompl.planning.moves.rules import MoveRules, long_enough
 
 
 class OneJointOptions(MoveRules):

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.search.crdt.rules import KERNELS
-from rrtik_ompl.moves.rules import Joints, PerJoint
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.kernels.search.crdt.rules import KERNELS
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
+from rrtik_ompl.planning.moves.rules import Joints, PerJoint
 from rrtik_planners.crdt_endings import NO_ENDING, Endings
 from rrtik_planners.one_joint_options import OneJointOptions, joint_names
 

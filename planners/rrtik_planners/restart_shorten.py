@@ -9,16 +9,16 @@ from typing import ClassVar
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.connect_layout import KERNELS
-from rrtik_ompl.fast.search.shortcut_layout import KERNELS as SHORTCUTS
-from rrtik_ompl.fast.search.taut.layout import KERNELS as TAUT
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.search.connect_layout import KERNELS
+from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUTS
+from rrtik_ompl.kernels.search.taut.layout import KERNELS as TAUT
+from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
-from rrtik_ompl.shortening.best import best_in_time
-from rrtik_ompl.shortening.restarts import GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
-from rrtik_ompl.shortening.task import Task
-from rrtik_ompl.transitions import route_length
+from rrtik_ompl.planning.shortening.best import best_in_time
+from rrtik_ompl.planning.shortening.restarts import GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
+from rrtik_ompl.planning.shortening.task import Task
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 

@@ -8,15 +8,15 @@ from typing import ClassVar
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.digests import world_digest
-from rrtik_ompl.errors import InputError, PlannerError, require
-from rrtik_ompl.fast.search import connect_layout
-from rrtik_ompl.fast.search.roadmap.graph import KernelGraph
-from rrtik_ompl.fast.search.roadmap.layout import KERNELS
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError, PlannerError, require
+from rrtik_ompl.geometry.collision.digests import world_digest
+from rrtik_ompl.kernels.search import connect_layout
+from rrtik_ompl.kernels.search.roadmap.graph import KernelGraph
+from rrtik_ompl.kernels.search.roadmap.layout import KERNELS
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
-from rrtik_ompl.search.roadmap import NEAR, Graph, Roadmap, checked_near, graph_in, load_roadmap
-from rrtik_ompl.world import World
+from rrtik_ompl.planning.search.roadmap import NEAR, Graph, Roadmap, checked_near, graph_in, load_roadmap
+from rrtik_ompl.world.world import World
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 
 FIRST_VERTICES = 100  # of a roadmap that is made for one query
@@ -46,7 +46,7 @@ class RoadmapPlanner(SafePlanner):
             si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
             world: Checks configurations and motions instead of ``si``, if given.
             seed: At least 0; drawn from OMPL's if None.
-            roadmap: A :class:`~rrtik_ompl.search.roadmap.Roadmap` of the world, or the file of one.
+            roadmap: A :class:`~rrtik_ompl.planning.search.roadmap.Roadmap` of the world, or the file of one.
             near: With how many of the vertices near it a new one is joined, if there is no ``roadmap``.
 
         Raises:

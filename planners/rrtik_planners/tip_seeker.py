@@ -7,15 +7,15 @@ from typing import ClassVar
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import Goal, PoseGoal, TipGoal
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import IkurtTree
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.targets import targets
+from rrtik_ompl.model.goal import Goal, PoseGoal, TipGoal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 DRAWS = 16  # targets of a goal that leaves freedom
 ARM_DIAGONAL = 14.0  # [rad] of the limits of an arm with seven joints

@@ -8,14 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rrtik_ompl.arrays import positive, whole_number
+from rrtik_ompl.base.arrays import positive, whole_number
+from rrtik_ompl.base.choices import SuiteShortening, one_of
+from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, listed, require
 from rrtik_ompl.benchmark import spread
 from rrtik_ompl.benchmark.campaign import all_jobs
 from rrtik_ompl.benchmark.sources import build, file_source, from_plain
 from rrtik_ompl.benchmark.suite import Entrant, Suite
 from rrtik_ompl.benchmark.suite_file import NONE, SHORTENINGS
-from rrtik_ompl.choices import SuiteShortening, one_of
-from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError, listed, require
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto, options_of, refuse_options
 from rrtik_ompl.ompl_bridge.planner_options import is_safe
 

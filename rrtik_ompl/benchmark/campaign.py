@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark import records, spread
 from rrtik_ompl.benchmark.suite import Suite
-from rrtik_ompl.errors import InputError
 
 LIBRARIES = ("ompl", "pin", "coal", "numpy", "numba")
 

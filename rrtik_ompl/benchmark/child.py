@@ -23,7 +23,7 @@ MEGABYTE = 2**20
 def main() -> None:
     """Answer jobs until there are no more."""
     with _answers() as answers:
-        from rrtik_ompl.fast import warm_up
+        from rrtik_ompl.kernels import warm_up
 
         warm_up(lambda _: None)
         for line in sys.stdin:

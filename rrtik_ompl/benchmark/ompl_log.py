@@ -11,9 +11,9 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark.run import INVALID, NOT_FOUND, SOLVED, STATUSES
 from rrtik_ompl.benchmark.statistics import Result, by_label, measured
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import make_folder, write_text
 
 DATABASE = "benchmark.db"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rrtik_ompl.benchmark.statistics import QUANTITIES, Result, by_label
-from rrtik_ompl.plots.joints import COLORS, DASHES, save_figure, tidy
+from rrtik_ompl.viewer.plots.joints import COLORS, DASHES, save_figure, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

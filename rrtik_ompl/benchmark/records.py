@@ -13,8 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeAlias
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark.run import SOLVED, STATUSES
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import make_folder
 
 Record: TypeAlias = dict[str, Any]

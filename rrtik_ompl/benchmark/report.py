@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark import ompl_log, page, plots, records, tables
 from rrtik_ompl.benchmark.statistics import Result, results
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import write_text
 
 VIEWS = 12

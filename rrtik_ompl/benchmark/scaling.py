@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Sphere
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 CHAIN_LENGTH = 3.0  # [m] of all links together
 BEND = np.pi / 2.0  # [rad] by which all joints of the chain together bend to either side at start and goal

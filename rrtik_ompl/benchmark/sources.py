@@ -10,12 +10,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark.scaling import crowded_arm, planar_chain
-from rrtik_ompl.catalog import find_problem, load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.generated_problems import generated_problem
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.description.catalog import find_problem, load_robot
+from rrtik_ompl.planning.generated_problems import generated_problem
 from rrtik_ompl.problem_files.problem import load_problem
+from rrtik_ompl.world.problem import Problem
 
 CACHED_PROBLEMS = 4  # problems that a process remembers; runs of one problem follow each other
 
@@ -103,7 +103,7 @@ def folder_sources(folder: Path, robot: str | None) -> list[Source]:
 
 
 def generated_sources(robot: str, family: str, first: int, count: int) -> list[Source]:
-    """Problems of ``rrtik_ompl.generated_problems`` with the seeds first, first + 1, ..."""
+    """Problems of ``rrtik_ompl.planning.generated_problems`` with the seeds first, first + 1, ..."""
     group = f"{robot}/{family}"
     seeds = range(first, first + count)
     return [Source("generated", f"{group}/{seed}", group, (robot, family, seed)) for seed in seeds]

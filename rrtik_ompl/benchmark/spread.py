@@ -6,9 +6,9 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.benchmark.guard import Closed, Guards
 from rrtik_ompl.benchmark.run import execute
-from rrtik_ompl.errors import InputError, RrtikError
 
 if TYPE_CHECKING:
     from distributed import Client

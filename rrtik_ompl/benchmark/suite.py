@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from rrtik_ompl.base.choices import SuiteShortening, one_of
+from rrtik_ompl.base.errors import UnknownNameError
 from rrtik_ompl.benchmark.sources import (
     Source,
     file_source,
@@ -24,16 +26,14 @@ from rrtik_ompl.benchmark.suite_file import (
     Resolution,
     SuiteFile,
 )
-from rrtik_ompl.catalog import find_suite, load_robot
-from rrtik_ompl.choices import SuiteShortening, one_of
-from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.description.catalog import find_suite, load_robot
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
-from rrtik_ompl.generated_problems import FAMILIES
 from rrtik_ompl.ompl_bridge.planner_files import is_planner_file, label_of, planner_in_folder
 from rrtik_ompl.ompl_bridge.planner_names import options_of
 from rrtik_ompl.ompl_bridge.planner_traits import unbound_planners
+from rrtik_ompl.planning.generated_problems import FAMILIES
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, get_args
 
 from pydantic import Field, Tag
 
-from rrtik_ompl.choices import SuiteShortening
+from rrtik_ompl.base.choices import SuiteShortening
 from rrtik_ompl.files.sections import Name, Positive, Section, Version, tag, told_apart_by
 
 BY_KIND: Final = "by-kind"  # of shortening, beside the methods
@@ -17,7 +17,7 @@ Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 
 
 class GeneratedEntry(Section):
-    """Problems of ``rrtik_ompl.generated_problems``."""
+    """Problems of ``rrtik_ompl.planning.generated_problems``."""
 
     robot: Name
     family: Name

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rrtik_ompl.base.errors import RrtikError, printable
 from rrtik_ompl.cli.bench import bench
 from rrtik_ompl.cli.drawing import overlay, play, show
 from rrtik_ompl.cli.ik import inverse_kinematics
@@ -25,14 +26,13 @@ from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.task import straight, task
 from rrtik_ompl.cli.terminal import ProblemName, command, drop_output, prepare_terminal, say, stoppable, suggest
 from rrtik_ompl.cli.trust import with_trust
-from rrtik_ompl.errors import RrtikError, printable
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
-    from rrtik_ompl.certificates.certificate import Certificate
-    from rrtik_ompl.path import JointPath
-    from rrtik_ompl.problem import Problem
+    from rrtik_ompl.world.certificates.certificate import Certificate
+    from rrtik_ompl.world.path import JointPath
+    from rrtik_ompl.world.problem import Problem
 
 COMPLETING = "_RRTIK_COMPLETE"  # by which a shell asks for completions
 FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -92,11 +92,11 @@ def check(
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
     from rrtik_ompl import load_path, load_problem
-    from rrtik_ompl.certificates.certificate import load_certificate
     from rrtik_ompl.cli.plan_report import faults_of_motion, faults_of_path, how_proven, path_lines
     from rrtik_ompl.cli.run_report import is_record, judged
-    from rrtik_ompl.trajectory import Trajectory
-    from rrtik_ompl.trajectory.load import load_motion_or_path
+    from rrtik_ompl.motion.trajectory import Trajectory
+    from rrtik_ompl.motion.trajectory.load import load_motion_or_path
+    from rrtik_ompl.world.certificates.certificate import load_certificate
 
     question = load_problem(problem)
     world = question.world
@@ -143,7 +143,7 @@ def _said(file: Path, lines: Sequence[str], holds: bool) -> int:
 
 def _beside(problem: Problem, route: JointPath, path: Path) -> int:
     """Say whether the certificate holds that a path's file has, if it has one."""
-    from rrtik_ompl.certificates.certificate import certificate_beside
+    from rrtik_ompl.world.certificates.certificate import certificate_beside
 
     found = certificate_beside(path)
     return FOUND if found is None else _certified(problem, route, found, f"{path}")
@@ -161,7 +161,7 @@ def _certified(problem: Problem, route: JointPath, certificate: Certificate, fil
 def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if left out.")] = None) -> int:
     """List names of robots, planners, problems and others."""
     from rrtik_ompl import list_ik_methods, list_planners, list_problems, list_robots
-    from rrtik_ompl.catalog import list_suites
+    from rrtik_ompl.description.catalog import list_suites
     from rrtik_ompl.tasks.task_file import list_tasks
 
     sources = {
@@ -205,8 +205,8 @@ def warmup() -> int:
 
     Later commands then do not wait for them.
     """
-    from rrtik_ompl.fast import warm_up
-    from rrtik_ompl.fast.wasm.page_kernels import page_kernels
+    from rrtik_ompl.kernels import warm_up
+    from rrtik_ompl.kernels.wasm.page_kernels import page_kernels
 
     ready = warm_up(say)
     if ready and page_kernels() is not None:

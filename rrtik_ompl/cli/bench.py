@@ -38,7 +38,7 @@ def bench(
     from rrtik_ompl.benchmark.statistics import always_refused
     from rrtik_ompl.benchmark.suite import load_suite
     from rrtik_ompl.benchmark.tables import failures, terminal_table
-    from rrtik_ompl.fast import warm_up
+    from rrtik_ompl.kernels import warm_up
 
     campaign = load_suite(suite, folder=problems, runs=runs)
     folder = Path(f"bench-{campaign.name}") if out is None else out

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.cli.terminal import ProblemName, note, progress, say, shown_names, suggest
-from rrtik_ompl.errors import InputError, ProblemError
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rrtik_ompl.overlay.film import ArmInPictures
-    from rrtik_ompl.robot import Robot
+    from rrtik_ompl.model.robot import Robot
+    from rrtik_ompl.pilot.overlay.film import ArmInPictures
     from rrtik_ompl.sensing.cameras.pictures import Picture
 
 ROBOT_FILES = (".urdf", ".xml", ".xacro")
@@ -55,7 +55,7 @@ def show(
     check_target(html, (".html", ".htm"))
     check_target(film, (".gif", ".mp4", ".png"))
     from rrtik_ompl import load_path
-    from rrtik_ompl.trajectory.load import load_motion_or_path
+    from rrtik_ompl.motion.trajectory.load import load_motion_or_path
     from rrtik_ompl.viewer import view
 
     question, robot, fault = _subject(problem, scene)
@@ -146,8 +146,8 @@ def overlay(
     if source.isdecimal() and not frames:
         raise InputError(f"camera {source} has no last picture; say --frames N")
     from rrtik_ompl import load_path, load_problem
-    from rrtik_ompl.overlay.film import ArmInPictures, rate_of, write_film
-    from rrtik_ompl.sensing.cameras.camera_file import load_camera
+    from rrtik_ompl.pilot.overlay.film import ArmInPictures, rate_of, write_film
+    from rrtik_ompl.sensing.camera_file import load_camera
     from rrtik_ompl.sensing.cameras.pictures import pictures_from, write_picture
     from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
     from rrtik_ompl.sensing.sensor import Sensor

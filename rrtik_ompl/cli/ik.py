@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.ik_rows import count, each, followed, milliseconds, point, refuse_orientation
 from rrtik_ompl.cli.terminal import note, progress, say, suggest
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target, comma_numbers
 
 if TYPE_CHECKING:
-    from rrtik_ompl.arrays import Matrix, Vector
-    from rrtik_ompl.goal import Goal, TipGoal
-    from rrtik_ompl.problem import Problem
-    from rrtik_ompl.robot import Robot
-    from rrtik_ompl.world import World
+    from rrtik_ompl.base.arrays import Matrix, Vector
+    from rrtik_ompl.model.goal import Goal, TipGoal
+    from rrtik_ompl.model.robot import Robot
+    from rrtik_ompl.world.problem import Problem
+    from rrtik_ompl.world.world import World
 
 
 FOUND, NOT_FOUND = 0, 1
@@ -130,7 +130,7 @@ def _setting(
 
 def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, float]:
     """Those that are given, by the names of `PoseGoal`, in metres and radians."""
-    from rrtik_ompl.arrays import positive
+    from rrtik_ompl.base.arrays import positive
 
     for option, value in (("--tolerance-mm", millimetres), ("--tolerance-deg", degrees)):
         if value is not None:
@@ -160,7 +160,7 @@ def _goal(
     import numpy as np
 
     from rrtik_ompl import JointGoal, MultiGoal, PoseGoal
-    from rrtik_ompl.poses import pose, pose_from_rpy
+    from rrtik_ompl.base.poses import pose, pose_from_rpy
 
     if quaternion and rpy_deg:
         raise InputError("give one of --quaternion and --rpy-deg, not both")

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, frozen
+from rrtik_ompl.base.units import DEGREES, shown_unit
 from rrtik_ompl.cli.terminal import Table
-from rrtik_ompl.goal import PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
 from rrtik_ompl.ik.method_interface import IkResult, different_rows, mid_range_configuration
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.units import DEGREES, shown_unit
+from rrtik_ompl.model.goal import PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.model.robot import Robot
 
 if TYPE_CHECKING:
-    from rrtik_ompl.goal import TipGoal
+    from rrtik_ompl.model.goal import TipGoal
 
 
 SAME = 1e-5  # [rad] or [m]; a double root is known to the square root of the rounding

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from rrtik_ompl.arrays import Matrix
-    from rrtik_ompl.goal import PositionGoal
+    from rrtik_ompl.base.arrays import Matrix
     from rrtik_ompl.ik.solve import IkResult
     from rrtik_ompl.ik.trajectory import IkTrajectory
-    from rrtik_ompl.robot import Robot
+    from rrtik_ompl.model.goal import PositionGoal
+    from rrtik_ompl.model.robot import Robot
 
 
 class Solved(NamedTuple):

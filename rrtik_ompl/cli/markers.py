@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.cli.trust import with_trust
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
-    from rrtik_ompl.sensing.cameras.calibration import Board, Calibration
+    from rrtik_ompl.sensing.calibration import Board, Calibration
     from rrtik_ompl.sensing.cameras.camera import Camera
     from rrtik_ompl.sensing.rig import Rig
     from rrtik_ompl.sensing.sensor import Sensor, View
@@ -94,8 +94,8 @@ def calibrate_camera(
     one camera's photographs of the same moments in order, make a rig: its file, and one for each camera beside it.
     """
     check_target(out, SCENES)
-    from rrtik_ompl.sensing.cameras.calibration import calibrate
-    from rrtik_ompl.sensing.cameras.camera_file import save_camera
+    from rrtik_ompl.sensing.calibration import calibrate
+    from rrtik_ompl.sensing.camera_file import save_camera
     from rrtik_ompl.sensing.cameras.pictures import pictures_from
     from rrtik_ompl.sensing.markers.chessboard import Chessboard
     from rrtik_ompl.sensing.markers.detection import charuco_board
@@ -230,7 +230,7 @@ def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tup
 
 def _camera_or_rig(sources: list[str], camera: Path | None, rig: Path | None) -> Camera | Rig:
     """What took the pictures."""
-    from rrtik_ompl.sensing.cameras.camera_file import load_camera
+    from rrtik_ompl.sensing.camera_file import load_camera
     from rrtik_ompl.sensing.rig_file import load_rig
 
     if (camera is None) == (rig is None):

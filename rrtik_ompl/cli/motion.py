@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rrtik_ompl.choices import one_of
+from rrtik_ompl.base.choices import one_of
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, ProblemName, progress, say
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target, comma_numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from rrtik_ompl.arrays import Vector
-    from rrtik_ompl.path import JointPath
-    from rrtik_ompl.problem import Problem
+    from rrtik_ompl.base.arrays import Vector
+    from rrtik_ompl.world.path import JointPath
+    from rrtik_ompl.world.problem import Problem
 
 PLOT_FORMATS = (".png", ".svg")
 
@@ -52,7 +52,7 @@ def list_moves(
     if out is not None:
         route.save(out)
     from rrtik_ompl.cli import plan_report as report
-    from rrtik_ompl.moves import text as moves_text
+    from rrtik_ompl.planning.moves import text as moves_text
 
     if as_csv:
         print(moves_text.moves_csv(route), end="")
@@ -101,9 +101,9 @@ def time_path(
     import numpy as np
 
     from rrtik_ompl import RateLimits, load_problem, plot_joints, time_parameterize
+    from rrtik_ompl.base.units import DEGREE
     from rrtik_ompl.cli import plan_report as report
-    from rrtik_ompl.trajectory.limits import default_words
-    from rrtik_ompl.units import DEGREE
+    from rrtik_ompl.motion.trajectory.limits import default_words
 
     task = load_problem(problem)
     robot = task.robot
@@ -141,8 +141,8 @@ def time_path(
 def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> JointPath:
     """The path as single-joint moves."""
     from rrtik_ompl import load_path, load_problem, one_joint_moves
-    from rrtik_ompl.shortening import METHODS
-    from rrtik_ompl.shortening import shorten as shortened
+    from rrtik_ompl.planning.shortening import METHODS
+    from rrtik_ompl.planning.shortening import shorten as shortened
 
     if problem is None:
         route = load_path(path)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.terminal import ProblemName, note, progress, say
-from rrtik_ompl.errors import InputError
 
 if TYPE_CHECKING:
     from rrtik_ompl.pilot.setup import OpenSession

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from rrtik_ompl.choices import CommandShortening, Name, ProofMode, one_of
+from rrtik_ompl.base.choices import CommandShortening, Name, ProofMode, one_of
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.terminal import ProblemName, command, note, progress, say, suggest
-from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
-    from rrtik_ompl.path import JointPath
+    from rrtik_ompl.world.path import JointPath
 
 RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules
 
@@ -95,7 +95,7 @@ def plan(
     from rrtik_ompl import load_problem
     from rrtik_ompl.cli import plan_report as report
     from rrtik_ompl.ompl_bridge.planner_names import AUTO, options_of
-    from rrtik_ompl.planning import plan as find_path
+    from rrtik_ompl.planning.plan import plan as find_path
 
     options_of(AUTO if planner is None else planner)
     options = _parameters(parameter or [])
@@ -162,7 +162,7 @@ def _shortened(
     path: Any, problem: Any, method: CommandShortening, seed: int, rules: dict[str, Any], clearance: float | None
 ) -> tuple[Any, float]:
     """The path made shorter, by the rules of single-joint moves that the planner had; and the time [s]."""
-    from rrtik_ompl.shortening import MoveRules, shorten
+    from rrtik_ompl.planning.shortening import MoveRules, shorten
     from rrtik_ompl.world.kept_clearance import possible_clearance
 
     if path is None or method == "none" or len(path.waypoints) < 2:

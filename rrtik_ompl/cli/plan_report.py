@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rrtik_ompl.base.units import reading, shown_unit
 from rrtik_ompl.cli.terminal import Table
-from rrtik_ompl.goal import GoalSet, JointGoal, PositionGoal
-from rrtik_ompl.moves.text import COLUMNS, moves_document
+from rrtik_ompl.model.goal import GoalSet, JointGoal, PositionGoal
+from rrtik_ompl.model.transitions import lower_bound
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.planning import Plan
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.transitions import lower_bound
-from rrtik_ompl.units import reading, shown_unit
+from rrtik_ompl.planning.moves.text import COLUMNS, moves_document
+from rrtik_ompl.planning.plan import Plan
 from rrtik_ompl.world.clearance_curve import clearance_along
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import as_it_stands, how_checked
 
 if TYPE_CHECKING:
-    from rrtik_ompl.certificates.certificate import Certificate
-    from rrtik_ompl.robot import Robot
-    from rrtik_ompl.trajectory import RateLimits, Trajectory
+    from rrtik_ompl.model.robot import Robot
+    from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
+    from rrtik_ompl.world.certificates.certificate import Certificate
 
 SLACK = 1e-6  # share of a joint's fastest rate that rounding may add
 
@@ -53,7 +53,7 @@ def waypoints_table(path: JointPath) -> Table:
 
 def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     """One row per joint: its largest velocity, acceleration and jerk beside their limits; degrees, or metres."""
-    from rrtik_ompl.trajectory import motion_report  # whoever plans alone does not wait for it
+    from rrtik_ompl.motion.trajectory import motion_report  # whoever plans alone does not wait for it
 
     heads = [f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit")]
     numbers = range(1, len(heads) + 1)
@@ -163,7 +163,7 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
 
 def timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimits) -> dict[str, Any]:
     """A timed motion for machines: duration and each joint's peaks (a jerk of null is a jump of acceleration)."""
-    from rrtik_ompl.trajectory import motion_report
+    from rrtik_ompl.motion.trajectory import motion_report
 
     peaks, report = trajectory.peaks(), motion_report(trajectory, limits)
     return {
@@ -189,7 +189,7 @@ def write_certificate(problem: Problem, path: JointPath, file: Path, *, beside: 
     Raises:
         InputError: If the file cannot be written, or the scene has a cloud.
     """
-    from rrtik_ompl.certificates.write import certificate_by
+    from rrtik_ompl.world.certificates.write import certificate_by
 
     proved = path if path.proven_in(problem.world) else path.proved(problem.world)
     if proved.proof is not None and proved.proof.unproven:
@@ -212,7 +212,7 @@ def wrong_ends(problem: Problem, path: JointPath) -> list[str]:
 
 def certified(problem: Problem, path: JointPath, found: Certificate) -> tuple[str, bool]:
     """A line on whether a certificate proves that a path solves a problem, and whether it does."""
-    from rrtik_ompl.certificates.verify import verify_certificate
+    from rrtik_ompl.world.certificates.verify import verify_certificate
 
     faults = [verify_certificate(found, problem.world, path.waypoints), *wrong_ends(problem, path)]
     if any(faults):

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.terminal import progress, say
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
-    from rrtik_ompl.reach.grid_map import ReachMap
-    from rrtik_ompl.robot import Robot
-    from rrtik_ompl.world import World
+    from rrtik_ompl.ik.reach.grid_map import ReachMap
+    from rrtik_ompl.model.robot import Robot
+    from rrtik_ompl.world.world import World
 
 
 MAP_FORMATS, PLOT_FORMATS, PAGE_FORMATS = (".npz", ".csv"), (".png", ".svg"), (".html", ".htm")
@@ -58,7 +58,7 @@ def reach(
             raise InputError("--effective draws slices: give --plot FILE, and none of --out, --html, --json, --scene")
         return _effective(robot, plot)
     from rrtik_ompl import Scene, World, load_robot, load_scene
-    from rrtik_ompl.reach.sampling import reach_map
+    from rrtik_ompl.ik.reach.sampling import reach_map
 
     arm = load_robot(robot)
     surroundings = load_scene(scene) if scene is not None else Scene() if free else None
@@ -76,8 +76,8 @@ def reach(
 
 
 def _effective(robot: str, plot: Path | None) -> int:
-    from rrtik_ompl.catalog import find_workspace
-    from rrtik_ompl.plots.reach import plot_slices
+    from rrtik_ompl.description.catalog import find_workspace
+    from rrtik_ompl.viewer.plots.reach import plot_slices
 
     with progress(f"effective workspace of {robot}"):
         slices = find_workspace(robot)()
@@ -90,7 +90,7 @@ def _effective(robot: str, plot: Path | None) -> int:
 def _draw(shown: Robot | World, found: ReachMap, plot: Path | None, html: Path | None) -> None:
     title = f"{found.robot}: {LABELS[found.measure]}"
     if plot is not None:
-        from rrtik_ompl.plots.reach import plot_slices
+        from rrtik_ompl.viewer.plots.reach import plot_slices
 
         plot_slices(found.slices(), plot, title=title, label=found.measure)
     if html is not None:

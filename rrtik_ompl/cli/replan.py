@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.terminal import note, progress, say
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:

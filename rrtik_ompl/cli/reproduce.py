@@ -11,10 +11,10 @@ from typing import Annotated, Any
 
 import typer
 
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.published.kept import Kept
 from rrtik_ompl.cli.published.page import HEADS, Row, Table, cells, counted, page, plain
 from rrtik_ompl.cli.terminal import note, progress, say
-from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.text import check_target, write_text
 
 NONE: Mapping[str, str] = MappingProxyType({})
@@ -49,7 +49,7 @@ def reproduce(
 
     Exit code 1 if a figure is missed.
     """
-    from rrtik_ompl.catalog import find_tables
+    from rrtik_ompl.description.catalog import find_tables
 
     check_target(markdown, (".md",))
     offers = find_tables()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeGuard
 
+from rrtik_ompl.base.errors import InputError, in_file
 from rrtik_ompl.cli.terminal import progress
-from rrtik_ompl.errors import InputError, in_file
-from rrtik_ompl.problem import Problem
 from rrtik_ompl.replanning.record import KIND, load_run
+from rrtik_ompl.world.problem import Problem
 
 HEAD = 4096  # bytes in which a record says what it is
 MOST_LINES = 20

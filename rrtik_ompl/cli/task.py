@@ -46,7 +46,7 @@ def straight(
 
     from rrtik_ompl import arc, load_problem
     from rrtik_ompl import straight as follow
-    from rrtik_ompl.poses import pose_from_rpy
+    from rrtik_ompl.base.poses import pose_from_rpy
     from rrtik_ompl.world.route_check import as_it_stands
 
     question = load_problem(problem)

@@ -15,7 +15,7 @@ from unicodedata import east_asian_width
 
 import typer
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files import notice
 
 if TYPE_CHECKING:
@@ -204,14 +204,14 @@ def counter(message: str, total: int) -> Iterator[Callable[[int], object]]:
 
 def problem_names(incomplete: str) -> list[str]:
     """Shipped problems that begin so: what a shell completes."""
-    from rrtik_ompl.catalog import list_problems
+    from rrtik_ompl.description.catalog import list_problems
 
     return [name for name in list_problems() if name.startswith(incomplete)]
 
 
 def shown_names(incomplete: str) -> list[str]:
     """Shipped problems and robots that begin so."""
-    from rrtik_ompl.catalog import list_robots
+    from rrtik_ompl.description.catalog import list_robots
 
     return problem_names(incomplete) + [name for name in list_robots() if name.startswith(incomplete)]
 

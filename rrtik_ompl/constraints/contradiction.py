@@ -8,7 +8,7 @@ import numpy as np
 
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.residuals import projected_rows
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 DRAWN = 64  # configurations that are moved towards the regions
 

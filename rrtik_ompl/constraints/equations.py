@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.constraints.held_region import ANYWHERE, HeldRegion, Turning
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.residuals import SMALL, rates, twists
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import into_range, roll_pitch_yaw
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.task_region import into_range, roll_pitch_yaw
 
 
 def equation_count(constraints: HeldRegions) -> int:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from rrtik_ompl.base.errors import UnknownNameError
 from rrtik_ompl.constraints.held_region import HeldRegion, held_region
-from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.goal import MultiGoal, as_task_region
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.model.goal import MultiGoal, as_task_region
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
 
 
 def goal_regions(robot: Robot, scene: Scene, goal: MultiGoal) -> tuple[HeldRegion, ...]:

@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.errors import InputError, listed
 from rrtik_ompl.constraints.held_region import HeldRegion, Turning, frame_place, held_region
-from rrtik_ompl.errors import InputError, listed
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.task_region import TaskRegion
 
 HALVINGS = 7  # of a motion, at most, to see that it keeps to a region
 ROUNDING = 1e-9  # without unit; of a measure

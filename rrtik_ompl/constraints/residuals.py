@@ -1,6 +1,6 @@
 """How a configuration has to move to come into regions: residuals, their derivatives, and projection, in numpy.
 
-:mod:`rrtik_ompl.fast.search.constrained.projection_kernels` is the same in kernels.
+:mod:`rrtik_ompl.kernels.search.constrained.projection_kernels` is the same in kernels.
 
 Sources: damped Gauss-Newton steps on the residuals of all regions at once [17, 22].
 """
@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.base.poses import cross_products
 from rrtik_ompl.constraints.held_region import HeldRegion, Turning
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.poses import cross_products
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import into_range, roll_pitch_yaw
-from rrtik_ompl.tip_distance import PER_RADIAN, reach_of
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.task_region import into_range, roll_pitch_yaw
+from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
 
 DAMPING, SHARE = 1e-9, 0.5  # added to the squares of the derivatives: a constant, and so much of the squared residual
 LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one step

@@ -8,13 +8,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, dimensions, finite_array, not_negative, number_rows, positive
-from rrtik_ompl.choices import FrameAxis
+from rrtik_ompl.base.arrays import Matrix, dimensions, finite_array, not_negative, number_rows, positive
+from rrtik_ompl.base.choices import FrameAxis
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.poses import rigid, turned_z, unit_vector
 from rrtik_ompl.constraints.held_region import ANYWHERE
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.poses import rigid, turned_z, unit_vector
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.task_region import TaskRegion
 
 LARGEST_TILT_DEG = 80.0
 TURN_TOLERANCE, RIM_SHARE = 1e-2, 0.5  # of ranges of angles: [rad] at most, and a share of the smallest range

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.constraints.held_region import HeldRegion, Turning
 from rrtik_ompl.constraints.held_regions import HeldRegions
 

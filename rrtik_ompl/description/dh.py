@@ -11,14 +11,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import bounded_array, finite_array
-from rrtik_ompl.choices import DhConvention
+from rrtik_ompl.base.arrays import bounded_array, finite_array
+from rrtik_ompl.base.choices import DhConvention
+from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most
+from rrtik_ompl.base.poses import rigid, turned_z
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
 from rrtik_ompl.description.tree import MOST_JOINTS, Joint, Link, Solid, Tree
-from rrtik_ompl.errors import InputError, UnknownNameError, at_most
-from rrtik_ompl.poses import rigid, turned_z
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.shapes import Capsule
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.shapes import Capsule
 
 if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from rrtik_ompl.choices import DhConvention
+from rrtik_ompl.base.choices import DhConvention
+from rrtik_ompl.base.poses import IDENTITY_QUATERNION, pose
+from rrtik_ompl.base.units import DEGREE
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.files.sections import (
     Name,
@@ -24,9 +26,7 @@ from rrtik_ompl.files.sections import (
     parse,
 )
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
-from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.units import DEGREE
+from rrtik_ompl.model.robot import Robot
 
 if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose

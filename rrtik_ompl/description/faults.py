@@ -8,8 +8,8 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from rrtik_ompl.errors import DescriptionWarning, InputError, few, printable
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, few, printable
+from rrtik_ompl.model.robot import Robot
 
 MOST_NAMED = 3  # faults in one line
 MOST_UNREAD = 8  # things in one line

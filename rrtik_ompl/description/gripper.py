@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rrtik_ompl.arrays import finite_number
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.arrays import finite_number
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 
 STATES = ("open", "closed")
 

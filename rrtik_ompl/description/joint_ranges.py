@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
-from rrtik_ompl.arrays import finite_array, frozen
-from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import finite_array, frozen
+from rrtik_ompl.base.errors import InputError, UnknownNameError, require
+from rrtik_ompl.model.robot import Robot
 
 
 def narrowed(robot: Robot, ranges: Mapping[str, Sequence[float]]) -> Robot:

@@ -9,11 +9,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen, positive
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen, positive
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.description.named_numbers import by_name
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.goal import joint_difference
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import joint_difference
+from rrtik_ompl.model.robot import Robot
 
 LIGHTEST, HEAVIEST = 1e-3, 1e3
 

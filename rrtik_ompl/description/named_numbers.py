@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from rrtik_ompl.arrays import bounded_array
-from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import bounded_array
+from rrtik_ompl.base.errors import UnknownNameError
+from rrtik_ompl.model.robot import Robot
 
 
 def by_name(

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from urllib.parse import unquote
 
-from rrtik_ompl.errors import InputError, MissingFileError
+from rrtik_ompl.base.errors import InputError, MissingFileError
 
 MESH_SUFFIXES = (".stl", ".obj", ".dae")
 _FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)/*(.*)")

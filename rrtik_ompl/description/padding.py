@@ -7,10 +7,10 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TypeAlias
 
-from rrtik_ompl.arrays import not_negative
+from rrtik_ompl.base.arrays import not_negative
+from rrtik_ompl.base.errors import require
 from rrtik_ompl.description.named_numbers import by_name
-from rrtik_ompl.errors import require
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 Padding: TypeAlias = float | Mapping[str, float]
 

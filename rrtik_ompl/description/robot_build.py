@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import LARGEST, TAU, Mask, Vector, bounded_array, frozen
+from rrtik_ompl.base.arrays import LARGEST, TAU, Mask, Vector, bounded_array, frozen
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, TipWarning, UnknownNameError, name_of
 from rrtik_ompl.description import robot_pickle as robot_pickle  # teaches pickle to take robots
 from rrtik_ompl.description.robot_source import BasePose
 from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.tree import Joint, Tree
 from rrtik_ompl.description.tree_model import build_models
-from rrtik_ompl.errors import DescriptionWarning, InputError, TipWarning, UnknownNameError, name_of
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Chain, Robot
+from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Chain, Robot
 
 RATES = ("velocity", "acceleration", "jerk")
 MOST_TURNS = 100  # of a joint without limits that something follows at a fraction

@@ -7,7 +7,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Iterable
 
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 CACHE_SIZE = 64
 

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.collision.solids import bvh, is_mesh, mesh_arrays
-from rrtik_ompl.copies import Once, packed, unpacked
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.copies import Once, packed, unpacked
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.digest import sha256
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.geometry.collision.solids import bvh, is_mesh, mesh_arrays
+from rrtik_ompl.model.robot import Robot
 
 LIMITS = tuple(f"{end}{what}Limit" for what in ("Position", "Velocity", "Effort") for end in ("lower", "upper"))
 MOST_ROBOTS = 16  # that arrived and are kept, so that the next copy of one is the same object

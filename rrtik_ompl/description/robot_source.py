@@ -12,9 +12,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw, rigid
+from rrtik_ompl.base.arrays import finite_array
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.poses import pose, pose_from_rpy, quaternion_xyzw, rigid
 
 BasePose: TypeAlias = "pin.SE3 | ArrayLike | Mapping[str, Sequence[float]] | None"
 POSE_KEYS = ("xyz", "quat_xyzw", "rpy_deg")
@@ -44,7 +44,7 @@ def source_entry(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
-    """A base pose in any form that `rrtik_ompl.poses.rigid` takes, or as ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
+    """A base pose in any form that `rrtik_ompl.base.poses.rigid` takes, or as ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
 
     Raises:
         InputError: If it is neither, or a key or number in it makes no sense.

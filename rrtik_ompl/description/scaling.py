@@ -9,12 +9,12 @@ from types import MappingProxyType
 import coal
 import pinocchio as pin
 
-from rrtik_ompl.arrays import positive
-from rrtik_ompl.collision.shape_table import resized
-from rrtik_ompl.collision.solids import bvh, hull, is_mesh, mesh_arrays
+from rrtik_ompl.base.arrays import positive
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.description.named_numbers import by_name
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.geometry.collision.shape_table import resized
+from rrtik_ompl.geometry.collision.solids import bvh, hull, is_mesh, mesh_arrays
+from rrtik_ompl.model.robot import Robot
 
 
 def scaled(robot: Robot, scale: Mapping[str, float]) -> Robot:

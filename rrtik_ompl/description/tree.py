@@ -16,10 +16,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, bounded_array, frozen
-from rrtik_ompl.errors import InputError, UnknownNameError, at_most, name_of
-from rrtik_ompl.poses import rigid
-from rrtik_ompl.shapes import Shape
+from rrtik_ompl.base.arrays import Vector, bounded_array, frozen
+from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, name_of
+from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.model.shapes import Shape
 
 MOST_JOINTS = 1001  # those of an arm, and the one that fixes its tip
 KINDS = ("revolute", "continuous", "prismatic", "fixed")

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
 from rrtik_ompl.description.gripper import GripperJoints
-from rrtik_ompl.description.moveit.srdf import Srdf, read_srdf
-from rrtik_ompl.description.moveit.srdf_gripper import srdf_gripper
 from rrtik_ompl.description.robot_build import JointLimits, build_robot, merge_limits
 from rrtik_ompl.description.robot_source import source_entry
+from rrtik_ompl.description.srdf import Srdf, read_srdf
+from rrtik_ompl.description.srdf_gripper import srdf_gripper
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.description.xacro_text import robot_text
-from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
 
 if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose
@@ -208,6 +208,6 @@ def _actuated(
 
 def _limits_of_file(file: FilePath, tree: Tree) -> tuple[dict[str, JointLimits], list[str]]:
     """Limits by joint, and what the file says about limits besides."""
-    from rrtik_ompl.description.moveit.joint_limits import read_joint_limits, unread_limits  # most need no YAML
+    from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits  # most need no YAML
 
     return read_joint_limits(file, [joint.name for joint in tree.joints]), unread_limits(file)

@@ -14,13 +14,13 @@ from xml.parsers import expat
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.base.errors import InputError, MeshWarning, MissingFileError, RrtikError, UnknownNameError
+from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.description.package_path import resolve_mesh
 from rrtik_ompl.description.robot_build import Mimic
 from rrtik_ompl.description.tree import KINDS, Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.description.urdf_unread import unread_of_urdf
-from rrtik_ompl.errors import InputError, MeshWarning, MissingFileError, RrtikError, UnknownNameError
-from rrtik_ompl.poses import pose_from_rpy
-from rrtik_ompl.shapes import SHAPES, Cylinder, Measure, Shape
+from rrtik_ompl.model.shapes import SHAPES, Cylinder, Measure, Shape
 
 Colour = tuple[float, float, float, float]
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

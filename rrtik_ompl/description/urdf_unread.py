@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from rrtik_ompl.errors import few
+from rrtik_ompl.base.errors import few
 
 # Elements that are read, or that say nothing about shapes, joints and limits.
 OF_ROBOT = {"gazebo", "joint", "link", "material", "mujoco", "plugin", "ros2_control", "sensor", "transmission"}

@@ -17,8 +17,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from rrtik_ompl.arrays import positive
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.arrays import positive
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.files.text import MAX_BYTES, read_text
 
 CHILD = Path(__file__).with_name("xacro_child.py")

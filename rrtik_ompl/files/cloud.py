@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import positive
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.base.arrays import positive
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.files.octree import octree_points, octree_resolution
 from rrtik_ompl.files.pcd import pcd_points
 from rrtik_ompl.files.ply import ply_points
 from rrtik_ompl.files.point_records import AXES, npy_rows, text_rows
 from rrtik_ompl.files.text import file_name, read_bytes, write_bytes
-from rrtik_ompl.shapes import PointCloud
-from rrtik_ompl.shapes.point_cloud import RADIUS, Invalid
+from rrtik_ompl.model.shapes import PointCloud
+from rrtik_ompl.model.shapes.point_cloud import RADIUS, Invalid
 
 MAX_BYTES = 1024 * 1024 * 1024
 PLY_HEADER = "ply\nformat binary_little_endian 1.0\nelement vertex {}\n" + "".join(

@@ -14,11 +14,11 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, positive
-from rrtik_ompl.errors import InputError, MeshWarning
+from rrtik_ompl.base.arrays import Matrix, positive
+from rrtik_ompl.base.errors import InputError, MeshWarning
 from rrtik_ompl.files.notice import tell_once
 from rrtik_ompl.files.text import file_name, read_bytes
-from rrtik_ompl.shapes import Mesh
+from rrtik_ompl.model.shapes import Mesh
 
 SUFFIXES = (".stl", ".obj", ".dae")
 MAX_BYTES = 256 * 1024 * 1024

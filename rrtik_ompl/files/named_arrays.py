@@ -11,7 +11,7 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import InputError, at_most
+from rrtik_ompl.base.errors import InputError, at_most
 from rrtik_ompl.files.text import read_bytes
 
 LARGEST_FILE = 2**30  # bytes, of the file and of what it holds when unpacked
@@ -27,7 +27,7 @@ class NamedArrays:
 
     Raises:
         InputError: If it is no such file, or half of one; later, if it lacks an array. Messages of the lookups do not
-            name the file (see :func:`rrtik_ompl.errors.in_file`).
+            name the file (see :func:`rrtik_ompl.base.errors.in_file`).
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:

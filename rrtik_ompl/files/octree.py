@@ -11,11 +11,11 @@ import os
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, positive
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, Vector, positive
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import file_name, read_bytes
-from rrtik_ompl.shapes.octree import Octree
-from rrtik_ompl.shapes.point_cloud import MOST_POINTS
+from rrtik_ompl.model.shapes.octree import Octree
+from rrtik_ompl.model.shapes.point_cloud import MOST_POINTS
 
 FIRST_LINE = b"# Octomap OcTree binary file"
 OCCUPIED, INNER = 2, 3

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.point_records import AXES, claimed, coordinates, records, text_rows
 
 KINDS = {"F": "f", "I": "i", "U": "u"}

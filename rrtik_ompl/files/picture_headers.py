@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
 
 PNG, PNG_BITS, PNG_COLOUR = b"\x89PNG\r\n\x1a\n", 24, 25  # signature; places of the bits of a sample, of its kind
 BITS, PHOTOMETRIC, GDAL_METADATA, GDAL_NODATA = 258, 262, 42112, 42113  # tags of TIFF

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 AXES = ("x", "y", "z")
 LONGEST_LINE = 4 * 1024 * 1024  # bytes, that are surely read; a line takes ten times its size in memory

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from rrtik_ompl.arrays import LARGEST
+from rrtik_ompl.base.arrays import LARGEST
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe
 from rrtik_ompl.files.text import is_number
 

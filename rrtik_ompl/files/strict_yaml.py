@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.files.text import file_name, read_text, write_text
 from rrtik_ompl.files.yaml_values import MAX_DEPTH, Builder, Group, plain_value
 from rrtik_ompl.files.yaml_values import Location as Location

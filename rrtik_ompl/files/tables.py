@@ -7,7 +7,7 @@ import io
 import json
 from typing import Any
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import is_number
 
 FORMATS = (".json", ".csv", ".txt")

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from errno import EDQUOT, EFBIG, ENOSPC
 from pathlib import Path
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 MAX_BYTES = 64 * 1024 * 1024  # far above any problem or path file; keeps /dev/zero from filling the memory
 

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 import yaml
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 Location: TypeAlias = tuple[str | int, ...]  # keys and list numbers from the top: ("start", "joints", 2)
 

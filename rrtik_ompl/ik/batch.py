@@ -9,13 +9,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
-from rrtik_ompl.choices import IkMethod
-from rrtik_ompl.copies import as_value, in_one_line
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
+from rrtik_ompl.base.choices import IkMethod
+from rrtik_ompl.base.copies import as_value, in_one_line
+from rrtik_ompl.base.errors import require
 from rrtik_ompl.description.joint_weights import weighted_difference
-from rrtik_ompl.errors import require
-from rrtik_ompl.fast.threads import cores, in_threads
-from rrtik_ompl.goal import PoseGoal, joint_difference, tolerances
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
 from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
 from rrtik_ompl.ik.goal_rows import POSE, pose_rows
@@ -23,9 +21,11 @@ from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
 from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, solve_ik
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.kernels.threads import cores, in_threads
+from rrtik_ompl.model.goal import PoseGoal, joint_difference, tolerances
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.check_world import check_world
+from rrtik_ompl.world.world import World
 
 LEAST_SHARE = 256  # poses of a thread: fewer take less time than it does to begin one
 

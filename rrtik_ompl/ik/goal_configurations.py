@@ -8,10 +8,18 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector, frozen
-from rrtik_ompl.choices import IkMethod
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, frozen
+from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.description.joint_weights import weighted_difference
-from rrtik_ompl.goal import (
+from rrtik_ompl.ik.held_goals import held_at_goal
+from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.ik.methods import METHODS, leaves_a_curve
+from rrtik_ompl.ik.multi_goals import at_all_tips
+from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
+from rrtik_ompl.ik.numeric.projection import project, projected
+from rrtik_ompl.ik.solve import DRAWS, solve_ik
+from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
+from rrtik_ompl.model.goal import (
     GoalSet,
     JointGoal,
     MultiGoal,
@@ -23,17 +31,9 @@ from rrtik_ompl.goal import (
     parts_of,
     tip_errors,
 )
-from rrtik_ompl.ik.held_goals import held_at_goal
-from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.ik.methods import METHODS, leaves_a_curve
-from rrtik_ompl.ik.multi_goals import at_all_tips
-from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
-from rrtik_ompl.ik.numeric.projection import project, projected
-from rrtik_ompl.ik.solve import DRAWS, solve_ik
-from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.world.problem import Problem
 
 STARTS = 48  # of inverse kinematics in one round
 PARTS = 6  # of a grasp set, among which the starts of a round are shared out, or to which it is said how near it came

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.ik.ik_layout import (
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.ik.residual import SHARE
+from rrtik_ompl.kernels.ik.ik_layout import (
     AIM_FLOATS,
     ANY_TURN,
     BOX,
@@ -16,14 +17,13 @@ from rrtik_ompl.fast.ik.ik_layout import (
     NO_TURN,
     POSITION_TOLERANCE,
 )
-from rrtik_ompl.goal import GoalPart, GoalSet, PoseGoal, PositionGoal, TipGoal
-from rrtik_ompl.ik.residual import SHARE
+from rrtik_ompl.model.goal import GoalPart, GoalSet, PoseGoal, PositionGoal, TipGoal
 
 POSE = PoseGoal(np.eye(4))  # for its tolerances
 
 
 def goal_rows(goal: TipGoal) -> Matrix:
-    """A goal as rows that `rrtik_ompl.fast.ik.ik_layout` describes, one for each member of a region, shape (k, 18).
+    """A goal as rows that `rrtik_ompl.kernels.ik.ik_layout` describes, one for each member of a region, shape (k, 18).
 
     Tolerances are a hundredth of the goal's: a solution on their rim would not survive rounding.
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_region import held_region
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalPart, TipGoal, as_task_region, parts_of
 from rrtik_ompl.ik.held_tables import projected_onto
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.model.goal import GoalPart, TipGoal, as_task_region, parts_of
+from rrtik_ompl.world.problem import Problem
 
 STARTS = 48  # random ones beside what inverse kinematics found
 PARTS = 6  # of a grasp set, to which rows are moved at a time

@@ -6,18 +6,18 @@ from functools import lru_cache
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix
+from rrtik_ompl.base.arrays import Mask, Matrix
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.residuals import DAMPING, LARGEST_STEP, STEPS, projected_rows
-from rrtik_ompl.fast.ik import ik_layout
-from rrtik_ompl.fast.search.constrained import layout
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.memory import Table, aligned, record, table
 from rrtik_ompl.ik.serial_chain import limb_table, pose_numbers
 from rrtik_ompl.ik.tip_columns import frame_columns
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.tip_distance import PER_RADIAN, reach_of
+from rrtik_ompl.kernels.ik import ik_layout
+from rrtik_ompl.kernels.search.constrained import layout
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.tables.memory import Table, aligned, record, table
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
 
 SHORTEST_STEP = 0.01  # [unit of the configurations] of a search, unless tolerances need shorter ones
 

@@ -10,13 +10,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
-from rrtik_ompl.choices import IkMethod
-from rrtik_ompl.copies import as_value, in_one_line
-from rrtik_ompl.goal import PoseGoal, PositionGoal, TipGoal, has_continuous, joint_difference
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.base.choices import IkMethod
+from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.ik.random_stream import RandomStream
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.model.goal import PoseGoal, PositionGoal, TipGoal, has_continuous, joint_difference
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.world.world import World
 
 Target: TypeAlias = PoseGoal | PositionGoal
 SAME_POSTURE = 1e-3  # [rad] or [m]; solutions of a numeric method this near are one

@@ -8,18 +8,18 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.choices import IkMethod
-from rrtik_ompl.fast.ik import branch_layout, ik_layout
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.goal import PositionGoal, tolerances
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.ik.analytic.closed_form import branches_of, family, form_of, has_closed_form
 from rrtik_ompl.ik.analytic.kernel_branches import valid_branches
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, Target, fits_all
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric
 from rrtik_ompl.ik.numeric.projection import projection
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.kernels.ik import branch_layout, ik_layout
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.goal import PositionGoal, tolerances
+from rrtik_ompl.model.robot import Robot
 
 
 def load_kernels(robot: Robot) -> None:

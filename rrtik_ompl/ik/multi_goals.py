@@ -8,18 +8,18 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
-from rrtik_ompl.choices import IkMethod
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.description.joint_weights import weighted_difference
-from rrtik_ompl.goal import MultiGoal, joint_difference
 from rrtik_ompl.ik.held_tables import projected_onto
 from rrtik_ompl.ik.method_interface import IkResult, different_rows
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.tip_distance import metres_per_radian
+from rrtik_ompl.model.goal import MultiGoal, joint_difference
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.tip_distance import metres_per_radian
 
 PROJECTION: IkMethod = "projection"
 STARTS = 96  # random ones, for each tip

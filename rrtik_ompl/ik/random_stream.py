@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rrtik_ompl.arrays import whole_number
+from rrtik_ompl.base.arrays import whole_number
 
 
 class RandomStream:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
 
 DAMPED_BELOW = 0.05  # singular values below this are damped; metres count in units of the arm's reach
 LOST = 1e-12  # singular values below this are 0

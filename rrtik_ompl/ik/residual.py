@@ -12,11 +12,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.poses import working_memory
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import PositionGoal
+from rrtik_ompl.model.robot import Robot
 
 SHARE = 0.01  # of the tolerance: a solution on the rim would not survive rounding
 NEAR_HALF_TURN = 1e-4  # [rad] from pi, where the skew part of a rotation no longer determines its axis

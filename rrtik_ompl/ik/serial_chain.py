@@ -9,20 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, frozen
-from rrtik_ompl.fast.ik import ik_layout
-from rrtik_ompl.fast.tables.memory import Table, table
-from rrtik_ompl.ik.numeric.reference_descent import (
-    DAMPING,
-    DAMPING_SHARE,
-    LARGEST_STEP,
-    PER_CHORD,
-    SHARE_GROWTH,
-    STALLED,
-)
+from rrtik_ompl.base.arrays import Matrix, frozen
+from rrtik_ompl.ik.reference_descent import DAMPING, DAMPING_SHARE, LARGEST_STEP, PER_CHORD, SHARE_GROWTH, STALLED
 from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.tip_distance import reach_of
+from rrtik_ompl.kernels.ik import ik_layout
+from rrtik_ompl.kernels.tables.memory import Table, table
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.tip_distance import reach_of
 
 SEEDS = 512
 

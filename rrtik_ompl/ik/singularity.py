@@ -9,10 +9,10 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Vector, frozen
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.base.arrays import Mask, Vector, frozen
+from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
+from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
 
 RANK_TOLERANCE = 1e-9  # singular values below this share of 1 (metres and radians as they are) count as 0
 

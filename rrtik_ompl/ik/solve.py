@@ -10,11 +10,18 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen, not_negative
-from rrtik_ompl.choices import IkMethod, one_of
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, not_negative
+from rrtik_ompl.base.choices import IkMethod, one_of
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.description.joint_weights import weighted_difference
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.goal import (
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, different_rows, mid_range_configuration
+from rrtik_ompl.ik.method_interface import IkResult as IkResult
+from rrtik_ompl.ik.methods import METHODS, load_kernels
+from rrtik_ompl.ik.multi_goals import PROJECTION, solve_all_tips
+from rrtik_ompl.ik.random_stream import RandomStream
+from rrtik_ompl.ik.residual import error_of_one
+from rrtik_ompl.ik.targets import leaves_freedom, targets
+from rrtik_ompl.model.goal import (
     MultiGoal,
     PoseGoal,
     PositionGoal,
@@ -26,17 +33,10 @@ from rrtik_ompl.goal import (
     tip_errors,
     tolerances,
 )
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, different_rows, mid_range_configuration
-from rrtik_ompl.ik.method_interface import IkResult as IkResult
-from rrtik_ompl.ik.methods import METHODS, load_kernels
-from rrtik_ompl.ik.multi_goals import PROJECTION, solve_all_tips
-from rrtik_ompl.ik.random_stream import RandomStream
-from rrtik_ompl.ik.residual import error_of_one
-from rrtik_ompl.ik.targets import leaves_freedom, targets
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.world import World
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.check_world import check_world
+from rrtik_ompl.world.world import World
 
 SECONDS = 1.0
 METHOD = "inverse kinematics method"

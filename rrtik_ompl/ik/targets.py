@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Matrix
-from rrtik_ompl.goal import GoalPart, PoseGoal, PositionGoal, TipGoal, parts_of
-from rrtik_ompl.task_region import TaskRegion, displacements
+from rrtik_ompl.base.arrays import TAU, Matrix
+from rrtik_ompl.model.goal import GoalPart, PoseGoal, PositionGoal, TipGoal, parts_of
+from rrtik_ompl.model.task_region import TaskRegion, displacements
 
 
 def targets(goal: TipGoal, most: int, rng: np.random.Generator) -> list[PoseGoal | PositionGoal]:

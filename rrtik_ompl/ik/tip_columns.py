@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 Numbers = NDArray[np.float64]
 ROUNDING = 1e-15  # entries of rotations this near to -1, 0, 1 are meant to be that

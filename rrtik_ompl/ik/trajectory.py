@@ -11,11 +11,10 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, dimensions, finite_array, frozen, not_negative, positive
-from rrtik_ompl.choices import FrameAxis, GeneticPreset, IkMethod, TrajectoryIkMethod, one_of
-from rrtik_ompl.copies import as_value, in_one_line
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors, tolerances
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, dimensions, finite_array, frozen, not_negative, positive
+from rrtik_ompl.base.choices import FrameAxis, GeneticPreset, IkMethod, TrajectoryIkMethod, one_of
+from rrtik_ompl.base.copies import as_value, in_one_line
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.analytic.branch_choice import JUMP, follow
 from rrtik_ompl.ik.analytic.closed_form import check_poses, form_of
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
@@ -25,9 +24,10 @@ from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric.track import Tracker
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.solve import free_of_collision, solve_ik
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors, tolerances
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.check_world import check_world
+from rrtik_ompl.world.world import World
 
 SECONDS = 60.0
 SECONDS_A_POINT = 5.0  # to say why a point has no configuration

@@ -19,8 +19,8 @@ import numpy as np
 from ompl import base as ob
 from ompl import util as ou
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import PlannerError, RrtikError
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import PlannerError, RrtikError
 from rrtik_ompl.ompl_bridge.ownership import foreign_code
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, other_planner, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerFactory, traits_of
@@ -34,7 +34,7 @@ from rrtik_ompl.ompl_bridge.setup import (
     space_information,
 )
 from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 
 # What an attempt of effort 1 may take: iterations of our planners, checked motions of OMPL's.
 ITERATION_LIMIT = "max_iterations"

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Mask, Matrix, frozen, whole_number
-from rrtik_ompl.errors import InputError, require
+from rrtik_ompl.base.arrays import Mask, Matrix, frozen, whole_number
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.ik.goal_configurations import LARGEST, GoalSearch
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 
 MAX_CONFIGURATIONS = 32
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Vector, positive
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Vector, positive
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 STEPS = 8  # parts of a motion over which a cost is summed up
 NEAREST = 1e-3  # [m] clearances below this cost no more

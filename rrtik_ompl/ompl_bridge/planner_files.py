@@ -13,7 +13,7 @@ from typing import Any
 
 from ompl import base as ob
 
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 

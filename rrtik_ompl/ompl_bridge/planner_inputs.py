@@ -9,8 +9,8 @@ from numbers import Real
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.results import IllPosed
 from rrtik_ompl.ompl_bridge.states import StateIO

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import cache
 
-from rrtik_ompl import catalog
-from rrtik_ompl.errors import InputError, UnknownNameError, require
+from rrtik_ompl.base.errors import InputError, UnknownNameError, require
+from rrtik_ompl.description import catalog
 from rrtik_ompl.ompl_bridge.planner_files import is_planner_file, planner_of_file
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, ompl_planners

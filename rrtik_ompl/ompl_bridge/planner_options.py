@@ -10,13 +10,13 @@ from typing import Any, TypeGuard
 
 from ompl import base as ob
 
-from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.moves.rules import weights_as_costs
+from rrtik_ompl.base.arrays import finite_array
+from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 from rrtik_ompl.ompl_bridge.inspection.settings import keyword_parameters
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.planning.moves.rules import weights_as_costs
+from rrtik_ompl.world.problem import Problem
 
 
 def is_safe(factory: PlannerFactory) -> TypeGuard[type[SafePlanner]]:

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from ompl import base as ob
 from ompl import geometric as og
 
-from rrtik_ompl import catalog
+from rrtik_ompl.description import catalog
 
 PlannerFactory: TypeAlias = Callable[..., ob.Planner]  # a planner's class, or what makes one from a SpaceInformation
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.equations import equation_count, equations
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.ompl_bridge.setup import bounded_space
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 
 STEP = 0.2  # [rad; m] between two projections; each of them asks Python some ten times
 DETOUR = 2.0  # a motion that gets this much longer by projection is none, as in OMPL

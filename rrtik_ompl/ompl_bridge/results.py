@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError, RrtikError
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph
 
 

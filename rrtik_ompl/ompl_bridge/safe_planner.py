@@ -18,8 +18,9 @@ import numpy as np
 from ompl import base as ob
 from ompl import util as ou
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, whole_number
-from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, whole_number
+from rrtik_ompl.base.errors import PlannerError
+from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph, Tree, graph_of_path, graph_of_trees, nearest_approach
 from rrtik_ompl.ompl_bridge.inspection.settings import FILLED_IN, change, keyword_parameters, options_of, remembering
@@ -29,10 +30,9 @@ from rrtik_ompl.ompl_bridge.results import Failure, IllPosed, SearchResult, expl
 from rrtik_ompl.ompl_bridge.spaces.coordinates import coordinates_of
 from rrtik_ompl.ompl_bridge.spaces.unrolled import Unrolled
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.transitions import route_length
-from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, turning_joints
 from rrtik_ompl.world.route_check import route_violations, verification_resolution
+from rrtik_ompl.world.world import World
 
 SEARCHES = 20  # until a world's second check takes a path
 

@@ -12,9 +12,10 @@ import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.ownership import foreign_code
 from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerTraits
@@ -22,10 +23,9 @@ from rrtik_ompl.ompl_bridge.region_constraint import projected_space
 from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, circular_space, planning_bounds
 from rrtik_ompl.ompl_bridge.spaces.coordinates import Coordinates, coordinates_of
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import motion_taken
+from rrtik_ompl.world.world import World
 
 FAR = 1e3  # [m] the clearance that OMPL is told where nothing can collide; its reports cannot hold an infinite one
 

@@ -8,12 +8,12 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import PlannerError
 from rrtik_ompl.ompl_bridge.attempt import in_short, interrupt_ends, quiet
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 
 MAX_SECONDS = 1e9  # [s]
 

@@ -9,8 +9,8 @@ import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge.spaces.coordinates import coordinates_of
 from rrtik_ompl.ompl_bridge.spaces.unrolled import on_circles
 

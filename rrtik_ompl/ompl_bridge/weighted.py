@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.base.arrays import Matrix, frozen
 from rrtik_ompl.description.joint_weights import weights_of
-from rrtik_ompl.problem import Problem
 from rrtik_ompl.world.motion_queries import MotionQueries
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.weighted_motions import WeightedMotions
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.messages import quoted
 
 NUMBERS = ("joint", "target", "level", "direction", "share", "press")  # arguments of commands; all others are words

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 
 STILL_SECONDS = 0.5  # an arm that stands for so long is where its last reading says: pictures and joints are not of now
 TOLERANCE = 0.005  # [m] of the arm's model and of the marker on it

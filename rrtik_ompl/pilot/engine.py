@@ -12,14 +12,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.arguments import number
 from rrtik_ompl.pilot.devices.camera_feed import ENDED
 from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera
-from rrtik_ompl.pilot.devices.perception import Perception
 from rrtik_ompl.pilot.interlock import PROPOSED, Sight
+from rrtik_ompl.pilot.perception import Perception
 from rrtik_ompl.pilot.records.pictures import PictureRecord
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document

@@ -6,12 +6,12 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.ik.analytic.closed_form import has_closed_form
-from rrtik_ompl.pilot.lamps import Lamp, diagnose, lamps
+from rrtik_ompl.pilot.routes.lamps import Lamp, diagnose, lamps
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange, joint_range
 from rrtik_ompl.pilot.surroundings import Surroundings
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 PATIENT_SECONDS = 0.05  # for a pose, when a route is asked for
 

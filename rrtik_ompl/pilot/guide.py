@@ -9,8 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Vector, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import apart
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.answers import Answer, alarm, news, refused
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
@@ -22,11 +24,9 @@ from rrtik_ompl.pilot.routes.proposal import propose
 from rrtik_ompl.pilot.routes.route import MAX_END_OFFSET, MAX_END_TURN, Route
 from rrtik_ompl.pilot.routes.track import Track, together
 from rrtik_ompl.pilot.surroundings import MAX_SHIFT, MAX_TURN, Surroundings
-from rrtik_ompl.poses import apart
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.scene_from_view import SeenObject
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 WITHDRAWN = "the route is withdrawn: {}; 'replan' finds another"
 MADE = "all moves are done"

@@ -13,8 +13,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
-from rrtik_ompl.errors import InputError, RrtikError, UnknownNameError
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.pilot.answers import Answer, Level, alarm, news, refused
 from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
 from rrtik_ompl.pilot.arm_check import ArmCheck
@@ -33,19 +33,19 @@ from rrtik_ompl.pilot.interlock import (
     Sight,
     refusal,
 )
-from rrtik_ompl.pilot.lamps import AMBER, GREEN, Lamp
 from rrtik_ompl.pilot.motion.hand import Hand
 from rrtik_ompl.pilot.motion.held import Held
 from rrtik_ompl.pilot.motion.leading import Leading
 from rrtik_ompl.pilot.records.record import Record
 from rrtik_ompl.pilot.routes.follower import Follower, Progress
+from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, Lamp
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange
 from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.pilot.routes.track import Track
 from rrtik_ompl.pilot.surroundings import Structure, Surroundings
-from rrtik_ompl.problem import Problem
 from rrtik_ompl.sensing.scene_from_view import SeenObject
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 READ_SECONDS = 1.0  # a stop so soon after a fault is against the fault: it does not acknowledge it
 

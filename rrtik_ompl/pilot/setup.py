@@ -8,33 +8,33 @@ from pathlib import Path
 
 import numpy as np
 
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.virtual_camera import orbit_pose
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import Feed
 from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera, LiveCamera, SimulatedFurtherCamera
 from rrtik_ompl.pilot.devices.line_arm import LineArm
-from rrtik_ompl.pilot.devices.perception import CameraOfRig, LivePerception, SimulatedSource
 from rrtik_ompl.pilot.devices.simulated_vehicle import SimulatedVehicle, find_vehicle, load_vehicle
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
 from rrtik_ompl.pilot.devices.wrong_arm import WrongArm
 from rrtik_ompl.pilot.engine import Engine
+from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
+from rrtik_ompl.pilot.perception import CameraOfRig, LivePerception, SimulatedSource
 from rrtik_ompl.pilot.records.pictures import PictureRecord, RecordedPictures, beside
 from rrtik_ompl.pilot.records.record import Record
-from rrtik_ompl.pilot.records.replay import RecordedArm, RecordedPerception, entries_for, start_of
+from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for, start_of
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import Structure
-from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
+from rrtik_ompl.sensing.camera_file import load_camera
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.cameras.camera_file import load_camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
 from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
 from rrtik_ompl.sensing.rig_file import load_rig, pictures_together
 from rrtik_ompl.sensing.scene_from_view import SIGMAS
 from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.sensing.sight import check_size
+from rrtik_ompl.world.problem import Problem
 
 LAST_PORT = 65535
 DEFAULT_CAMERA_POSE = 2.5, np.radians(125.0), np.radians(30.0)  # [m], [rad]: of a camera whose pose is not known

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.collision.bodies import deepest_contact
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import apart
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene, Touching
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import apart
+from rrtik_ompl.geometry.collision.bodies import deepest_contact
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, Touching
 from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.tasks.contact_life import (
@@ -27,7 +27,7 @@ from rrtik_ompl.tasks.contact_life import (
     touching_at,
     with_contacts,
 )
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 MAX_SHIFT, MAX_TURN = 5e-3, np.deg2rad(1.0)  # [m], [rad]; a target that has moved farther is not where a route ends
 MIN_SHIFT, MIN_ROTATION = 1e-3, np.deg2rad(0.2)  # [m], [rad]; smaller changes are noise

@@ -11,12 +11,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.overlay.augment import Augmenter, Ghost
-from rrtik_ompl.overlay.virtual_camera import background, orbit_pose, pinhole_camera
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.pilot.aids import Aids, draw_aids
 from rrtik_ompl.pilot.interlock import FOLLOWING, PROPOSED
-from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
+from rrtik_ompl.pilot.overlay.augment import Augmenter, Ghost
+from rrtik_ompl.pilot.overlay.virtual_camera import background, orbit_pose, pinhole_camera
+from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.cameras.camera import Camera
 

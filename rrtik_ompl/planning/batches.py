@@ -15,21 +15,21 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, ITERATION_LIMIT, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, reseed, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.results import SearchResult
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import shared_space
-from rrtik_ompl.path import JointPath
 from rrtik_ompl.planning.one_planner import load_kernels_for
 from rrtik_ompl.planning.outcome import Plan
-from rrtik_ompl.problem import Problem, known_problem
-from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import Room, rooms_between
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem, known_problem
 from rrtik_ompl.world.proof import Proof
+from rrtik_ompl.world.world import World
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.choices import ImproveStrategy, PathObjective
-from rrtik_ompl.errors import PlannerError
-from rrtik_ompl.path import JointPath
+from rrtik_ompl.base.choices import ImproveStrategy, PathObjective
+from rrtik_ompl.base.errors import PlannerError
 from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.planning.path_costs import COSTS, least_cost
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening import shorten
-from rrtik_ompl.shortening.restarts import BOUND, BOUNDED_SAMPLES, GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
+from rrtik_ompl.planning.shortening import shorten
+from rrtik_ompl.planning.shortening.restarts import BOUND, BOUNDED_SAMPLES, GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
 from rrtik_ompl.world.kept_clearance import possible_clearance
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
 
 LEAST_SECONDS = 1e-3  # for which another round is begun
 PLANS = 4  # of which the best is shortened further, if it is worth it

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, dimensions, finite_array, positive, whole_number
-from rrtik_ompl.choices import ProofMode, one_of
-from rrtik_ompl.errors import InputError, ProblemError, require
-from rrtik_ompl.fast.threads import in_threads
-from rrtik_ompl.goal import Goal, JointGoal
+from rrtik_ompl.base.arrays import Vector, dimensions, finite_array, positive, whole_number
+from rrtik_ompl.base.choices import ProofMode, one_of
+from rrtik_ompl.base.errors import InputError, ProblemError, require
+from rrtik_ompl.kernels.threads import in_threads
+from rrtik_ompl.model.goal import Goal, JointGoal
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_options import is_safe
-from rrtik_ompl.planning import PROOF_MODES, RESTARTS, plan
 from rrtik_ompl.planning.batches import Query, plans_together
 from rrtik_ompl.planning.outcome import Plan
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.planning.plan import PROOF_MODES, RESTARTS, plan
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 Ends = ArrayLike | Sequence[Goal]
 TOGETHER = 32  # queries at a time, whatever the number of threads

@@ -5,16 +5,16 @@ from __future__ import annotations
 import time
 from types import MappingProxyType
 
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.warming import load_together
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.methods import load_kernels
+from rrtik_ompl.kernels.warming import load_together
+from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.ompl_bridge.attempt import attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import check_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, planners_with, traits_of
+from rrtik_ompl.planning.attempts import Search
 from rrtik_ompl.planning.outcome import Plan, Request
-from rrtik_ompl.planning.search import Search
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proof import PROOF_KERNELS
 
 

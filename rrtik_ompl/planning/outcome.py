@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from rrtik_ompl.choices import ProofMode
-from rrtik_ompl.copies import as_value, in_notebook, in_one_line
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.choices import ProofMode
+from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import as_it_stands
 
 

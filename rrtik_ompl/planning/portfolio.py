@@ -9,18 +9,18 @@ from itertools import chain
 from types import MappingProxyType
 from typing import Any
 
-from rrtik_ompl.errors import InputError, PlannerError
-from rrtik_ompl.fast.search.shortcut_layout import KERNELS as SHORTCUT_KERNELS
-from rrtik_ompl.fast.search.taut.layout import KERNELS as TAUT_KERNELS
-from rrtik_ompl.fast.warming import load_together
-from rrtik_ompl.goal import TipGoal
+from rrtik_ompl.base.errors import InputError, PlannerError
+from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUT_KERNELS
+from rrtik_ompl.kernels.search.taut.layout import KERNELS as TAUT_KERNELS
+from rrtik_ompl.kernels.warming import load_together
+from rrtik_ompl.model.goal import TipGoal
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits, planners_with, traits_of
 from rrtik_ompl.planning.one_planner import run_planner
 from rrtik_ompl.planning.outcome import Plan, Request
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening import shorten
+from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.world.kept_clearance import possible_clearance
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proof import PROOF_KERNELS
 from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.choices import ProofMode
-from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.moves.clearance_levels import roomiest
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.choices import ProofMode
+from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.ompl_bridge.attempt import Attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
-from rrtik_ompl.path import JointPath, proved_as_clear
-from rrtik_ompl.problem import Problem, densely_checked
+from rrtik_ompl.planning.moves.clearance_levels import roomiest
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import Room, keeping, leaving_room, room_between
+from rrtik_ompl.world.path import JointPath, proved_as_clear
+from rrtik_ompl.world.problem import Problem, densely_checked
 
 TOUCHING = 1e-6  # [m]; bodies that are nearer to their margin than this count as touching
 
@@ -33,7 +33,7 @@ class SecondCheck:
     Args:
         problem: What is solved.
         name: Of the planner, for messages.
-        proof: See :func:`rrtik_ompl.planning.plan`.
+        proof: See :func:`rrtik_ompl.planning.plan.plan`.
         clearance: Likewise.
         traits: Of the planner.
         ruled: Whether its options say which moves there may be, so that none are added.

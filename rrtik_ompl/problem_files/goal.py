@@ -8,8 +8,9 @@ import numpy as np
 from pydantic import Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
@@ -21,11 +22,10 @@ from rrtik_ompl.files.sections import (
     tag,
     told_apart_by,
 )
-from rrtik_ompl.goal import JOINT_TOLERANCE, Goal, GoalPart, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
-from rrtik_ompl.poses import pose
+from rrtik_ompl.model.goal import JOINT_TOLERANCE, Goal, GoalPart, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.task_region import COORDINATES, TaskRegion
 from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import COORDINATES, TaskRegion
 
 
 class JointsDeg(Section):

@@ -11,23 +11,23 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError, UnknownNameError, few
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.joint_ranges import narrowed
 from rrtik_ompl.description.padding import padded
 from rrtik_ompl.description.scaling import scaled
-from rrtik_ompl.errors import InputError, UnknownNameError, few
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
-from rrtik_ompl.goal import Goal, JointGoal
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.model.goal import Goal, JointGoal
+from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
 from rrtik_ompl.problem_files.moveit_frames import WORLD, Frames
 from rrtik_ompl.problem_files.moveit_messages import JointConstraint, RequestMessage, RobotState, SceneMessage
 from rrtik_ompl.problem_files.moveit_regions import held_regions_of, tip_goal
 from rrtik_ompl.problem_files.moveit_scene import SceneReader, passed_over, tell
-from rrtik_ompl.robot import LIMIT_TOLERANCE, Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 FilePath = str | os.PathLike[str]
 DESCRIBING = ("urdf", "srdf", "joint_limits", "packages", "xacro_args")  # options of a robot's files

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.problem_files.moveit_messages import FixedFrame
-from rrtik_ompl.robot import Robot
 
 WORLD = "world"
 

@@ -14,11 +14,11 @@ import pinocchio as pin
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import IDENTITY_QUATERNION, pose
 from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Positive, Vector3, Vector4
-from rrtik_ompl.poses import IDENTITY_QUATERNION, pose
-from rrtik_ompl.shapes import SHAPES, Shape
+from rrtik_ompl.model.shapes import SHAPES, Shape
 
 KNOWN = {key: kind for key, kind in sorted(SHAPES.items()) if kind.moveit}
 SHAPE_NUMBERS = {1: "box", 2: "sphere", 3: "cylinder", 4: "cone", 5: "prism"}  # of shape_msgs/SolidPrimitive

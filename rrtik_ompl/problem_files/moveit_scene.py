@@ -11,11 +11,14 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError, SceneWarning, UnknownNameError, few
 from rrtik_ompl.description.faults import nearest_name
-from rrtik_ompl.errors import InputError, SceneWarning, UnknownNameError, few
 from rrtik_ompl.files.octree import cells_of_tree
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
+from rrtik_ompl.model.shapes.octree import Octree
 from rrtik_ompl.problem_files.moveit_frames import Frames
 from rrtik_ompl.problem_files.moveit_messages import (
     AllowedMatrix,
@@ -26,9 +29,6 @@ from rrtik_ompl.problem_files.moveit_messages import (
     RobotState,
     SceneMessage,
 )
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
-from rrtik_ompl.shapes.octree import Octree
 
 OCTOMAP = "<octomap>"  # MoveIt's name for it
 SHOWN = 3  # pairs in a warning

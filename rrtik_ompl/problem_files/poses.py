@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose, pose_from_rpy
 from rrtik_ompl.files.sections import Section, Vector3, exactly_one, parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.files.text import file_name, read_text
-from rrtik_ompl.poses import pose, pose_from_rpy
 from rrtik_ompl.problem_files.scene import PoseEntry
 
 FORMATS = (".csv", ".json", ".yaml", ".yml")

@@ -13,23 +13,23 @@ from typing import Any
 
 from pydantic import Field
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.catalog import find_problem, list_planners, load_robot, robot_from_entry, task_files
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError, require
+from rrtik_ompl.description.catalog import find_problem, list_planners, load_robot, robot_from_entry, task_files
 from rrtik_ompl.description.xacro_text import expanding
-from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError, require
 from rrtik_ompl.files.sections import Version, parse, without_null
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
-from rrtik_ompl.goal import Goal
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.model.goal import Goal
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.problem_files.goal import GoalSection, StartSection, build_goal, goal_data
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
 from rrtik_ompl.problem_files.run import RunSection
 from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
 from rrtik_ompl.problem_files.world import WorldKeys, world_data
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 FilePath = str | os.PathLike[str]
 

@@ -8,10 +8,10 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.sections import NotNegative, Numbers, Positive, Section
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 RENAMED = {"eps": "max_edge", "slot": "repair_budget", "predict": "lookahead_ticks"}  # old names of settings
 

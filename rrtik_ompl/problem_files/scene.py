@@ -11,7 +11,8 @@ import pinocchio as pin
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from rrtik_ompl.errors import require
+from rrtik_ompl.base.errors import require
+from rrtik_ompl.base.poses import pose, pose_from_rpy, quaternion_xyzw
 from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
@@ -25,9 +26,8 @@ from rrtik_ompl.files.sections import (
 )
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
-from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
+from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 
 
 class PoseEntry(Section):

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.cloud import load_cloud
 from rrtik_ompl.files.heights import load_height_field
 from rrtik_ompl.files.mesh import load_mesh
@@ -27,9 +27,9 @@ from rrtik_ompl.files.sections import (
     Vector3,
     exactly_one,
 )
-from rrtik_ompl.shapes import SHAPES, HeightField, Measure, Mesh, Octree, PointCloud, Shape
-from rrtik_ompl.shapes.point_cloud import RADIUS, Invalid
-from rrtik_ompl.shapes.shape import MeasureKind
+from rrtik_ompl.model.shapes import SHAPES, HeightField, Measure, Mesh, Octree, PointCloud, Shape
+from rrtik_ompl.model.shapes.point_cloud import RADIUS, Invalid
+from rrtik_ompl.model.shapes.shape import MeasureKind
 
 ONE_SHAPE = {"oneOf": [{"required": [key]} for key in SHAPES]}
 

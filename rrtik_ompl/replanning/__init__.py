@@ -8,11 +8,12 @@ from contextlib import ExitStack
 from functools import partial
 from typing import NoReturn
 
-from rrtik_ompl.arrays import positive
-from rrtik_ompl.choices import Replanner
-from rrtik_ompl.errors import called, require
+from rrtik_ompl.base.arrays import positive
+from rrtik_ompl.base.choices import Replanner
+from rrtik_ompl.base.errors import called, require
 from rrtik_ompl.files.text import check_target, file_name
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Source, SpeedWarning, Watch, feed_of
 from rrtik_ompl.replanning.loop import Clock, Loop
@@ -21,8 +22,7 @@ from rrtik_ompl.replanning.record import ReplanRun, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, ReplanSettings, refuse_renamed
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, refuse_constraints
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.world.problem import Problem
 
 __all__ = [
     "PLANNERS",

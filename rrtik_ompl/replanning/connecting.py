@@ -11,14 +11,14 @@ from typing import Protocol
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.connect_layout import KERNELS as CONNECT_KERNELS
-from rrtik_ompl.fast.search.shortcut import ShortcutSearch
-from rrtik_ompl.fast.search.shortcut_layout import KERNELS as CUT_KERNELS
-from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect
-from rrtik_ompl.search.tree import ConfigurationTree
-from rrtik_ompl.transitions import without_repeats
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.kernels.search.connect import ConnectSearch
+from rrtik_ompl.kernels.search.connect_layout import KERNELS as CONNECT_KERNELS
+from rrtik_ompl.kernels.search.shortcut import ShortcutSearch
+from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as CUT_KERNELS
+from rrtik_ompl.model.transitions import without_repeats
+from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect
+from rrtik_ompl.planning.search.tree import ConfigurationTree
 from rrtik_ompl.world.motion_queries import KernelWorld, MotionFree, MotionQueries, Stop
 
 KERNELS = (CONNECT_KERNELS, CUT_KERNELS)  # libraries that replanning in kernels needs
@@ -64,7 +64,7 @@ class Connect(Protocol):
 
 
 class KernelConnect:
-    """The search in a kernel, for worlds that have them (:mod:`rrtik_ompl.fast.search.connect_kernels`)."""
+    """The search in a kernel, for worlds that have them (:mod:`rrtik_ompl.kernels.search.connect_kernels`)."""
 
     def __init__(
         self, world: KernelWorld, lower: Vector, upper: Vector, max_edge: float, seed: int, iterations: int = ITERATIONS
@@ -106,7 +106,7 @@ class PythonConnect:
 
 
 class KernelCuts:
-    """Random shortcuts of a route in a kernel, a fixed number of them (:mod:`rrtik_ompl.fast.search.shortcut`)."""
+    """Random shortcuts of a route in a kernel, a fixed number of them (:mod:`rrtik_ompl.kernels.search.shortcut`)."""
 
     def __init__(self, world: KernelWorld, seed: int) -> None:
         self._world, self._rng = world, np.random.default_rng(seed)

@@ -10,15 +10,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.bodies import Body, link_bodies, scene_bodies
-from rrtik_ompl.collision.cloud_solid import cloud_gap, has_cloud, nearest_of_cloud
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.bodies import Body, link_bodies, scene_bodies
+from rrtik_ompl.geometry.collision.cloud_solid import cloud_gap, has_cloud, nearest_of_cloud
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import same_shape
 from rrtik_ompl.replanning.feed import Feed
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import same_shape
 
 SAMPLES_PER_TICK = 10
 MAX_DISTANCE = 0.05  # [m]; larger distances are not measured

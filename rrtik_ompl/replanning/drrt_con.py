@@ -14,10 +14,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.choices import Replanner
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.choices import Replanner
+from rrtik_ompl.model.transitions import part_counts, subdivided, without_repeats
 from rrtik_ompl.replanning.connecting import Connect, Joined, PythonConnect
-from rrtik_ompl.transitions import part_counts, subdivided, without_repeats
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
 
 MAX_CUTS = 24  # shortcut ends that are tried from one point of a path
@@ -177,7 +177,7 @@ def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> M
     """Shorten a free path: from each kept point straight to the last point that can be reached.
 
     Points lie every ``step`` along the path, and ``MAX_CUTS`` of them are tried in one call;
-    :func:`rrtik_ompl.shortening.sequential.sequential_cut` tries every waypoint and no others. Source: [1, ch. 5.3,
+    :func:`rrtik_ompl.planning.shortening.sequential.sequential_cut` tries every waypoint and no others. Source: [1, ch. 5.3,
     method 1], as DRRT-Con uses it.
     """
     done, rest = [path[:1]], path

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.moving_world import MovingWorld
 

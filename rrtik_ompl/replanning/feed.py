@@ -14,11 +14,11 @@ from typing import Any, TypeAlias
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.extent import farthest
-from rrtik_ompl.errors import InputError, called, require
-from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import same_shape
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError, called, require
+from rrtik_ompl.geometry.collision.extent import farthest
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.shapes import same_shape
 
 SILENCE_SECONDS = 2.0  # without a new scene, after which a run ends
 TIME_RESOLUTION = 1e-6  # [s]: a double holds a time since 1970 to a quarter of it

@@ -6,14 +6,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import Box, Capsule, Shape, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.shapes import Box, Capsule, Shape, Sphere
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 SHELL = (0.5, 1.05)  # of the reach: between these distances from the first joints obstacles move
 TURN_PROBABILITY = 0.08  # probability that one of them turns at a waypoint

@@ -16,21 +16,21 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.bodies import Body, Pairs, colliding_pairs, in_contact, link_bodies, scene_bodies
-from rrtik_ompl.collision.certificate import distance
-from rrtik_ompl.collision.extent import farthest
-from rrtik_ompl.collision.margins import contact_distance, keeps_clearance, kept_apart
-from rrtik_ompl.collision.motion_bound import approach_weights
-from rrtik_ompl.collision.own_distances import is_ours, own_nearest
-from rrtik_ompl.copies import as_value
-from rrtik_ompl.poses import pose
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.geometry.collision.bodies import Body, Pairs, colliding_pairs, in_contact, link_bodies, scene_bodies
+from rrtik_ompl.geometry.collision.certificate import distance
+from rrtik_ompl.geometry.collision.extent import farthest
+from rrtik_ompl.geometry.collision.margins import contact_distance, keeps_clearance, kept_apart
+from rrtik_ompl.geometry.collision.motion_bound import approach_weights
+from rrtik_ompl.geometry.collision.own_distances import is_ours, own_nearest
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Motion, Obstacle, Scene, TimedPoses, pairs_that_may_touch
+from rrtik_ompl.model.shapes import same_shape
 from rrtik_ompl.replanning.feed import ROTATION_NOISE, Feed, Snapshot
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Motion, Obstacle, Scene, TimedPoses, pairs_that_may_touch
-from rrtik_ompl.shapes import same_shape
+from rrtik_ompl.world.problem import Problem
 
 FINEST = 2e-5  # [m]: of the motion of a pair, below which its middle stands for it
 COARSEST = 2e-3  # [m]: the same where too little is kept there, of which the least is not sought any closer

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.search.repair import PathRepair
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.search.repair import PathRepair
 from rrtik_ompl.replanning.connecting import CUTS, ITERATIONS, PATIENCE, KernelConnect, KernelCuts
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, has_kernels, no_stop
@@ -18,7 +18,7 @@ REPAIR_CUTS, REPAIR_PATIENCE = 16, 6  # as CUTS and PATIENCE, where only a detou
 class KernelDrrtCon(DrrtCon):
     """As :class:`DrrtCon`, in one world: its path is kept free of what moves there.
 
-    What the kernels add to the published algorithm: :mod:`rrtik_ompl.fast.search.repair_kernels`.
+    What the kernels add to the published algorithm: :mod:`rrtik_ompl.kernels.search.repair_kernels`.
 
     Args:
         world: Checks motions; the ``motions`` of all methods.

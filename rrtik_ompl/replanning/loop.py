@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector, finite_number
-from rrtik_ompl.choices import TickEvent
-from rrtik_ompl.goal import JOINT_TOLERANCE
-from rrtik_ompl.poses import pose_row
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_number
+from rrtik_ompl.base.choices import TickEvent
+from rrtik_ompl.base.poses import pose_row
+from rrtik_ompl.model.goal import JOINT_TOLERANCE
+from rrtik_ompl.model.scene import Scene, pairs_that_may_touch
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.feed import (
     SILENCE_SECONDS,
@@ -29,11 +29,11 @@ from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, mak
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
-from rrtik_ompl.scene import Scene, pairs_that_may_touch
-from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld, check_held
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 Clock = Callable[[], float]
 

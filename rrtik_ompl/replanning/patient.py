@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 Answer = TypeVar("Answer")
 

@@ -12,21 +12,21 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
-from rrtik_ompl.choices import RunOutcome, TickEvent, one_of
-from rrtik_ompl.copies import in_one_line
-from rrtik_ompl.errors import InputError, in_file, require
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
+from rrtik_ompl.base.choices import RunOutcome, TickEvent, one_of
+from rrtik_ompl.base.copies import in_one_line
+from rrtik_ompl.base.errors import InputError, in_file, require
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
-from rrtik_ompl.poses import pose
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.shapes import PointCloud
+from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.replanning.feed import Feed, Snapshot
 from rrtik_ompl.replanning.judge import RunViolation, run_violations
 from rrtik_ompl.replanning.scenes_file import scenes_data, scenes_of
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.shapes import PointCloud
-from rrtik_ompl.transitions import route_length
+from rrtik_ompl.world.problem import Problem
 
 KIND = "replan_run"
 MOST_POINTS = 2_000_000  # of all clouds that a record keeps

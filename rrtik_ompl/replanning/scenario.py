@@ -6,10 +6,11 @@ import os
 import time
 from dataclasses import dataclass, fields, replace
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import read_yaml
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.problem_files.problem import ProblemFile, load_problem, problem_path
 from rrtik_ompl.problem_files.run import RunSection
 from rrtik_ompl.replanning import ReplanRun, ReplanSettings, replan_with
@@ -17,8 +18,7 @@ from rrtik_ompl.replanning.feed import Source
 from rrtik_ompl.replanning.loop import Clock
 from rrtik_ompl.replanning.settings import refuse_renamed
 from rrtik_ompl.replanning.start_and_goals import GoalFeed
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.trajectory.limits import RateLimits
+from rrtik_ompl.world.problem import Problem
 
 SETTINGS = {field.name for field in fields(ReplanSettings)}
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import finite_array, finite_number, whole_number
-from rrtik_ompl.choices import one_of
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.poses import pose, pose_row
+from rrtik_ompl.base.arrays import finite_array, finite_number, whole_number
+from rrtik_ompl.base.choices import one_of
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.poses import pose, pose_row
+from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
+from rrtik_ompl.model.shapes import SHAPES, Shape
 from rrtik_ompl.replanning.feed import Snapshot
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
-from rrtik_ompl.shapes import SHAPES, Shape
 
 Json = dict[str, Any]
 

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Vector, not_negative, positive, whole_number
-from rrtik_ompl.choices import Replanner, one_of
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.fast.search.connect_lengths import connect_lengths
+from rrtik_ompl.base.arrays import TAU, Vector, not_negative, positive, whole_number
+from rrtik_ompl.base.choices import Replanner, one_of
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.problem_files.run import RENAMED
 from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_ompl.world.moving_world import MovingWorld
 

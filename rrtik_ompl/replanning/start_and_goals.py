@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.goal_configurations import goal_configurations
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.world import World
+from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 GoalFeed = Callable[[float], ArrayLike]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.choices import TickEvent
-from rrtik_ompl.copies import as_value
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.choices import TickEvent
+from rrtik_ompl.base.copies import as_value
 
 
 @dataclass(frozen=True, slots=True, eq=False)

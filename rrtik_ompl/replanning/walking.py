@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 
 
 def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:

@@ -6,12 +6,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import not_negative, positive, whole_number
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.poses import rigid
+from rrtik_ompl.base.arrays import not_negative, positive, whole_number
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.model.shapes import PointCloud
+from rrtik_ompl.model.shapes.point_cloud import RADIUS
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.shapes import PointCloud
-from rrtik_ompl.shapes.point_cloud import RADIUS
 
 
 def cloud_from_depth(
@@ -30,7 +30,7 @@ def cloud_from_depth(
     Args:
         depth: Shape (height, width), along the camera's axis; what is not finite, or not between ``nearest`` and
             ``farthest``, was not seen.
-        camera: Its intrinsics, as :func:`rrtik_ompl.sensing.cameras.camera_file.load_camera` reads them.
+        camera: Its intrinsics, as :func:`rrtik_ompl.sensing.camera_file.load_camera` reads them.
         pose: T_world_camera (x right, y down, z away from it); the camera's own frame if None.
         radius: Of the ball that each point is [m].
         scale: Metres per unit of the picture; 0.001 for millimetres.

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.sight import Sighting
 

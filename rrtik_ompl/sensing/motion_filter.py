@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 
 STILL, MOVING = (1e-4, 1e-3), (0.25, 0.7)  # change of velocity within a second [m/s], [rad/s]
 FIRST_SPEED = 0.3, 0.6  # standard deviation of what is not known yet [m/s], [rad/s]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import finite_array
+from rrtik_ompl.base.errors import InputError
 
 NORMAL_QUARTILES = 1.349  # standard deviations between them
 

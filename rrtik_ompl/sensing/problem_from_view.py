@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import PoseGoal
-from rrtik_ompl.poses import pose
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.model.goal import PoseGoal
+from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.world.problem import Problem
 
 
 def scene_with(scene: Scene, solids: Iterable[Obstacle]) -> Scene:

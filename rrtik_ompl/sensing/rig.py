@@ -15,9 +15,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen, not_negative
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import rigid
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen, not_negative
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.corner_pose import CornerPose
 from rrtik_ompl.sensing.markers.detection import SeenMarker

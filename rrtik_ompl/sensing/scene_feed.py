@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.replanning.feed import Snapshot
-from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.problem_from_view import scene_with
 from rrtik_ompl.sensing.sensor import Sensor

@@ -8,17 +8,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, finite_array, frozen
-from rrtik_ompl.collision.extent import farthest
-from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import rigid
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.base.arrays import Matrix, finite_array, frozen
+from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.geometry.collision.extent import farthest
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import HalfSpace
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.frames import base_from_camera, place_in_base
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 from rrtik_ompl.sensing.sight import Sighting, detect_objects
-from rrtik_ompl.shapes import HalfSpace
 
 SIGMAS = 3.0  # standard deviations of an obstacle's position that its margin covers
 

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import quaternion_xyzw
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import quaternion_xyzw
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.sensing.annotate import annotated
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, write_picture

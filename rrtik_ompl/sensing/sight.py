@@ -10,8 +10,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from rrtik_ompl.arrays import Matrix, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, frozen
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
 from rrtik_ompl.sensing.markers.corner_pose import (

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.markers.corner_pose import ALIGNED_SIGMA, CornerPose, turn_between
 from rrtik_ompl.sensing.motion_filter import MotionFilter
 from rrtik_ompl.sensing.sight import Sighting

@@ -8,28 +8,28 @@ from itertools import pairwise
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.description.joint_weights import weighted_difference
-from rrtik_ompl.errors import InputError, ProblemError
-from rrtik_ompl.goal import JointGoal
 from rrtik_ompl.ik.goal_configurations import GoalSearch
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Touching
+from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Touching
+from rrtik_ompl.planning.tip_motion import DEVIATION, TURN_DEVIATION
+from rrtik_ompl.planning.tip_motion.attempts import Attempt, Way, attempt, farthest, path_of
+from rrtik_ompl.planning.tip_motion.following import follow
+from rrtik_ompl.planning.tip_motion.freedom import centred
+from rrtik_ompl.planning.tip_motion.rails import straight_rail
+from rrtik_ompl.planning.tip_motion.values import Tolerance
 from rrtik_ompl.tasks.contact_life import MotionContact, lived, parted
 from rrtik_ompl.tasks.finger_motion import finger_motion
 from rrtik_ompl.tasks.handling import arriving_at, handled, left_where, may_touch
 from rrtik_ompl.tasks.program import Step, options_of
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Alternatives, Gripper, MoveTo, Straight
-from rrtik_ompl.tip_motion import DEVIATION, TURN_DEVIATION
-from rrtik_ompl.tip_motion.attempts import Attempt, Way, attempt, farthest, path_of
-from rrtik_ompl.tip_motion.following import follow
-from rrtik_ompl.tip_motion.freedom import centred
-from rrtik_ompl.tip_motion.rails import straight_rail
-from rrtik_ompl.tip_motion.values import Tolerance
-from rrtik_ompl.world import World
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 TOLERANCE = Tolerance(DEVIATION, TURN_DEVIATION)
 THOROUGH = 1  # round of the search from which straight lines are tried in all ways that a redundant arm has

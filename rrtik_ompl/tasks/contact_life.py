@@ -3,7 +3,7 @@
 What touches when it is attached may go on touching, a millimetre deeper than then at most, until the two are apart;
 from there on the pair is checked as any other. Before something is taken or set down it may touch, a millimetre deep at
 most, on the motion that leads there. Never may thin things be so deep in each other that they could pass through
-(:mod:`rrtik_ompl.collision.thickness`). All of it is a distance that a pair of things must keep, negative for a depth
+(:mod:`rrtik_ompl.geometry.collision.thickness`). All of it is a distance that a pair of things must keep, negative for a depth
 (:class:`rrtik_ompl.Touching`), so that proofs and certificates hold as they do for margins.
 """
 
@@ -17,18 +17,18 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.bodies import Body, deepest_contact
-from rrtik_ompl.collision.contacts import measured
-from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, usually_apart
-from rrtik_ompl.collision.motion_bound import approach_weights
-from rrtik_ompl.collision.solids import is_mesh
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene, Touching
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import Body, deepest_contact
+from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, usually_apart
+from rrtik_ompl.geometry.collision.motion_bound import approach_weights
+from rrtik_ompl.geometry.collision.solids import is_mesh
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene, Touching
 from rrtik_ompl.world.exact_checks import distance
+from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.proof import Prover
+from rrtik_ompl.world.world import World
 
 NEAR = 1e-4  # [m] of a gap up to which two touch: straight lines deviate by as much
 DEEPER = 1e-3  # [m] that two in contact may come nearer than they were

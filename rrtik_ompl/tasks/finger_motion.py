@@ -15,14 +15,14 @@ from functools import lru_cache
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.catalog import robot_from_entry
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.contacts import measured
-from rrtik_ompl.collision.containment import Containment
-from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart
-from rrtik_ompl.collision.solids import around
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.description.catalog import robot_from_entry
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.containment import Containment
+from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, kept_apart
+from rrtik_ompl.geometry.collision.solids import around
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.tasks.contact_life import DEEPER, NEAR, signed_distance
 from rrtik_ompl.tasks.setting import Setting
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.goal import PoseGoal
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.model.goal import PoseGoal
+from rrtik_ompl.planning.tip_motion import DEVIATION, TURN_DEVIATION
 from rrtik_ompl.tasks.contact_life import DEEPER, Nearness, joined_with, left_inside, signed_distance
 from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, MoveTo, Straight
-from rrtik_ompl.tip_motion import DEVIATION, TURN_DEVIATION
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Touching
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.tasks.contact_life import allowed, joined_with, left_inside, touching_at
 from rrtik_ompl.tasks.program import Step, options_of
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, MoveTo, Straight
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 
 @dataclass(frozen=True, slots=True)

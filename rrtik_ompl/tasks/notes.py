@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from itertools import product
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.collision.contacts import measured
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.geometry.collision.contacts import measured
 from rrtik_ompl.tasks.search import Done
 from rrtik_ompl.tasks.stages import Attach
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 FAR = 0.05  # [m] between an object and what holds it, from which on that is said
 

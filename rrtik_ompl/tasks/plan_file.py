@@ -10,21 +10,21 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.catalog import robot_from_entry
+from rrtik_ompl.base.arrays import finite_array
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.description.xacro_text import expanding
-from rrtik_ompl.errors import InputError, require
 from rrtik_ompl.files.sections import Name, Number, Numbers, Positive, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name, known_ending, read_text, write_text
-from rrtik_ompl.path import JointPath
 from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
 from rrtik_ompl.problem_files.scene import ContactEntry, SceneEntry, scene_data
 from rrtik_ompl.problem_files.world import WorldKeys, world_data
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.contact_life import MotionContact
 from rrtik_ompl.tasks.task_file import StageEntry, stage_data
-from rrtik_ompl.world import FINEST_RESOLUTION, World
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import FINEST_RESOLUTION, World
 
 KIND: Literal["task_plan"] = "task_plan"
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.tasks.setting import with_gripper
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 Held = frozenset[str]
 

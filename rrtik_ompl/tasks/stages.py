@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, dimensions, finite_array, frozen, not_negative
-from rrtik_ompl.choices import one_of
-from rrtik_ompl.errors import InputError, listed, require
-from rrtik_ompl.goal import Goal, PoseGoal
-from rrtik_ompl.poses import rigid
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.base.arrays import Vector, dimensions, finite_array, frozen, not_negative
+from rrtik_ompl.base.choices import one_of
+from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.model.goal import Goal, PoseGoal
+from rrtik_ompl.model.task_region import TaskRegion
 
 LineFrame: TypeAlias = Literal["world", "tip"]
 GripperState: TypeAlias = Literal["open", "close"]

@@ -12,10 +12,10 @@ import numpy as np
 from pydantic import Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.catalog import list_problems, robot_from_entry, task_files
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.catalog import list_problems, robot_from_entry, task_files
 from rrtik_ompl.description.xacro_text import expanding
-from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
@@ -29,21 +29,21 @@ from rrtik_ompl.files.sections import (
 )
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
-from rrtik_ompl.goal import Goal
-from rrtik_ompl.problem import usable_configuration
+from rrtik_ompl.model.goal import Goal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, build_goal, goal_data
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.robot import RobotEntry
 from rrtik_ompl.problem_files.scene import PoseEntry, SceneEntry, pose_data
 from rrtik_ompl.problem_files.world import WorldKeys
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import TaskRegion
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight
 from rrtik_ompl.tasks.through import placed_constraints
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import usable_configuration
+from rrtik_ompl.world.world import World
 
 NO_STAGES = "it has a goal and no stages"
 NUMBER = re.compile(r"stage (\d+)")

@@ -9,13 +9,13 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import dimensions
-from rrtik_ompl.errors import InputError, listed
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.base.arrays import dimensions
+from rrtik_ompl.base.errors import InputError, listed
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.tasks import SECONDS, MoveTo, Task
-from rrtik_ompl.world import World
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 
 @dataclass(frozen=True, slots=True, eq=False)

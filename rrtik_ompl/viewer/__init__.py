@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.errors import InputError, called, require
+from rrtik_ompl.base.errors import InputError, called, require
 from rrtik_ompl.files.text import write_text
 
 if TYPE_CHECKING:
-    from rrtik_ompl.problem import Problem
     from rrtik_ompl.replanning.record import ReplanRun
     from rrtik_ompl.tasks import TaskPlan
     from rrtik_ompl.viewer.drawing.marks import Mark
     from rrtik_ompl.viewer.notebook import InlinePage
     from rrtik_ompl.viewer.subject import Showable, ShownPath
+    from rrtik_ompl.world.problem import Problem
 
 __all__ = ["play", "view"]
 

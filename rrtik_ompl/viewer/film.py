@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import check_target
 from rrtik_ompl.viewer.page import ASKING_POLICY, POLICY, asset, page
 from rrtik_ompl.viewer.serve import PageServer

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.poses import pose_row
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.poses import pose_row
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name
 

@@ -6,15 +6,15 @@ import html
 import sys
 from dataclasses import dataclass
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import RrtikError
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.planning import Plan
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.trajectory import Trajectory
+from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.motion.trajectory import Trajectory
+from rrtik_ompl.planning.plan import Plan
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.subject import Showable
-from rrtik_ompl.world import World
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 HEIGHT = 520  # [px] of the frame
 

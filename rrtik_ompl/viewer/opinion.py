@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field, ValidationError
 
-from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.files.sections import Name, Number, Section
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import SHAPES, Box, Shape
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import SHAPES, Box, Shape
 from rrtik_ompl.world.clearance_curve import clearance_along
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import how_checked
 
 Row = list[Number]

@@ -15,11 +15,10 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.errors import InputError, listed
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.errors import InputError, listed
+from rrtik_ompl.model.transitions import single_joint
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.tasks import TaskPlan
-from rrtik_ompl.transitions import single_joint
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.page_fixed import packed
@@ -28,6 +27,7 @@ from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import play_pace, story_of
 from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
 from rrtik_ompl.viewer.task_story import subject_of_task
+from rrtik_ompl.world.problem import Problem
 
 # The page may run its own script and nothing else: no request leaves the machine that shows it.
 # WebAssembly may be compiled, text may not be run as script.

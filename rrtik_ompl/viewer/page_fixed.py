@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.collision.bodies import Body, by_motion
-from rrtik_ompl.collision.enclosure import enclosure
-from rrtik_ompl.collision.solids import is_closed, is_mesh, mesh_arrays
-from rrtik_ompl.fast.tables.layout import CONVEX_SOLID
-from rrtik_ompl.fast.tables.solid_tables import convex_solids
-from rrtik_ompl.world import World
+from rrtik_ompl.geometry.collision.bodies import Body, by_motion
+from rrtik_ompl.geometry.collision.enclosure import enclosure
+from rrtik_ompl.geometry.collision.solids import is_closed, is_mesh, mesh_arrays
+from rrtik_ompl.kernels.layout import CONVEX_SOLID
+from rrtik_ompl.kernels.tables.solid_tables import convex_solids
+from rrtik_ompl.world.world import World
 
 DIGITS = 6  # of a metre, of corners of pieces around meshes; pieces are so much larger for it
 GRAIN = 1e-6  # [m] of the corners of triangles; obstacles are so much larger for it

@@ -9,32 +9,31 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.shape_table import core_of
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.simd.processor import WIDTH
-from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables.primitive_tables import UNBOUNDED_COORDINATE
-from rrtik_ompl.fast.tables.scene_tables import SLACK_PER_METRE as PRIMITIVE_SLACK
-from rrtik_ompl.fast.tables.scene_tables import primitive_kind
-from rrtik_ompl.fast.tables.solid_tables import SLACK_PER_METRE as SOLID_SLACK
-from rrtik_ompl.fast.tables.solid_tables import convex_solids
-from rrtik_ompl.fast.wasm.image import MemoryImage
-from rrtik_ompl.fast.wasm.page_kernels import page_kernels
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.poses import pose, pose_row
-from rrtik_ompl.problem import Problem, densely_checked
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose, pose_row
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.shape_table import core_of
+from rrtik_ompl.kernels import FastWorld, layout
+from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables.primitive_tables import UNBOUNDED_COORDINATE
+from rrtik_ompl.kernels.tables.scene_tables import SLACK_PER_METRE as PRIMITIVE_SLACK
+from rrtik_ompl.kernels.tables.scene_tables import primitive_kind
+from rrtik_ompl.kernels.tables.solid_tables import SLACK_PER_METRE as SOLID_SLACK
+from rrtik_ompl.kernels.tables.solid_tables import convex_solids
+from rrtik_ompl.kernels.wasm.image import MemoryImage
+from rrtik_ompl.kernels.wasm.page_kernels import page_kernels
+from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.problem_files.problem import problem_data
-from rrtik_ompl.scene import Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page_fixed import packed, standing_parts
 from rrtik_ompl.viewer.page_tables import BASE, add_limb, layout_numbers, page_tables
 from rrtik_ompl.viewer.page_tips import dragged_tips, tip_entry
-from rrtik_ompl.world import World
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem, densely_checked
+from rrtik_ompl.world.world import World
 
 SAMPLES = 60_000  # of a search
 TRIES = 2000  # of shortcuts

@@ -7,25 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.ik import ik_layout
-from rrtik_ompl.fast.search import connect_layout, shortcut_layout, tree_layout
-from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.crdt import layout as crdt_layout
-from rrtik_ompl.fast.search.crdt.rules import CrdtRules
-from rrtik_ompl.fast.search.crdt.search import CrdtSearch
-from rrtik_ompl.fast.search.motions import motion_layout
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
-from rrtik_ompl.fast.search.shortcut import ShortcutSearch
-from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables.scratch import probe_table
-from rrtik_ompl.fast.wasm.image import MemoryImage
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
 from rrtik_ompl.ik.numeric.kernel_call import call_table
 from rrtik_ompl.ik.serial_chain import limb_of
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.kernels import layout
+from rrtik_ompl.kernels.ik import ik_layout
+from rrtik_ompl.kernels.search import connect_layout, shortcut_layout, tree_layout
+from rrtik_ompl.kernels.search.connect import ConnectSearch
+from rrtik_ompl.kernels.search.crdt import layout as crdt_layout
+from rrtik_ompl.kernels.search.crdt.rules import CrdtRules
+from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
+from rrtik_ompl.kernels.search.motions import motion_layout
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
+from rrtik_ompl.kernels.search.shortcut import ShortcutSearch
+from rrtik_ompl.kernels.tables.scratch import probe_table
+from rrtik_ompl.kernels.wasm.image import MemoryImage
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 BASE = 1 << 20  # where the image begins; the stack of the kernels lies below
 VERTICES = 1 << 14  # of each tree

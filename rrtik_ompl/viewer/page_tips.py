@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.goal import Goal, MultiGoal
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import Goal, MultiGoal
+from rrtik_ompl.model.robot import Robot
 
 OWN_JOINTS = 3  # of a branch that can be dragged; fewer are fingers
 DIGITS = 9

@@ -7,10 +7,10 @@ from itertools import groupby
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.contacts import Contact
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.contacts import Contact
 from rrtik_ompl.world.clearance_curve import places_along
+from rrtik_ompl.world.world import World
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.goal import Goal, JointGoal, MultiGoal, as_task_region, parts_of
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.model.goal import Goal, JointGoal, MultiGoal, as_task_region, parts_of
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.viewer.drawing.constraint_picture import draw_constraints
 from rrtik_ompl.viewer.drawing.framing import Frame, frame_around
 from rrtik_ompl.viewer.drawing.marks import draw_marks

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.poses import pose_row
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.poses import pose_row
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.drawing.scene_picture import obstacle_look

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.collision.contacts import Contact
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.contacts import Contact
 from rrtik_ompl.replanning.judge import RunViolation
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.viewer.path_contacts import PathContact
 from rrtik_ompl.viewer.verdict import Judged, Verdict
+from rrtik_ompl.world.problem import Problem
 
 NOWHERE = np.full(3, np.nan)
 

@@ -13,7 +13,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
 from typing import TypeAlias
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.viewer.page import ASKING_POLICY, POLICY
 
 ADDRESS = "127.0.0.1"

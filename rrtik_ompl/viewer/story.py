@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.goal import Goal, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.transitions import moved, route_length, transitions
-from rrtik_ompl.units import shown_unit
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.units import shown_unit
+from rrtik_ompl.model.goal import Goal, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.transitions import moved, route_length, transitions
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.marks import Mark

@@ -8,22 +8,22 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.constraints.held_region import HeldRegion
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.goal import Goal, JointGoal, MultiGoal
-from rrtik_ompl.path import JointPath, fitted
+from rrtik_ompl.model.goal import Goal, JointGoal, MultiGoal
+from rrtik_ompl.model.robot import Robot, require_joints
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.robot import Robot, require_joints
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.trajectory import Trajectory
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.fingers import Fingers
 from rrtik_ompl.viewer.path_contacts import PathContact
 from rrtik_ompl.viewer.run_verdict import judged_run
 from rrtik_ompl.viewer.verdict import Judged, Verdict, frames_of, judged_motion, judged_path
-from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import ClearanceCurve
+from rrtik_ompl.world.path import JointPath, fitted
+from rrtik_ompl.world.world import World
 
 
 class HasWorld(Protocol):

@@ -9,14 +9,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import held_regions
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import pose_row
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.timed import time_task
@@ -24,8 +24,8 @@ from rrtik_ompl.viewer.fingers import fingers_of
 from rrtik_ompl.viewer.path_contacts import PathContact, contacts_at
 from rrtik_ompl.viewer.subject import Showable, Subject, played
 from rrtik_ompl.viewer.verdict import Judged, Verdict
-from rrtik_ompl.world import World
 from rrtik_ompl.world.route_check import as_it_stands
+from rrtik_ompl.world.world import World
 
 TASK = "task"  # the planner of a run that shows one
 RATE = 25.0  # ticks per second

@@ -13,14 +13,14 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.trajectory import Trajectory
-from rrtik_ompl.trajectory.motion import faults_of, greatest_speeds
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.motion.trajectory import Trajectory
+from rrtik_ompl.motion.trajectory.motion import faults_of, greatest_speeds
 from rrtik_ompl.viewer.path_contacts import PathContact, contacts_at
-from rrtik_ompl.world import World
 from rrtik_ompl.world.clearance_curve import PLACES, ClearanceCurve, Course, clearance_on, course_along
 from rrtik_ompl.world.route_check import as_it_stands, route_violations, verification_resolution
+from rrtik_ompl.world.world import World
 
 MOST_KNOTS = 900  # of a timed motion, that are all looked at
 FRAME_RATE = 30.0  # [1/s] of a timed motion

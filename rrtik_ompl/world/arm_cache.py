@@ -13,14 +13,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.bodies import Body, link_bodies
-from rrtik_ompl.collision.bodies import Pairs as Pairs
-from rrtik_ompl.collision.solids import of_each
-from rrtik_ompl.covers.cache import cached_inner_spheres, cached_outer_cover
-from rrtik_ompl.fast import FastWorld, needs_covers
-from rrtik_ompl.fast.tables.solid_tables import convex_solids
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
+from rrtik_ompl.geometry.collision.bodies import Pairs as Pairs
+from rrtik_ompl.geometry.collision.solids import of_each
+from rrtik_ompl.geometry.covers.cache import cached_inner_spheres, cached_outer_cover
+from rrtik_ompl.kernels import FastWorld, needs_covers
+from rrtik_ompl.kernels.tables.solid_tables import convex_solids
+from rrtik_ompl.model.robot import Robot
 
 SLIDING_MARGIN = 1e-3  # [m] beyond the limits of sliding joints that the tables cover
 MAX_ROBOTS = 16  # whose covers and tables are kept

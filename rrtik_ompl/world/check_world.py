@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rrtik_ompl.errors import InputError, require
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.world.world import World
 
 
 def check_world(world: World | None, robot: Robot) -> None:

@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
-from rrtik_ompl.world import Proof, World
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.world.proof import Gap
+from rrtik_ompl.world.world import Proof, World
 
 PLACES = 240  # on a path, beside its waypoints
 NEAREST, FARTHEST = 1e-5, 2.0  # [m] of clearances that are told apart

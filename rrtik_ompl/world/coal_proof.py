@@ -13,17 +13,17 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.contacts import measured
-from rrtik_ompl.collision.containment import Containment
-from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE
-from rrtik_ompl.collision.motion_bound import approach_weights
-from rrtik_ompl.collision.solids import is_closed, is_mesh
-from rrtik_ompl.fast.proof import layout
-from rrtik_ompl.fast.proof.log import ProofLog, logged
-from rrtik_ompl.fast.proof.packing import ProofPairs
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.containment import Containment
+from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE
+from rrtik_ompl.geometry.collision.motion_bound import approach_weights
+from rrtik_ompl.geometry.collision.solids import is_closed, is_mesh
+from rrtik_ompl.kernels.proof import layout
+from rrtik_ompl.kernels.proof.log import ProofLog, logged
+from rrtik_ompl.kernels.proof.packing import ProofPairs
+from rrtik_ompl.model.robot import Robot
 
 MOST = 400  # distances for a pair in one motion: some tenths of a second
 DEEPEST = 9  # level of an interval: 1/512 of a motion

@@ -12,13 +12,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.cloud_solid import CloudSolid
-from rrtik_ompl.collision.solids import around
-from rrtik_ompl.fast.proof import layout
-from rrtik_ompl.fast.proof.packing import ProofPairs
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
+from rrtik_ompl.geometry.collision.solids import around
+from rrtik_ompl.kernels.proof import layout
+from rrtik_ompl.kernels.proof.packing import ProofPairs
+from rrtik_ompl.model.robot import Robot
 
 
 def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, ends: Matrix) -> None:

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.transitions import route_length
-from rrtik_ompl.world import Proof, World
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.world.world import Proof, World
 
 SIZES = (0.01, 0.03, 0.1, 0.3)  # of a detour, shares of the stretch's length
 POINTS = 12  # of each size

@@ -1,6 +1,6 @@
 """Which configurations and motions are free of collision: kernels first, coal where these are in doubt.
 
-The kernels (:mod:`rrtik_ompl.fast`) give three answers. Their "free" and "colliding", by sphere covers and a narrow
+The kernels (:mod:`rrtik_ompl.kernels`) give three answers. Their "free" and "colliding", by sphere covers and a narrow
 phase of convex solids, are certain. What stays undecided falls back to coal, pair by pair and only for the pairs that
 are in doubt, so every answer is coal's own. Coal is called with fresh requests: reused collision data start from the
 last support points and have been seen to miss overlaps.
@@ -18,20 +18,20 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.body_arrays import body_arrays
-from rrtik_ompl.collision.collector import collector_waits
-from rrtik_ompl.collision.containment import Containment
-from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
-from rrtik_ompl.collision.motion_bound import approach_weights
-from rrtik_ompl.collision.own_distances import is_ours, own_gap
-from rrtik_ompl.collision.solids import around, is_mesh, solids_of
-from rrtik_ompl.copies import Items, Once, shallow_copy
-from rrtik_ompl.fast import FREE, UNDECIDED, FastWorld
-from rrtik_ompl.fast.taken_tables import TakenTables
-from rrtik_ompl.poses import working_memory
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.copies import Items, Once, shallow_copy
+from rrtik_ompl.base.poses import working_memory
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.body_arrays import body_arrays
+from rrtik_ompl.geometry.collision.collector import collector_waits
+from rrtik_ompl.geometry.collision.containment import Containment
+from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
+from rrtik_ompl.geometry.collision.motion_bound import approach_weights
+from rrtik_ompl.geometry.collision.own_distances import is_ours, own_gap
+from rrtik_ompl.geometry.collision.solids import around, is_mesh, solids_of
+from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld
+from rrtik_ompl.kernels.taken_tables import TakenTables
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, Spheres, arm_cache
 from rrtik_ompl.world.proof import Prover
 

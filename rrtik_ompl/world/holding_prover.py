@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.collision.bodies import Body
+from rrtik_ompl.base.arrays import Mask, Matrix
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.fast.proof.packing import ProofPairs
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.kernels.proof.packing import ProofPairs
 from rrtik_ompl.world.proof import Gap, Proof, Prover
 
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, not_negative
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.world import FINEST_RESOLUTION, World
+from rrtik_ompl.base.arrays import Matrix, not_negative
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.world.world import FINEST_RESOLUTION, World
 
 CLEARANCE = 1e-3  # [m] that is kept where nobody says
 SPARE = 1e-3  # [m] that searches keep on top, but not more than twice: they look at points of a motion alone

@@ -15,14 +15,14 @@ from typing import Protocol, TypeAlias, TypeGuard
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
-from rrtik_ompl.fast.search.motions.motion_table import MotionsFree as MotionsFree
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.robot import Chain, Robot
+from rrtik_ompl.kernels import FastWorld
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
+from rrtik_ompl.kernels.search.motions.motion_table import MotionsFree as MotionsFree
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.robot import Chain, Robot
 
 MotionFree: TypeAlias = Callable[[Vector, Vector], bool]  # as MotionQueries.motion_valid
 Stop: TypeAlias = Callable[[], object]  # true when it is time to stop
@@ -110,7 +110,7 @@ def has_kernels(world: object, *libraries: str, within: Matrix | None = None) ->
 
     Args:
         world: A world, a stand-in, or None.
-        libraries: Names of the kernel libraries that are needed (:func:`rrtik_ompl.fast.simd.library.library`).
+        libraries: Names of the kernel libraries that are needed (:func:`rrtik_ompl.kernels.simd.library.library`).
         within: Corners of a box of configurations, shape (m, n), in all of which the kernels must be certain.
     """
     fast = kernel_tables(world)

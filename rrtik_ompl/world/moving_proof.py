@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.fast.proof.moving import MovedObstacles
-from rrtik_ompl.fast.proof.packing import ProofPairs
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.kernels.proof.moving import MovedObstacles
+from rrtik_ompl.kernels.proof.packing import ProofPairs
 from rrtik_ompl.world.proof import Prover
 
 

@@ -1,6 +1,6 @@
 """A robot among obstacles that move: checks that keep a clearance, and follow a scene within a tick.
 
-What is free is proven by the kernels alone (:mod:`rrtik_ompl.fast`); what they cannot prove is refused, so that an
+What is free is proven by the kernels alone (:mod:`rrtik_ompl.kernels`); what they cannot prove is refused, so that an
 answer never waits for coal. When the scene changes, only the obstacles that moved are packed again.
 """
 
@@ -12,20 +12,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Vector, finite_array, not_negative
-from rrtik_ompl.choices import Accuracy
-from rrtik_ompl.collision.bodies import Body, Pairs, far_apart
-from rrtik_ompl.collision.certificate import distance, fixed_contact
-from rrtik_ompl.collision.cloud_solid import cloud_solid
-from rrtik_ompl.errors import InputError, UnknownNameError, require
-from rrtik_ompl.fast import FREE, FastWorld
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions, motions_of, step_counts
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene, pairs_that_may_touch
-from rrtik_ompl.shapes import PointCloud, same_shape
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Mask, Vector, finite_array, not_negative
+from rrtik_ompl.base.choices import Accuracy
+from rrtik_ompl.base.errors import InputError, UnknownNameError, require
+from rrtik_ompl.geometry.collision.bodies import Body, Pairs, far_apart
+from rrtik_ompl.geometry.collision.certificate import distance, fixed_contact
+from rrtik_ompl.geometry.collision.cloud_solid import cloud_solid
+from rrtik_ompl.kernels import FREE, FastWorld
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, pairs_that_may_touch
+from rrtik_ompl.model.shapes import PointCloud, same_shape
 from rrtik_ompl.world.arm_cache import arm_cache
 from rrtik_ompl.world.moving_proof import MovingProver
+from rrtik_ompl.world.world import World
 
 SAME_PLACE = 1e-6  # [m] and of directions: of what a link holds, by which two scenes may differ
 

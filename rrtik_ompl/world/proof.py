@@ -1,6 +1,6 @@
 """Proofs that whole motions are free: every configuration between two waypoints, not a sample of them.
 
-The kernels (:mod:`rrtik_ompl.fast.proof.proof_kernels`) share the description of the bodies with the checks that
+The kernels (:mod:`rrtik_ompl.kernels.proof.proof_kernels`) share the description of the bodies with the checks that
 planners use, and nothing else: their forward kinematics are their own, in float64, and so are their distances.
 """
 
@@ -15,17 +15,17 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.digests import world_digest
-from rrtik_ompl.collision.solids import of_each
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.proof.layout import WAYS, ProofTable
-from rrtik_ompl.fast.proof.packing import ProofPairs, proof_pairs
-from rrtik_ompl.fast.proof.taken_proof import TakenProof
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.tables.solid_tables import convex_solids
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Mask, Matrix
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.digests import world_digest
+from rrtik_ompl.geometry.collision.solids import of_each
+from rrtik_ompl.kernels.proof.layout import WAYS, ProofTable
+from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
+from rrtik_ompl.kernels.proof.taken_proof import TakenProof
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.tables.solid_tables import convex_solids
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.arm_cache import Pairs, strokes
 from rrtik_ompl.world.coal_proof import CoalProof, Told, distance_between
 from rrtik_ompl.world.contact_planes import suggest_planes

@@ -6,16 +6,16 @@ from functools import partial
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.choices import Accuracy
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import FREE, FastWorld
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.choices import Accuracy
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels import FREE, FastWorld
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.kept_clearance import keeping
 from rrtik_ompl.world.motion_queries import MotionQueries, has_kernels
+from rrtik_ompl.world.world import World
 
 KERNELS = "search.motions.proven_kernels"
 

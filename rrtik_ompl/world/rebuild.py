@@ -11,16 +11,16 @@ from typing import Any, TypeVar
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.choices import Accuracy
-from rrtik_ompl.collision.bodies import Body, Pairs, far_apart
-from rrtik_ompl.collision.certificate import Certificate, fixed_contact
-from rrtik_ompl.collision.margins import DISTANCE_TOLERANCE
-from rrtik_ompl.collision.shape_table import pieces
-from rrtik_ompl.copies import Items, KeptHere, Once, ThreadOwn
-from rrtik_ompl.errors import DescriptionWarning, MeshWarning, UnknownNameError, require
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Mesh
+from rrtik_ompl.base.choices import Accuracy
+from rrtik_ompl.base.copies import Items, KeptHere, Once, ThreadOwn
+from rrtik_ompl.base.errors import DescriptionWarning, MeshWarning, UnknownNameError, require
+from rrtik_ompl.geometry.collision.bodies import Body, Pairs, far_apart
+from rrtik_ompl.geometry.collision.certificate import Certificate, fixed_contact
+from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE
+from rrtik_ompl.geometry.collision.shape_table import pieces
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Mesh
 from rrtik_ompl.world.exact_checks import ExactChecker
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.settings import WorldSettings
@@ -104,7 +104,7 @@ class Rebuilt:
 
         Args:
             name: Of the obstacle.
-            pose: T_world_obstacle, in any form that :func:`rrtik_ompl.poses.rigid` takes.
+            pose: T_world_obstacle, in any form that :func:`rrtik_ompl.base.poses.rigid` takes.
 
         Raises:
             UnknownNameError: If there is no obstacle of that name.

@@ -7,14 +7,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Mask, Matrix, bounded_array, not_negative
-from rrtik_ompl.collision.bodies import Body, link_bodies, scene_bodies
-from rrtik_ompl.collision.cloud_solid import cloud_gap, cloud_solid
-from rrtik_ompl.errors import require
-from rrtik_ompl.poses import rigid
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.shapes import PointCloud
+from rrtik_ompl.base.arrays import Mask, Matrix, bounded_array, not_negative
+from rrtik_ompl.base.errors import require
+from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.geometry.collision.bodies import Body, link_bodies, scene_bodies
+from rrtik_ompl.geometry.collision.cloud_solid import cloud_gap, cloud_solid
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.shapes import PointCloud
 from rrtik_ompl.world.arm_cache import arm_cache
 
 

@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.transitions import in_parts, subdivided
-from rrtik_ompl.world import FINEST_RESOLUTION, Proof, World
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.transitions import in_parts, subdivided
+from rrtik_ompl.world.world import FINEST_RESOLUTION, Proof, World
 
 VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a motion is checked again
 MAX_CHECKS = 30_000_000  # of a path; more than that take minutes

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, get_args
 
-from rrtik_ompl.arrays import finite_array, not_negative
-from rrtik_ompl.choices import Accuracy, one_of
-from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError, listed, require
-from rrtik_ompl.poses import few_joints
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.base.arrays import finite_array, not_negative
+from rrtik_ompl.base.choices import Accuracy, one_of
+from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.base.poses import few_joints
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.task_region import TaskRegion
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
-from rrtik_ompl.choices import Accuracy
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.kernels import FastWorld
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.motion_queries import MotionQueries, is_conservative, keeps_constraints, kernel_tables
 
 

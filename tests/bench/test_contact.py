@@ -7,7 +7,7 @@ import rrtik_ompl as rrtik
 from bench.robustness import contact
 from bench.robustness.contact_judge import Judge
 from bench.robustness.solid_distance import distance_to, lowest
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Sphere
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Sphere
 
 CORNERS = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.2, 0.2) for z in (-0.3, 0.3)])
 SURFACE = Box([0.2, 0.4, 0.6]).surface()

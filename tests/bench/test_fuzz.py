@@ -11,7 +11,7 @@ import rrtik_ompl as rrtik
 from bench import fuzz
 from bench.robustness import calls, commands, spoilt_files
 from bench.robustness.spoilt_files import Drawn
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 CALLS = 400
 

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl import JointPath, load_problem, load_robot
-from rrtik_ompl.generated_problems import generated_problem
+from rrtik_ompl.planning.generated_problems import generated_problem
 
 
 @pytest.mark.parametrize("of_meshes", [False, True])

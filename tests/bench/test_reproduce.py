@@ -17,10 +17,10 @@ from rrtik_bench.mb_rrt.runs import PUBLISHED, Measured
 from rrtik_bench.registry import COLLECTION
 from rrtik_bench.report.rows import Bar, Row, Verdict, all_of, judged, within
 from rrtik_bench.tables import Collection, Table
-from rrtik_ompl import catalog
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.cli.reproduce import chosen
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.description import catalog
 
 HELD, BETTER, DIFFERS, REFUTED, MISSED = Verdict
 TABLES = {table.name: table for table in COLLECTION.tables}
@@ -231,7 +231,7 @@ def test_bad_input_is_one_line_and_exit_2(capsys, arguments, said):
 
 def test_singular_titan_postures_are_on_the_axis_they_are_named_for():
     from rrtik_bench.titan4 import D6, _singular
-    from rrtik_ompl.catalog import load_robot
+    from rrtik_ompl.description.catalog import load_robot
 
     Q = _singular("shoulder and wrist", 50, np.random.default_rng(0))
     tips = load_robot("titan4").fk_batch(Q)

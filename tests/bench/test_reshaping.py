@@ -5,7 +5,7 @@ import pytest
 
 from rrtik_bench.drrt_con import FASTEST
 from rrtik_bench.reshaping import NONE, Reshaper, bent, hit_edges, reshaped
-from rrtik_ompl.transitions import route_length
+from rrtik_ompl.model.transitions import route_length
 
 SCENE = "replan_triangles"
 

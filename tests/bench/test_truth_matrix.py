@@ -9,7 +9,7 @@ import rrtik_ompl as rrtik
 from bench.truth import matrix, settings
 from bench.truth.matrix_cells import WAYS, Judged, draw, judged, without_row
 from bench.truth.shape_kinds import MAKERS, without_maker
-from rrtik_ompl.shapes import Box
+from rrtik_ompl.model.shapes import Box
 
 pytestmark = pytest.mark.kernels
 

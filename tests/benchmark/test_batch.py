@@ -3,7 +3,7 @@
 import pytest
 
 from rrtik_ompl import load_problem, plan, plan_batch
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 
 def test_a_batch_of_queries_comes_in_order_and_finds_what_plan_finds(tmp_path):

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark.campaign import machine
 from rrtik_ompl.benchmark.records import NAME, RecordFile, read_records
 from rrtik_ompl.benchmark.suite import load_suite
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import InputError
 
 pytestmark = pytest.mark.slow
 

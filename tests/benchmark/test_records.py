@@ -4,10 +4,10 @@ import json
 
 import pytest
 
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark.records import NAME, read_head
 from rrtik_ompl.benchmark.report import write_report
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import InputError
 
 pytestmark = pytest.mark.slow
 

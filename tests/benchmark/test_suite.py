@@ -5,10 +5,10 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from rrtik_ompl import catalog
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark.suite import load_suite
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.description import catalog
 from rrtik_planners.suites import FOLDER
 from rrtik_tests.campaigns import SUITE
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import RrtikError
-from rrtik_ompl.poses import pose
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
 
 ARM = "{planar: {lengths: [1, 1], limits_deg: [[-90, 90], [-90, 90]], radius: 0.01}}"
 GOOD = f"""version: 1

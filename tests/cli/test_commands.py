@@ -10,7 +10,7 @@ import time
 import pytest
 
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.path import load_path
+from rrtik_ompl.world.path import load_path
 from rrtik_tests.command_line import rrtik
 
 
@@ -252,7 +252,7 @@ def test_convert_between_path_formats(capsys, tmp_path, ending):
 
 
 def test_convert_writes_a_problem_that_loads_again(capsys, tmp_path):
-    from rrtik_ompl.catalog import find_problem
+    from rrtik_ompl.description.catalog import find_problem
 
     target = tmp_path / "copy.yaml"
     assert rrtik(capsys, "convert", str(find_problem("titan4_sdu")), str(target))[0] == 0

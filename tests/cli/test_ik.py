@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import JointGoal, load_problem, load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose, pose_from_rpy, quaternion_xyzw
 from rrtik_ompl.problem_files.poses import load_poses
 from rrtik_tests.command_line import rrtik
 

@@ -9,12 +9,12 @@ import pytest
 
 import rrtik_ompl as rrtik
 from bench.truth.scenes import tolerances
+from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
+from rrtik_ompl.base.poses import rotation_angles
 from rrtik_ompl.constraints.held_region import Turning
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows, residual
-from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
-from rrtik_ompl.poses import rotation_angles
-from rrtik_ompl.scene import AttachedObject, Scene
+from rrtik_ompl.model.scene import AttachedObject, Scene
 
 START = np.array([0.3, -1.2, 1.4, -0.4, 0.6, 0.2])
 

@@ -7,9 +7,9 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
 from rrtik_ompl.constraints.walls import separation
-from rrtik_ompl.fast.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.ik.held_tables import held_tables
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.kernels.search.constrained.search import ConstrainedSearch
+from rrtik_ompl.model.scene import Scene
 
 DOWN = np.array([0.0, -1.5, 1.5, -1.5, -0.5 * np.pi, 0.0])  # the tool of a UR5 points down
 

@@ -5,9 +5,9 @@ import warnings
 
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.description.moveit.srdf import MENTIONS
-from rrtik_ompl.errors import DescriptionWarning, InputError
+from rrtik_ompl.base.errors import DescriptionWarning, InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.description.srdf import MENTIONS
 
 LINK = '<link name="{}"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>'
 JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="0 0 0.3"/>

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
-from rrtik_ompl.errors import InputError
 
 LENGTH = st.floats(-1.0, 1.0).map(lambda x: round(x, 3))
 ANGLE = st.floats(-3.1, 3.1)

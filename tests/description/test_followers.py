@@ -6,20 +6,20 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.arrays import TAU
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.arrays import TAU
+from rrtik_ompl.base.errors import DescriptionWarning, InputError
 from rrtik_ompl.cli.ik_report import fold_full_turns
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import DescriptionWarning, InputError
-from rrtik_ompl.goal import PoseGoal, joint_difference
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ik.method_interface import IkResult
 from rrtik_ompl.ik.solve import solve_ik
-from rrtik_ompl.planning import plan
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.search.roadmap import Roadmap
+from rrtik_ompl.model.goal import PoseGoal, joint_difference
+from rrtik_ompl.planning.plan import plan
+from rrtik_ompl.planning.search.roadmap import Roadmap
 from rrtik_ompl.tasks.through import plan_through
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{name}_link"/><axis xyz="0 0 1"/>
 <limit lower="{low}" upper="{high}" velocity="{rate}" effort="1"/>{mimic}</joint>"""

@@ -7,11 +7,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import RrtikError
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 HEAD = """<mujoco model="arm"><compiler angle="{angle}" eulerseq="{sequence}"/>
 <default><geom rgba="1 0 0 1"/><default class="hard"><geom group="3" type="capsule" size="0.03"/>

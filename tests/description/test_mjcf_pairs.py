@@ -6,9 +6,9 @@ import warnings
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import DescriptionWarning, InputError
-from rrtik_ompl.world import World
+from rrtik_ompl.base.errors import DescriptionWarning, InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.world.world import World
 
 HEAD = '<mujoco><compiler angle="radian"/><worldbody>'
 MASKS = (

@@ -6,12 +6,12 @@ import sys
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.description.moveit.joint_limits import read_joint_limits
-from rrtik_ompl.errors import DescriptionWarning, InputError, RrtikError, UnknownNameError
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, RrtikError, UnknownNameError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.description.joint_limits import read_joint_limits
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_robots.example_arms import data_folder
 
 PACKAGE, SRDF = "panda_description", "panda_description/srdf/panda.srdf"

@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, TipWarning
 from rrtik_ompl.description.urdf import robot_from_urdf, robot_from_urdf_text
-from rrtik_ompl.errors import DescriptionWarning, InputError, TipWarning
 from rrtik_robots.example_arms import data_folder
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import InputError, Problem, World, load_problem, load_robot, save_problem
-from rrtik_ompl.catalog import robot_from_entry
+from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.description.xacro_expression import FUNCTIONS, MATHEMATICS, Evaluator, Refused
 from rrtik_ompl.description.xacro_text import expanding, robot_text
 
-pytestmark = pytest.mark.filterwarnings("ignore::rrtik_ompl.errors.MeshWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::rrtik_ompl.base.errors.MeshWarning")
 
 ARM = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
 %s

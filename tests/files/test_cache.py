@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
-from rrtik_ompl.fast.simd import library as libraries
-from rrtik_ompl.fast.simd.code_files import Code, write_code
 from rrtik_ompl.files.cache import FOLDER_VARIABLE, cache_folder, nobody_else_s, write_whole
+from rrtik_ompl.kernels.simd import library as libraries
+from rrtik_ompl.kernels.simd.code_files import Code, write_code
 
 OTHER_USER = 54321
 only_root = pytest.mark.skipif(os.geteuid() != 0, reason="needs to make files of another user")

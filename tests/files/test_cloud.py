@@ -5,12 +5,12 @@ import io
 import numpy as np
 import pytest
 
-from rrtik_ompl.errors import CloudWarning, InputError
+from rrtik_ompl.base.errors import CloudWarning, InputError
 from rrtik_ompl.files.cloud import load_cloud, save_cloud
 from rrtik_ompl.files.pcd import unpacked
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import PointCloud, same_shape
 from rrtik_ompl.problem_files.scene import load_scene, save_scene
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import PointCloud, same_shape
 
 POINTS = np.array([[0.5, -1.25, 2.0], [0.0, 0.0, 0.0], [1e-3, 7.0, -3.0]])
 PLY = "ply\nformat {} 1.0\ncomment made by hand\nelement vertex 3\n{}end_header\n"

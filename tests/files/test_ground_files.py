@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import CloudWarning, InputError
-from rrtik_ompl.shapes import same_shape
+from rrtik_ompl.base.errors import CloudWarning, InputError
+from rrtik_ompl.model.shapes import same_shape
 
 HEIGHTS = np.array([[0.0, 0.5, 1.0], [1.5, 2.0, 2.5]])
 HEAD = b"# Octomap OcTree binary file\n# a comment\nid OcTree\nsize 3\nres 0.1\ndata\n"

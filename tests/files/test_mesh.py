@@ -8,15 +8,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.errors import InputError, MeshWarning
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import InputError, MeshWarning
 from rrtik_ompl.files import mesh as mesh_files
 from rrtik_ompl.files import notice
 from rrtik_ompl.files.mesh import load_mesh
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Mesh
-from rrtik_ompl.world import World
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Mesh
+from rrtik_ompl.world.world import World
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], dtype=np.float64)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -214,7 +214,7 @@ def test_a_scale_that_makes_no_sense_is_refused(tmp_path, scale):
         load_mesh(tmp_path / "part.obj", scale)
 
 
-@pytest.mark.filterwarnings("ignore::rrtik_ompl.errors.MeshWarning")
+@pytest.mark.filterwarnings("ignore::rrtik_ompl.base.errors.MeshWarning")
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(
     st.sampled_from(sorted(GOOD)),

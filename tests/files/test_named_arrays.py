@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files import named_arrays
 from rrtik_ompl.files.named_arrays import NamedArrays
 

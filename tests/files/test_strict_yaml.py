@@ -7,7 +7,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrtik_ompl.errors import InputError, ProblemError
+from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.files import yaml_values
 from rrtik_ompl.files.strict_yaml import key_path, read_yaml, write_yaml
 from rrtik_ompl.files.text import read_text, write_text

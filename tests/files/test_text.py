@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files import text
 from rrtik_ompl.files.text import write_bytes, write_text
 

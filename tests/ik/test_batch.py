@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.analytic.branch_choice import nearest
 from rrtik_ompl.ik.batch import solve_ik_batch
-from rrtik_ompl.shapes import Box
+from rrtik_ompl.model.shapes import Box
 
 
 @pytest.mark.parametrize(("name", "count"), [("titan4", 500), ("puma560", 500), ("planar3", 500), ("ur5", 5)])

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.analytic.branch_choice import follow, nearest
 from rrtik_ompl.ik.analytic.closed_form import solutions
 

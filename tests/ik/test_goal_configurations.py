@@ -10,22 +10,22 @@ from hypothesis import strategies as st
 from ompl import base as ob
 from ompl import geometric as og
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik import goal_configurations
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.targets import skip_targets, targets
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
 from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners, traits_of
-from rrtik_ompl.planning import list_planners, plan
-from rrtik_ompl.poses import pose
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.planning.plan import list_planners, plan
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box
-from rrtik_ompl.task_region import TaskRegion
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_planners import MBRRT, BiCRDT
 
 ANYTIME_PLANNERS = tuple(name for name, planner in ompl_planners().items() if traits_of(planner).anytime)

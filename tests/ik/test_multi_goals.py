@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.goal import MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.solve import solve_ik
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.model.goal import MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Sphere
+from rrtik_ompl.world.world import World
 
 TIPS = ("left_grip_point", "right_grip_point")
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.rate import rate
 from rrtik_ompl.ik.singularity import manipulability, singularity_report
 

@@ -7,9 +7,6 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.fast.ik import ik_layout
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.goal import tip_errors
 from rrtik_ompl.ik.analytic import kernel_branches
 from rrtik_ompl.ik.analytic.closed_form import branches_of, form_of
 from rrtik_ompl.ik.goal_rows import goal_rows
@@ -19,6 +16,9 @@ from rrtik_ompl.ik.numeric.kernel_call import spare_calls
 from rrtik_ompl.ik.residual import error_of_one
 from rrtik_ompl.ik.serial_chain import seeded_limb_of
 from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.kernels.ik import ik_layout
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.goal import tip_errors
 
 ARMS = ("ur5", "panda", "titan4")
 ROUNDING = 1e-12  # [m] and [rad]

@@ -5,11 +5,11 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.trajectory import list_ik_trajectory_methods
-from rrtik_ompl.poses import pose_from_rpy
-from rrtik_ompl.shapes import Sphere
+from rrtik_ompl.model.shapes import Sphere
 
 METHODS_OF = {
     "titan4": ("closed-form", "numeric", "genetic"),

@@ -13,7 +13,7 @@ from ompl import geometric as og
 
 import rrtik_ompl as rrtik
 from bench.truth.ompl_exact import STRICT, deepest, faults, solved, ways
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge import GoalSampler, SafePlanner, SearchResult
 from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners
 from rrtik_ompl.ompl_bridge.states import StateIO

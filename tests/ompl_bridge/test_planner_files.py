@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
+from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.benchmark import load_suite
-from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.ompl_bridge.planner_names import find_planner
-from rrtik_ompl.planning import plan
+from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
 
 CODE = """

@@ -10,8 +10,9 @@ import pytest
 import rrtik
 import rrtik_ompl
 import rrtik_planners
-from rrtik_ompl import catalog, choices
-from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.base import choices
+from rrtik_ompl.base.errors import PlannerError
+from rrtik_ompl.description import catalog
 from rrtik_ompl.ik.genetic.options import PRESETS
 from rrtik_ompl.ik.trajectory import list_ik_trajectory_methods
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
@@ -25,9 +26,9 @@ from rrtik_ompl.ompl_bridge.planner_traits import (
     traits_of,
     unbound_planners,
 )
+from rrtik_ompl.planning.shortening import METHODS
 from rrtik_ompl.replanning import PLANNERS
-from rrtik_ompl.shortening import METHODS
-from rrtik_ompl.world import ACCURACIES
+from rrtik_ompl.world.world import ACCURACIES
 
 LIBRARY = Path(rrtik_ompl.__file__).parent
 # Replanners, methods of shortening and of improving have names of their own, some of them those of planners; a page has
@@ -35,15 +36,15 @@ LIBRARY = Path(rrtik_ompl.__file__).parent
 BY_NAME: tuple[str, ...] = (
     "ompl_bridge/planner_traits.py",
     "replanning/",
-    "shortening/",
+    "planning/shortening/",
     "cli/replan.py",
     "cli/plan.py",
     "choices.py",
     "problem_files/run.py",
     "replanning/scenario.py",
-    "planning/__init__.py",
+    "planning/plan.py",
     "planning/improving.py",
-    "fast/wasm/page_kernels.py",
+    "kernels/wasm/page_kernels.py",
     "viewer/page_planner.py",
     "viewer/page_tables.py",
 )

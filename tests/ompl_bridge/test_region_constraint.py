@@ -5,11 +5,11 @@ import pytest
 from ompl import base as ob
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.equations import equation_count, equations
 from rrtik_ompl.constraints.held_regions import held_regions
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.ompl_bridge.region_constraint import RegionConstraint
-from rrtik_ompl.scene import Scene
 
 START = np.array([0.3, -1.2, 1.4, -0.4, 0.6, 0.2])
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ompl import base as ob
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.contract.problems import GOAL, START, outside_bar, small_problem, solution_rows
 

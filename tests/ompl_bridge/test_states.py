@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ompl import base as ob
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge import StateIO, space_bounds, states
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.pilot.devices.perception import REPEATS
 from rrtik_ompl.pilot.interlock import STALE_SECONDS
+from rrtik_ompl.pilot.perception import REPEATS
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.sensing.cameras.pictures import Picture
 

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import DEFAULT_RATE, SimulatedArm
 from rrtik_ompl.pilot.interlock import ALWAYS, FOLLOWING, MODES, MOVING, PRESENT, PROPOSED
 from rrtik_ompl.pilot.motion.drive import LEASH_SECONDS

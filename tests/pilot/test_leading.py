@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.poses import apart, pose
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.motion.leading import ALIGNED, NEAR
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document
-from rrtik_ompl.poses import apart, pose
 from rrtik_tests.pilot_session import PLACE, PROBLEM, ROBOT, WORLD, follow, hold, seen_at, session
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import load_problem
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.line_arm import UNSEEN_SECONDS, LineArm, LineServer
 from rrtik_ompl.pilot.session import Session

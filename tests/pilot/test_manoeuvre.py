@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import Cylinder, Obstacle, load_robot, pose
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.routes.manoeuvre import check_move, escape_move, free_until, joint_range
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 from rrtik_tests.pilot_session import PROBLEM, ROBOT, WORLD, hold
 
 

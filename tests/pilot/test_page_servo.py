@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.poses import apart, pose
 from rrtik_ompl.pilot.setup import SessionOptions
-from rrtik_ompl.poses import apart, pose
 from rrtik_tests.browser import Running
 from rrtik_tests.pilot_hands import ENABLE, HANDS, faster, follow
 

@@ -10,11 +10,11 @@ import pytest
 from rrtik_ompl import Cylinder, Obstacle, Scene, World, load_problem, load_robot, pose
 from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
-from rrtik_ompl.pilot.lamps import lamps, stage_poses
 from rrtik_ompl.pilot.routes import route_search
 from rrtik_ompl.pilot.routes.approach import MAX_JOINTS, MAX_OFFSET, MAX_TILT, STANDOFF_FACTORS, approaches
 from rrtik_ompl.pilot.routes.clearance import executions, forgiving, free_rows
 from rrtik_ompl.pilot.routes.follower import slack
+from rrtik_ompl.pilot.routes.lamps import lamps, stage_poses
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import route_to, route_to_grasp
 from rrtik_ompl.pilot.routes.route_search import GraspRoute, RouteSearch

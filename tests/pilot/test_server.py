@@ -11,7 +11,7 @@ import pytest
 import tornado.httpclient
 import tornado.websocket
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.clients import Client, Clients, Lane

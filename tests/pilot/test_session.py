@@ -6,16 +6,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.model.scene import Obstacle
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED
 from rrtik_ompl.pilot.records.record import Record, read_record
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.poses import pose
-from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import SeenObject
-from rrtik_ompl.shapes import Box
 from rrtik_tests.pilot_session import PLACE, PROBLEM, ROBOT, VALVE, follow, hold, session
 
 

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import load_problem
-from rrtik_ompl.catalog import find_problem
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.description.catalog import find_problem
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import Feed
 from rrtik_ompl.pilot.devices.line_arm import LineServer
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
-from rrtik_ompl.pilot.lamps import AMBER, GREEN, RED
+from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
-from rrtik_ompl.poses import pose
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError, Picture
 from rrtik_tests.waiting import until
 

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.interlock import ALWAYS, FOLLOWING, GUIDED, MANOEUVRE, MOVING, PRESENT, PROPOSED, UNSEEN_SECONDS
@@ -15,7 +15,7 @@ from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.state import state_document
 from rrtik_ompl.pilot.surroundings import Structure
 from rrtik_ompl.sensing.scene_from_view import SeenObject
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 from rrtik_tests.pilot_session import PLACE, PROBLEM, ROBOT, VALVE, WORLD, hold, seen_at
 
 PANEL = replace(VALVE, name="panel_mark", solids=(), grasps=())

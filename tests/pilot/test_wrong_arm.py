@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.pilot.hands import follow_route, hold_next
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle
 from rrtik_ompl.pilot.devices.wrong_arm import Faults, WrongArm

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_tests.upright_problem import cup_problem
 
 pytestmark = [pytest.mark.kernels, pytest.mark.usefixtures("quiet_ompl")]

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from ompl import base as ob
 
-from rrtik_ompl import catalog
-from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.base.errors import PlannerError
+from rrtik_ompl.description import catalog
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
 from rrtik_ompl.ompl_bridge.contract.problems import Clause, small_problem, solution_rows

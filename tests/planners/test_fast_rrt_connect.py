@@ -8,21 +8,21 @@ import pinocchio as pin
 import pytest
 from ompl import base as ob
 
-from rrtik_ompl.covers.spheres import inner_spheres, outer_cover
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import FastWorld, needs_covers
-from rrtik_ompl.fast.search import connect
-from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.motions.motion_table import FastMotions
+from rrtik_ompl.geometry.covers.spheres import inner_spheres, outer_cover
+from rrtik_ompl.kernels import FastWorld, needs_covers
+from rrtik_ompl.kernels.search import connect
+from rrtik_ompl.kernels.search.connect import ConnectSearch
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.ompl_bridge import StateIO
 from rrtik_ompl.ompl_bridge.attempt import attempt
-from rrtik_ompl.planning import plan
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_planners import FastRRTConnect
 
 pytestmark = [pytest.mark.kernels, pytest.mark.usefixtures("quiet_ompl")]

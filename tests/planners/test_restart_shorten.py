@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, spaces
 from rrtik_ompl.ompl_bridge.contract.problems import Clause, outside_wall, small_problem, solution_rows
 from rrtik_planners import FastAORRTC, FastRRTConnect, RestartShorten

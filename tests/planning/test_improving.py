@@ -7,14 +7,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
-from rrtik_ompl.planning import improving, plan
+from rrtik_ompl.planning import improving
 from rrtik_ompl.planning.improving import Improvement, improved
 from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.planning.path_costs import COSTS, least_time, weighted_length
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem
+from rrtik_ompl.world.problem import Problem
 
 LONG = 20.0  # [s] a limit that the tests do not come near to
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
-from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ompl_bridge.planner_names import find_planner
 from rrtik_ompl.planning import improving
 from rrtik_ompl.planning.improving import Improvement, improved

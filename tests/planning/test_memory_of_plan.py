@@ -12,7 +12,7 @@ SOLVES = how_many(10_000, 2_000)
 CODE = f"""
 import numpy as np, pinocchio as pin
 from rrtik_ompl import Obstacle, Problem, Scene, World, load_robot, plan
-from rrtik_ompl.shapes import Box
+from rrtik_ompl.model.shapes import Box
 
 def resident():
     return int(open("/proc/self/statm").read().split()[1]) * 4096 / 2**20

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 
 TIPS = ("left_grip_point", "right_grip_point")

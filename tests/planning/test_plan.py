@@ -10,21 +10,21 @@ import pytest
 from ompl import base as ob
 from ompl import control as oc
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
-from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.model.goal import PoseGoal, PositionGoal
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.ompl_bridge.planner_names import find_planner, list_planners
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.planning import plan, plan_counted
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.planning.plan import plan, plan_counted
+from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box
-from rrtik_ompl.shortening import shorten
-from rrtik_ompl.world import World
 from rrtik_ompl.world.exact_checks import ExactChecker
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_robots.titan4.singular_samples import configurations_inside
 
 

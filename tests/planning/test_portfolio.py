@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import Problem, load_problem, plan, plan_batch, save_problem
-from rrtik_ompl.errors import InputError, PlannerError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner
 from rrtik_ompl.planning import portfolio

@@ -8,14 +8,14 @@ import pytest
 from ompl import geometric as og
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError, MeshWarning, UnknownNameError
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import InputError, MeshWarning, UnknownNameError
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
-from rrtik_ompl.planning import plan
-from rrtik_ompl.poses import pose
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Sphere
+from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import CLEARANCE, room_between
 from rrtik_planners import FewestMoves

@@ -5,11 +5,11 @@ import tarfile
 import numpy as np
 import pytest
 
-from rrtik_ompl.errors import InputError, ProblemError, RrtikError
-from rrtik_ompl.goal import JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.base.errors import InputError, ProblemError, RrtikError
+from rrtik_ompl.model.goal import JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.shapes import Box, Cylinder, Sphere
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
-from rrtik_ompl.shapes import Box, Cylinder, Sphere
 from rrtik_tests.places import ROOT
 
 ARCHIVE = ROOT.parent / "shared" / "data" / "mbm_panda.tar.bz2"
@@ -100,7 +100,9 @@ def test_a_start_may_name_joints_that_the_robot_lacks_and_its_description_is_rea
     for names, values in states:
         request = REQUEST.replace("[grip, hoist, rail]", names).replace("[0.25, 0.5, -1]", values)
         robots.append(load(pair(request=request)).world.robot)
-        monkeypatch.setattr("rrtik_ompl.catalog.robot_from_urdf", None)  # from now on only what is kept serves
+        monkeypatch.setattr(
+            "rrtik_ompl.description.catalog.robot_from_urdf", None
+        )  # from now on only what is kept serves
     assert robots[0] is robots[1]
     assert robots[0].movable == {"grip", "hoist", "rail"}
 

@@ -8,7 +8,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from bench.truth.moveit_pairs import GANTRY, Case, attached, box, joints, pose
-from rrtik_ompl.errors import RrtikError, SceneWarning, UnknownNameError
+from rrtik_ompl.base.errors import RrtikError, SceneWarning, UnknownNameError
 
 FINGER = """<link name="claw"/><joint name="grip" type="prismatic"><parent link="tool"/><child link="claw"/>
 <axis xyz="1 0 0"/><limit lower="0" upper="1" velocity="1" effort="1"/></joint></robot>"""

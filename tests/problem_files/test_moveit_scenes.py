@@ -10,7 +10,7 @@ import pytest
 import rrtik_ompl as rrtik
 from bench.truth.moveit_pairs import CASES, GANTRY, attached, box, pose
 from bench.truth.scenes import pair
-from rrtik_ompl.errors import InputError, SceneWarning
+from rrtik_ompl.base.errors import InputError, SceneWarning
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.problem_files import moveit_messages

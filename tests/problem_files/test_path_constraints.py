@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.errors import InputError, ProblemError
+from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
 
 START = "[0.3, -1.2, 1.4, -0.4, 0.6, 0.2]"

@@ -9,15 +9,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rrtik_ompl.catalog import list_problems
-from rrtik_ompl.errors import InputError, ProblemError, RrtikError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, ProblemError, RrtikError, UnknownNameError
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.description.catalog import list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
-from rrtik_ompl.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
-from rrtik_ompl.poses import pose
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.model.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.problem_files.problem import load_problem, problem_schema, save_problem
-from rrtik_ompl.task_region import TaskRegion
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 ARM = "{planar: {lengths: [1, 1, 1], limits_deg: [[-170, 170], [-170, 170], [-170, 170]], radius: 0.01}}"
 URDF = """<robot name="slide"><link name="base"/><link name="car"/><link name="tool">

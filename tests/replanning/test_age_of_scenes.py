@@ -8,15 +8,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning import SpeedWarning, load_run, replan
 from rrtik_ompl.replanning.feed import MotionTracker, Snapshot, Stream
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import Box, HalfSpace, Sphere
-from rrtik_ompl.trajectory.limits import RateLimits
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_tests.run_judge import judged
 
 SPEED, RATE, MARGIN = 0.2, 50.0, 0.02

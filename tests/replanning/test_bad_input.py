@@ -8,16 +8,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
+from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning import SpeedWarning, load_run, replan
 from rrtik_ompl.replanning.in_time import plan_in_time
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import Box, HalfSpace, Sphere
-from rrtik_ompl.task_region import TaskRegion
-from rrtik_ompl.trajectory.limits import RateLimits
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import OPTIONS, box, crossing, plane
 
 

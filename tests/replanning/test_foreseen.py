@@ -7,14 +7,14 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.shapes import Box, Sphere
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning import in_time
 from rrtik_ompl.replanning.in_time import foreseen, hurry, plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.tree import NEVER, Pace
-from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import Box, Sphere
-from rrtik_ompl.trajectory.limits import RateLimits
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import FAST, box, crossing, place, plane
 
 PEDESTAL = """<robot name="pedestal">

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.replanning.generate import moving_scene
 
 

@@ -10,17 +10,17 @@ import pinocchio as pin
 import pytest
 
 from bench.truth.shape_kinds import kinds
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.app import run as rrtik
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses, Touching
+from rrtik_ompl.model.shapes import Box, HalfSpace, PointCloud
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.replanning import ReplanRun, Tick, load_run, record, replan
 from rrtik_ompl.replanning.feed import Snapshot
 from rrtik_ompl.replanning.scenario import load_scenario
-from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, TimedPoses, Touching
-from rrtik_ompl.shapes import Box, HalfSpace, PointCloud
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import OPTIONS, crossing
 from rrtik_tests.run_judge import judged
 

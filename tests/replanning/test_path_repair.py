@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rrtik_ompl.planning.search.tree import ConfigurationTree
 from rrtik_ompl.replanning.connecting import PythonConnect
 from rrtik_ompl.replanning.drrt_con import (
     DrrtCon,
@@ -15,7 +16,6 @@ from rrtik_ompl.replanning.drrt_con import (
 )
 from rrtik_ompl.replanning.single_tree import trimmed
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
-from rrtik_ompl.search.tree import ConfigurationTree
 from rrtik_tests.moving_plane import HIGH, LOW
 
 

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 SETTINGS = {"step": 0.05, "rate": 20.0, "seconds": 2.0, "seed": 1, "repair_budget": 30.0}
 

@@ -4,14 +4,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, PointCloud, Prism, Sphere
 from rrtik_ompl.replanning import load_run, replan
 from rrtik_ompl.replanning.feed import MotionTracker, Snapshot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, PointCloud, Prism, Sphere
-from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import OPTIONS, crossing, plane
 
 SOLIDS = (

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.replanning import load_run, replan
 from rrtik_tests.moving_plane import OPTIONS, crossing
 

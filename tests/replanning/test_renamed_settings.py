@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.app import run as rrtik
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.replanning import ReplanSettings, replan, replan_with
 from rrtik_ompl.replanning.scenario import Scenario, load_scenario
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 NAMES = {"eps": "max_edge", "slot": "repair_budget", "predict": "lookahead_ticks"}
 TEXT = """version: 1

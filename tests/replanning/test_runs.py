@@ -10,17 +10,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import PositionGoal
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.goal import PositionGoal
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.shapes import Box, PointCloud, Prism, Sphere
 from rrtik_ompl.replanning import PLANNERS, SpeedWarning, replan
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.generate import moving_problem
-from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import Box, PointCloud, Prism, Sphere
-from rrtik_ompl.world import World
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import FAST, OPTIONS, box, crossing, place, plane
 from rrtik_tests.run_judge import judged
 

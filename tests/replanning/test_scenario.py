@@ -8,22 +8,22 @@ import re
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import find_problem, list_problems, load_robot
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.cli.app import run as rrtik
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import pose
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.description.catalog import find_problem, list_problems, load_robot
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
+from rrtik_ompl.model.shapes import HalfSpace
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.replanning import load_run, replan
 from rrtik_ompl.replanning.scenario import load_scenario
-from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene
-from rrtik_ompl.shapes import HalfSpace
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import subject_of_run
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_tests.run_judge import judged
 
 SCENARIOS = [name for name in list_problems() if name.startswith("replan_")]

@@ -7,9 +7,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import list_robots, load_robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.world import World
+from rrtik_ompl.description.catalog import list_robots, load_robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.world.world import World
 from rrtik_robots import example_arms
 from rrtik_robots.puma560 import INCH
 

@@ -4,10 +4,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import find_problem, list_problems
+from rrtik_ompl.description.catalog import find_problem, list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml
-from rrtik_ompl.goal import JointGoal, PoseGoal, PositionGoal
-from rrtik_ompl.planning import plan
+from rrtik_ompl.model.goal import JointGoal, PoseGoal, PositionGoal
+from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem, problem_schema, save_problem
 
 NAMES = [

@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.world import World
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.world.world import World
 from rrtik_robots.titan4 import JOINTS, TitanGeometry, titan4_urdf
 
 G = TitanGeometry()

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose_from_rpy
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.analytic.closed_form import solutions
-from rrtik_ompl.poses import pose_from_rpy
 from rrtik_robots.titan4.workspace import Camera, EffectiveWorkspace, gripper_poses
 
 NOWHERE = np.array([[50.0, 50.0, 50.0], [51.0, 51.0, 51.0]])

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_tests.marker_views import CAMERA, SIDE, facing

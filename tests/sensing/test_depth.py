@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.depth import cloud_from_depth
 

@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.sensing.cameras.calibration import calibrate
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.sensing.calibration import calibrate
+from rrtik_ompl.sensing.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.cameras.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, marker_print, photograph
 from rrtik_ompl.sensing.cameras.tone import coded
 from rrtik_ompl.sensing.markers.chessboard import Chessboard

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import pose
-from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.model.scene import Obstacle
+from rrtik_ompl.model.shapes import Box, HalfSpace
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.sensing.sensor import Sensor
-from rrtik_ompl.shapes import Box, HalfSpace
 from rrtik_tests.marker_views import BOX, CAMERA, STAND
 
 

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.problem_files.scene import load_scene
-from rrtik_ompl.sensing.cameras.camera_file import save_camera
+from rrtik_ompl.sensing.camera_file import save_camera
 from rrtik_tests.command_line import rrtik
 from rrtik_tests.marker_files import CAMERA, MAP
 

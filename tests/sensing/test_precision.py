@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.precision import Series, series_of
 
 

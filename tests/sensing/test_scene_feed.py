@@ -5,18 +5,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import pose
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.replanning import replan
-from rrtik_ompl.scene import Obstacle, Scene
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.scene_feed import scene_feed
 from rrtik_ompl.sensing.sensor import Sensor
-from rrtik_ompl.shapes import Box
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_tests.marker_views import BOX, CAMERA, T_BOX_MARKERS, facing, picture_of
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import pose, pose_from_rpy
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose, pose_from_rpy
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pan_tilt_zoom import Encoder, PanTiltZoom
 from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError, ProblemError, RrtikError, UnknownNameError, at_most
-from rrtik_ompl.moves.rules import MoveRules
+from rrtik_ompl.base.errors import InputError, ProblemError, RrtikError, UnknownNameError, at_most
+from rrtik_ompl.planning.moves.rules import MoveRules
 
 ROBOT = rrtik.load_robot("planar3")
 FAR = rrtik.Obstacle("far", rrtik.Sphere(0.1), rrtik.pose([9, 9, 9]))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError, RrtikError
-from rrtik_ompl.moves.rules import MoveRules
+from rrtik_ompl.base.errors import InputError, RrtikError
+from rrtik_ompl.planning.moves.rules import MoveRules
 from rrtik_ompl.world.moving_world import MovingWorld
 
 

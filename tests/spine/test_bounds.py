@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import InputError
 
 
 def urdf(joints):

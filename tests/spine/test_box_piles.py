@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.shapes import Mesh, Octree
-from rrtik_ompl.shapes.height_field import HeightField
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.shapes import Mesh, Octree
+from rrtik_ompl.model.shapes.height_field import HeightField
 
 
 def inside(pile, points):

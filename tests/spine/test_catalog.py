@@ -7,7 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import (
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.catalog import (
     find_planner,
     find_problem,
     list_planners,
@@ -16,7 +17,6 @@ from rrtik_ompl.catalog import (
     load_robot,
     robot_from_entry,
 )
-from rrtik_ompl.errors import InputError, UnknownNameError
 
 URDF = """<robot name="arm"><link name="base"/><link name="arm"/><joint name="j" type="revolute">
 <parent link="base"/><child link="arm"/><origin xyz="{height} 0 0"/><axis xyz="0 0 1"/>

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.viewer.subject import subject_of
 
 MOTIONS = re.compile(r"\b(JointPath|Trajectory|HasWaypoints|ShownPath)\b")

@@ -13,14 +13,14 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl import errors
-from rrtik_ompl.certificates.write import certificate_of
+from rrtik_ompl.base import errors
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.ik.singularity import singularity_report
-from rrtik_ompl.overlay.virtual_camera import pinhole_camera
+from rrtik_ompl.pilot.overlay.virtual_camera import pinhole_camera
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError
 from rrtik_ompl.sensing.frames import NoBaseError
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
+from rrtik_ompl.world.certificates.write import certificate_of
 
 AT = rrtik.pose([0.1, 0.2, 0.3])
 BALL = rrtik.Obstacle("ball", rrtik.Sphere(0.2), rrtik.pose([9, 9, 9]), margin=0.1)

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.path import JointPath, Move, load_path
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box
-from rrtik_ompl.transitions import subdivided
-from rrtik_ompl.world import World
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.model.transitions import subdivided
+from rrtik_ompl.world.path import JointPath, Move, load_path
+from rrtik_ompl.world.world import World
 
 
 def test_the_published_route_has_seven_moves_and_its_published_length(sdu_route):

@@ -7,8 +7,8 @@ import warnings
 import numpy as np
 import pytest
 
-from rrtik_ompl.errors import CloudWarning, InputError
-from rrtik_ompl.shapes import PointCloud, same_shape
+from rrtik_ompl.base.errors import CloudWarning, InputError
+from rrtik_ompl.model.shapes import PointCloud, same_shape
 
 
 def scattered(count, seed=0, size=1.0):

@@ -5,13 +5,13 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import NOT_RIGID, rigid
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.description.tree import Joint, Solid
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.overlay.augment import Augmenter
-from rrtik_ompl.overlay.virtual_camera import pinhole_camera
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
-from rrtik_ompl.poses import NOT_RIGID, rigid
+from rrtik_ompl.pilot.overlay.augment import Augmenter
+from rrtik_ompl.pilot.overlay.virtual_camera import pinhole_camera
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 

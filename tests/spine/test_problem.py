@@ -6,14 +6,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
-from rrtik_ompl.goal import GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
-from rrtik_ompl.shapes import Box
-from rrtik_ompl.world import World
+from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.goal import GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
+from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 
 @pytest.fixture(scope="module")

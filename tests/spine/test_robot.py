@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import InputError, UnknownNameError
 
 MIXED = """<robot name="mixed"><link name="base"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
 <link name="a"/><link name="b"/><link name="c"/><link name="d"><collision><geometry><sphere radius="1"/></geometry>

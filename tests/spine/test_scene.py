@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 
 BALL = rrtik.Obstacle("ball", rrtik.Sphere(0.1), [0.5, 0.0, 0.5])
 BOX = rrtik.Obstacle("box", rrtik.Box([0.1, 0.1, 0.1]), [0.5, 0.5, 0.5])

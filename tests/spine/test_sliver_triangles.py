@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.shapes.surfaces import revolved
+from rrtik_ompl.model.shapes.surfaces import revolved
 
 
 def ball_of_triangles():

@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal, as_task_region, has_task_regions, tip_errors
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose, pose_from_rpy, rotation_angles, rpy_matrices
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.numeric.projection import project
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.ik.targets import targets
-from rrtik_ompl.poses import pose, pose_from_rpy, rotation_angles, rpy_matrices
-from rrtik_ompl.task_region import TaskRegion, nearest_angles
-from rrtik_ompl.tip_distance import metres_per_radian
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, as_task_region, has_task_regions, tip_errors
+from rrtik_ompl.model.task_region import TaskRegion, nearest_angles
+from rrtik_ompl.model.tip_distance import metres_per_radian
 
 FREE = [-np.pi, np.pi]
 angles = st.floats(-4.0, 4.0)

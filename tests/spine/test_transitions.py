@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.transitions import (
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.transitions import (
     lower_bound,
     merge_moves,
     moved,

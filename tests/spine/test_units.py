@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.units import joint_unit, joint_units, reading, shown_unit
+from rrtik_ompl.base.units import joint_unit, joint_units, reading, shown_unit
 
 
 def test_units_follow_the_kind_of_joint():

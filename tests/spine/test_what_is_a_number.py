@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.arrays import BLOCK_ROWS, MOST_NUMBERS, finite_array, in_blocks, number_rows, truths
-from rrtik_ompl.errors import listed
-from rrtik_ompl.trajectory.cubics import places
+from rrtik_ompl.base.arrays import BLOCK_ROWS, MOST_NUMBERS, finite_array, in_blocks, number_rows, truths
+from rrtik_ompl.base.errors import listed
+from rrtik_ompl.motion.trajectory.cubics import places
 
 ROBOT = rrtik.load_robot("planar3")
 WORLD = rrtik.World(ROBOT)

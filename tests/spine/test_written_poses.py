@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import pose, pose_from_rpy, quaternion_xyzw, rigid
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose, pose_from_rpy, quaternion_xyzw, rigid
 
 XYZ, RPY = [0.4, -0.1, 0.3], [0.2, -0.5, 1.0]
 POSE = pose_from_rpy(XYZ, RPY)

@@ -10,7 +10,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl import Alternatives, Attach, Detach, Gripper, MoveTo, Straight, Task
-from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 CUP = np.array([0.5, 0.2, 0.252])  # [m] its middle, 2 mm above the table

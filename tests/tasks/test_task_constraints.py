@@ -11,7 +11,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl import Alternatives, Attach, MoveTo, Straight, Task
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.problem_files.path_constraints import constraint_data
 from rrtik_ompl.tasks.task_file import stage_data
 from rrtik_ompl.viewer.page import page

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.tasks.task_file import stage_data
 from rrtik_ompl.viewer.task_story import run_of
 

@@ -5,15 +5,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.shorthands import upright
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import PoseGoal, PositionGoal
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box
+from rrtik_ompl.model.goal import PoseGoal, PositionGoal
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.tasks.through import plan_through
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 START = np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
 

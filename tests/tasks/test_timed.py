@@ -8,8 +8,8 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl import MoveTo, Straight, Task
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.errors import InputError
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links
-from rrtik_ompl.poses import pose
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.crane import TETRAHEDRON, URDF, WAYPOINTS, problem
 

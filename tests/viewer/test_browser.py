@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.crane import WAYPOINTS

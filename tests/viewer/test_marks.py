@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rrtik_ompl import Scene, load_robot, view
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links
 from rrtik_ompl.viewer.drawing.marks import balls, tubes

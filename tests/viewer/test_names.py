@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.choices import TickEvent
+from rrtik_ompl.base.choices import TickEvent
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, link_parts, node_name, nodes_of

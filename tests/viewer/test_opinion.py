@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.viewer import play
 from rrtik_ompl.viewer.opinion import opinion
 from rrtik_ompl.viewer.page import page

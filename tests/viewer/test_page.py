@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.viewer import view
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.crane import WAYPOINTS, problem, story

@@ -14,20 +14,20 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.search.connect import ConnectSearch
-from rrtik_ompl.fast.search.crdt.rules import CrdtRules
-from rrtik_ompl.fast.search.crdt.search import CrdtSearch
-from rrtik_ompl.fast.search.motions.motion_table import step_counts
-from rrtik_ompl.fast.tables.layout import FREE
-from rrtik_ompl.generated_problems import generated_problem
-from rrtik_ompl.moves.axis_cut import double_axis_cut
-from rrtik_ompl.problem import Problem, densely_checked
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.kernels.layout import FREE
+from rrtik_ompl.kernels.search.connect import ConnectSearch
+from rrtik_ompl.kernels.search.crdt.rules import CrdtRules
+from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
+from rrtik_ompl.kernels.search.motions.motion_table import step_counts
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.planning.generated_problems import generated_problem
+from rrtik_ompl.planning.moves.axis_cut import double_axis_cut
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.page_planner import SAMPLES, page_planner
 from rrtik_ompl.viewer.page_tables import VERTICES
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
+from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_tests.browser import CHROMIUM, Browser, planning_page
 
 pytestmark = pytest.mark.kernels

@@ -10,17 +10,16 @@ import pytest
 import umsgpack
 from scipy.spatial import ConvexHull
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.constraints.shorthands import on_plane, upright
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalSet, MultiGoal, PoseGoal, PositionGoal
-from rrtik_ompl.poses import pose
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.model.goal import GoalSet, MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.viewer.drawing.framing import frame_around
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin
 from rrtik_ompl.viewer.drawing.objects import TriangleGeometry
@@ -29,7 +28,8 @@ from rrtik_ompl.viewer.drawing.viewpoint import behind, overview
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.subject import subject_of
-from rrtik_ompl.world import World
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_tests.crane import TETRAHEDRON, URDF, WAYPOINTS, problem, story
 
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.scene import ConstantVelocity, TimedPoses
+from rrtik_ompl.model.scene import ConstantVelocity, TimedPoses
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.browser import CHROMIUM, Browser, planning_page
 

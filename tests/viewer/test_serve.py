@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.viewer import serve
 from rrtik_ompl.viewer.serve import PageServer
 from rrtik_tests.waiting import cut_off, until
@@ -107,7 +107,7 @@ def test_a_live_view_ends_with_a_line_when_its_server_has_ended(server: PageServ
 
 SERVE_AND_PRESS_CTRL_C = """
 import os, signal, threading
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.viewer import view
 signal.signal(signal.SIGINT, signal.default_int_handler)
 def ready(url):

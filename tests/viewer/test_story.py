@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import grid_cell, play_times
 from rrtik_ompl.viewer.subject import subject_of

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rrtik_ompl.collision.shape_table import pieces
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
-from rrtik_ompl.shapes.surfaces import extruded
+from rrtik_ompl.geometry.collision.shape_table import pieces
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
+from rrtik_ompl.model.shapes.surfaces import extruded
 from rrtik_ompl.viewer.drawing.meshes import half_space_plate, look_of_coal, look_of_shape, thickened
 from rrtik_ompl.viewer.drawing.objects import SphereGeometry
 from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out, tube

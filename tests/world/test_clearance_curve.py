@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.collision.contacts import measured
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Sphere
+from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Sphere
 from rrtik_ompl.world.clearance_curve import FARTHEST, clearance_along
 
 

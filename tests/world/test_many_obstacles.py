@@ -6,11 +6,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.world import World
 from rrtik_tests.by_coal import free_by_coal
 
 pytestmark = pytest.mark.kernels

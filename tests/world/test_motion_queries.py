@@ -5,10 +5,10 @@ import time
 import numpy as np
 import pytest
 
-from rrtik_ompl.fast.search.shortcut_layout import KERNELS
+from rrtik_ompl.kernels.search.shortcut_layout import KERNELS
+from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect, extend, path_between, reach, straight_path
+from rrtik_ompl.planning.search.tree import ConfigurationTree
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.search.rrt_connect import ConnectRules, RrtConnect, extend, path_between, reach, straight_path
-from rrtik_ompl.search.tree import ConfigurationTree
 from rrtik_ompl.world.motion_queries import (
     CALL_TARGET_SECONDS,
     FIRST_BATCH,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.fast.checks.fast_world import FastWorld
-from rrtik_ompl.fast.tables import moved_rows
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.kernels.checks.fast_world import FastWorld
+from rrtik_ompl.kernels.tables import moved_rows
 from rrtik_tests.sizes import how_many
 
 MOVES = how_many(300, 24)

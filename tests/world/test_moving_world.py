@@ -6,15 +6,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.collision.contacts import measured
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast import FREE
-from rrtik_ompl.fast.search.motions.motion_table import step_counts
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, HalfSpace, Prism, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.kernels import FREE
+from rrtik_ompl.kernels.search.motions.motion_table import step_counts
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, HalfSpace, Prism, Sphere
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import box, plane
 
 

@@ -8,18 +8,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.certificates.verify import verify_certificate
-from rrtik_ompl.certificates.write import certificate_of
+from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.padding import padded
-from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
-from rrtik_ompl.planning import plan
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Sphere
+from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.world.certificates.verify import verify_certificate
+from rrtik_ompl.world.certificates.write import certificate_of
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 from rrtik_tests.by_coal import free_by_coal
 
 NEARLY = 1e-5  # [m]; what coal's distances and the kernels' rounding may differ by

@@ -10,12 +10,12 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.collision.bodies import link_bodies
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.proof import layout
-from rrtik_ompl.scene import Obstacle, Scene
-from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.bodies import link_bodies
+from rrtik_ompl.kernels.proof import layout
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, Sphere
+from rrtik_ompl.world.world import World
 from rrtik_tests.by_coal import free_by_coal
 from rrtik_tests.turning_slider import slider
 

@@ -5,11 +5,11 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.collision.bodies import link_bodies
-from rrtik_ompl.collision.solids import is_mesh, mesh_arrays
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.shapes import PointCloud
-from rrtik_ompl.world import World
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.bodies import link_bodies
+from rrtik_ompl.geometry.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.model.shapes import PointCloud
+from rrtik_ompl.world.world import World
 
 
 def skin(robot, q, rng, count=15):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError, ProblemError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.world.moving_world import MovingWorld
 
 BALL = rrtik.Obstacle("ball", rrtik.Sphere(0.1), rrtik.pose([3.4, 0.0, 0.0]))

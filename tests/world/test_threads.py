@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.fast.threads import in_threads
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.threads import in_threads
 from rrtik_tests.sizes import how_many
 
 CALLS = how_many(100_000, 4_000)  # mixed

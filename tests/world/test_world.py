@@ -4,12 +4,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.collision.certificate import Certificate
-from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.scene import AttachedObject, Obstacle, Scene
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
-from rrtik_ompl.world import World
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.geometry.collision.certificate import Certificate
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
+from rrtik_ompl.world.world import World
 
 
 def at(x, y, z):
@@ -221,7 +221,7 @@ def test_batches_may_be_empty_of_any_layout_and_any_real_type():
 
 
 def test_moving_obstacles_stand_where_they_are_at_time_zero():
-    from rrtik_ompl.scene import ConstantVelocity, TimedPoses
+    from rrtik_ompl.model.scene import ConstantVelocity, TimedPoses
 
     robot = load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]])
     buoy = Obstacle("buoy", Sphere(0.5), at(2, 2, 0), ConstantVelocity([1, 0, 0]))

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from bench.peers.ik import Solver
-from rrtik_ompl.arrays import TAU
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import TAU
+from rrtik_ompl.model.robot import Robot
 
 
 def solver(robot: Robot, start: np.ndarray) -> Solver:

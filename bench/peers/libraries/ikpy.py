@@ -10,7 +10,7 @@ import numpy as np
 from bench.peers.description import serial_urdf
 from bench.peers.ik import Solver
 from bench.peers.task import BASE
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 
 def solver(robot: Robot, start: np.ndarray) -> Solver:

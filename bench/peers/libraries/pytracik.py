@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.peers.description import serial_urdf
 from bench.peers.ik import Solver
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 SECONDS = 0.1  # by the clock, so that a busy machine does not count against it; its default is 0.005
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.peers.description import uncoupled_columns
 from bench.peers.ik import Solver
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 TOLERANCE = 1e-10  # of half the squared error, which is TRAC-IK's 1e-5; its default 1e-6 leaves 1.4 mm
 

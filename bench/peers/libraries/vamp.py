@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pinocchio as pin
 
 from rrtik_ompl import Problem
-from rrtik_ompl.shapes import Box, Capsule, Sphere
+from rrtik_ompl.model.shapes import Box, Capsule, Sphere
 
 SAMPLES = 100_000  # its default, a million, costs 0.5 ms of allocation in every call
 

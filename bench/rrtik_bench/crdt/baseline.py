@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.catalog import find_planner
-from rrtik_ompl.errors import require
-from rrtik_ompl.goal import JointGoal
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import require
+from rrtik_ompl.description.catalog import find_planner
+from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, problem_definition, space_information
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 
 STEP = 1.0  # of the RRT, and the tolerance at the goal for both
 SPACING = 0.2  # between two point tests

@@ -14,7 +14,7 @@ from rrtik_bench.crdt.published import CONNECT_LIST, CRDT_TABLE, PRISM_LIST, RRT
 from rrtik_bench.crdt.runs import RouteRun, joints_of, route_run
 from rrtik_bench.report.rows import INFINITE, Bar, Row, about, all_of, exactly, judged, within
 from rrtik_bench.tables import Table
-from rrtik_ompl.transitions import lower_bound, route_length, routes, transitions
+from rrtik_ompl.model.transitions import lower_bound, route_length, routes, transitions
 
 SOURCE = "[1, ch. 6.3]"
 COLUMNS = ("iterations", "vertices", "collision checks", "time [s]")

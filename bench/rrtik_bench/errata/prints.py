@@ -8,7 +8,7 @@ from math import factorial
 import numpy as np
 
 from rrtik_bench.titan4 import A1, A2, A3, A4, D6, RIGHT
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 
 

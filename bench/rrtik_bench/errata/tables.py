@@ -24,11 +24,11 @@ from rrtik_bench.mb_rrt.runs import GOALS, NAMES, PRECISION, PUBLISHED
 from rrtik_bench.report.rows import INFINITE, Bar, Row, Verdict, judged
 from rrtik_bench.sensing.tables import arithmetic
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import STANDARD
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 RIGHT_TO = 1e-9  # a formula that is right is so to this
 DEVIATION = Bar((0.0, INFINITE), held=(0.0, RIGHT_TO), refuted=(1e-3, 1e6))

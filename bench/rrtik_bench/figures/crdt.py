@@ -14,8 +14,8 @@ from rrtik_bench.crdt.runs import STAGES, route_run
 from rrtik_bench.crdt.tables import TWICE
 from rrtik_bench.figures.plane import draw_arm, draw_scene
 from rrtik_bench.report.figures import Figure
-from rrtik_ompl.plots.joints import COLORS, tidy
-from rrtik_ompl.transitions import transitions
+from rrtik_ompl.model.transitions import transitions
+from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing

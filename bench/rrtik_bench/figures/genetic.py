@@ -14,7 +14,7 @@ from rrtik_bench.report.figures import Figure
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD
-from rrtik_ompl.plots.joints import COLORS, tidy
+from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing

@@ -20,8 +20,8 @@ from rrtik_bench.ikurt_limits import (
     outward_share,
 )
 from rrtik_bench.report.figures import Figure
-from rrtik_ompl.goal import PoseGoal, PositionGoal
-from rrtik_ompl.plots.joints import COLORS, tidy
+from rrtik_ompl.model.goal import PoseGoal, PositionGoal
+from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing

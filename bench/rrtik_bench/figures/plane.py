@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,11 +12,11 @@ from rrtik_bench.figures.plane import INK, SOLID, draw_arm, draw_scene
 from rrtik_bench.report.figures import Figure
 from rrtik_bench.shortening.plane_worlds import PUBLISHED, sampled_route
 from rrtik_bench.shortening.tables import METHODS, STEP
-from rrtik_ompl.plots.joints import COLORS, tidy
+from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.planning.shortening.task import Task
 from rrtik_ompl.replanning import ReplanRun
 from rrtik_ompl.replanning.scenario import load_scenario
-from rrtik_ompl.shortening.task import Task
-from rrtik_ompl.transitions import route_length
+from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing

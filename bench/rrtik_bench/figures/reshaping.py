@@ -9,9 +9,9 @@ import numpy as np
 from rrtik_bench.figures.plane import INK, draw_scene
 from rrtik_bench.report.figures import Figure
 from rrtik_bench.reshaping import SCENES, SOURCE, WAYS, reshaped
-from rrtik_ompl.plots.joints import COLORS, tidy
+from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.replanning.scenario import load_scenario
-from rrtik_ompl.transitions import route_length
+from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing

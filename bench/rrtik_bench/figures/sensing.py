@@ -10,7 +10,7 @@ from rrtik_bench.report.figures import Figure
 from rrtik_bench.sensing.detections import NUMBERS, confusion
 from rrtik_bench.sensing.sequences import APART, NEAR, errors
 from rrtik_bench.sensing.tables import ACCURACY, SERIES, simulated
-from rrtik_ompl.plots.joints import COLORS, tidy
+from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing

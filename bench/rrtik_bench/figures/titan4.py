@@ -9,10 +9,10 @@ import numpy as np
 import rrtik_ompl as rrtik
 from rrtik_bench.figures.plane import INK, arm_points
 from rrtik_bench.report.figures import Figure
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.numeric.descent import descend
-from rrtik_ompl.plots.joints import COLORS
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.viewer.plots.joints import COLORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,12 +9,12 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from rrtik_bench.genetic.published import INCH, POINTS, TOLERANCE, curve
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.genetic.search import GeneticRun, follow_targets
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 TRAJECTORIES = (1, 2, 3, 4)
 JUMP = 10.0  # [deg]

@@ -12,7 +12,7 @@ import numpy as np
 
 from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, sunflower
 from rrtik_ompl.ik.mb_rrt.variants import Draw, projected, square, square_then_goal, surface
 

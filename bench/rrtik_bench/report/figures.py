@@ -8,7 +8,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from rrtik_ompl.plots.joints import save_figure
+from rrtik_ompl.viewer.plots.joints import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_bench.sensing.tables import NOISE
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.markers.corner_pose import (

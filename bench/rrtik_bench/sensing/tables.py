@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from rrtik_bench.report.rows import Bar, Row, about, judged, within
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.sensing.precision import NORMAL_QUARTILES
 
 SOURCE = "[1, ch. 4]"

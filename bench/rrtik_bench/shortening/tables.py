@@ -13,12 +13,12 @@ import rrtik_ompl as rrtik
 from rrtik_bench.report.rows import Bar, Row, exactly, judged
 from rrtik_bench.shortening.plane_worlds import PUBLISHED, Plane, sampled_route
 from rrtik_bench.tables import Table
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.shortening.random_cut import random_cut
-from rrtik_ompl.shortening.retraction import retract
-from rrtik_ompl.shortening.sequential import sequential_cut
-from rrtik_ompl.shortening.task import Task
-from rrtik_ompl.transitions import part_counts, route_length, subdivided
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.model.transitions import part_counts, route_length, subdivided
+from rrtik_ompl.planning.shortening.random_cut import random_cut
+from rrtik_ompl.planning.shortening.retraction import retract
+from rrtik_ompl.planning.shortening.sequential import sequential_cut
+from rrtik_ompl.planning.shortening.task import Task
 
 STEP = 1.0  # of the planner
 Method: TypeAlias = Callable[[Matrix, Task], Matrix]

@@ -9,11 +9,11 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rrtik_ompl.base.errors import DescriptionWarning, InputError
 from rrtik_ompl.description.gripper import GripperJoints
 from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.description.urdf import robot_from_urdf
-from rrtik_ompl.errors import DescriptionWarning, InputError
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.base.arrays import finite_array
+from rrtik_ompl.base.errors import InputError, at_most
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.description.tree import MOST_JOINTS
-from rrtik_ompl.errors import InputError, at_most
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose

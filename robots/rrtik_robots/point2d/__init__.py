@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import finite_array, not_negative
+from rrtik_ompl.base.arrays import finite_array, not_negative
 from rrtik_ompl.description.robot_build import build_robot
 from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.shapes import Cylinder, Sphere
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.shapes import Cylinder, Sphere
 
 if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import finite_array
+from rrtik_ompl.base.arrays import finite_array
+from rrtik_ompl.base.errors import UnknownNameError
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
-from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 from rrtik_robots.puma560.inverse import PumaGeometry, five_joint_form, pose_form, position_form
 
 if TYPE_CHECKING:

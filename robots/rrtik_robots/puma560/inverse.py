@@ -14,9 +14,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.ik.branch_layout import REACH_TOLERANCE, SHOULDER_ROOT, SINGULAR
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two_links, wrapped
+from rrtik_ompl.kernels.ik.branch_layout import REACH_TOLERANCE, SHOULDER_ROOT, SINGULAR
 
 Numbers = NDArray[np.float64]
 MISFIT = 1e-9  # sine of the angle between axis 5 and where a pose wants it; more is out of reach for five joints

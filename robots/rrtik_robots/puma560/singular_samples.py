@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import UnknownNameError
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 from rrtik_robots.puma560 import ROWS_560
 
 CASES = ("generic", "elbow", "wrist", "shoulder", "elbow wrist", "shoulder wrist")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 from rrtik_robots.titan4.geometry import (
     JOINTS,
     LIMITS_ENVELOPE_DEG,

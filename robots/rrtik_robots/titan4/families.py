@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.ik.branch_layout import REACH_TOLERANCE, SINGULAR
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.analytic.analytic_solver import Limits, wrapped
+from rrtik_ompl.kernels.ik.branch_layout import REACH_TOLERANCE, SINGULAR
 from rrtik_robots.titan4.geometry import TitanGeometry
 
 Numbers = NDArray[np.float64]

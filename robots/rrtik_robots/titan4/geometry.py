@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from rrtik_ompl.arrays import finite_array
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.arrays import finite_array
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 
 JOINTS = ("azimuth", "shoulder_pitch", "elbow_pitch", "wrist_pitch", "wrist_yaw", "wrist_rotate")
 

@@ -13,9 +13,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.ik.branch_layout import NORMAL, ROUNDING, SINGULAR, UNSURE
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, Limits, wrapped
+from rrtik_ompl.kernels.ik.branch_layout import NORMAL, ROUNDING, SINGULAR, UNSURE
 from rrtik_robots.titan4.families import nearest_azimuth, nearest_psi, psi_within_rounding
 from rrtik_robots.titan4.geometry import TitanGeometry
 from rrtik_robots.titan4.members import Singular, moved_inside

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
-from rrtik_ompl.fast.ik.branch_layout import SINGULAR
+from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.ik.analytic.analytic_solver import Limits, wrapped
+from rrtik_ompl.kernels.ik.branch_layout import SINGULAR
 from rrtik_robots.titan4.families import psi_at
 from rrtik_robots.titan4.geometry import TitanGeometry
 from rrtik_robots.titan4.postures import SIGMA, Target, completed

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
-from rrtik_ompl.arrays import length
-from rrtik_ompl.description.moveit.joint_limits import read_joint_limits
-from rrtik_ompl.description.moveit.srdf import read_srdf
+from rrtik_ompl.base.arrays import length
+from rrtik_ompl.description.joint_limits import read_joint_limits
 from rrtik_ompl.description.robot_build import JointLimits
+from rrtik_ompl.description.srdf import read_srdf
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.files.text import read_text
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 from rrtik_robots.titan4.geometry import JOINTS
 from rrtik_robots.titan4.urdf import titan4_urdf
 

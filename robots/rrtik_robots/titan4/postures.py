@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.analytic.analytic_solver import two_links, wrapped
 from rrtik_robots.titan4.geometry import TitanGeometry
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.analytic.analytic_solver import Limits, wrapped
 from rrtik_robots.titan4.geometry import TitanGeometry
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_robots.titan4.geometry import TitanGeometry
 
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, finite_array, frozen
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.units import wrapped
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.analytic.closed_form import solutions
-from rrtik_ompl.reach.grid_map import Slice
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.units import wrapped
+from rrtik_ompl.ik.reach.grid_map import Slice
+from rrtik_ompl.model.robot import Robot
 
 PITCHES_DEG = tuple(range(-90, 91, 15))  # of the gripper in the arm plane, with a straight wrist
 CELL = 0.025  # [m]

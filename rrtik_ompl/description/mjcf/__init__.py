@@ -7,16 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rrtik_ompl.base.errors import InputError, few
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
+from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits
 from rrtik_ompl.description.mjcf.bodies import WORLD
 from rrtik_ompl.description.mjcf.read import Mjcf, read_mjcf
-from rrtik_ompl.description.moveit.joint_limits import read_joint_limits, unread_limits
 from rrtik_ompl.description.robot_build import build_robot
 from rrtik_ompl.description.robot_source import source_entry
 from rrtik_ompl.description.urdf_read import located
-from rrtik_ompl.errors import InputError, few
 from rrtik_ompl.files.text import read_text
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 MJCF_OPTIONS = ("base_pose", "joint_limits", "joints", "locked", "strict", "tip")
 TIP_SITES = ("attachment_site", "tip", "tcp", "ee", "ee_site", "end_effector", "eef", "grip_site", "pinch")  # by custom

@@ -11,13 +11,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.base.errors import InputError, MissingFileError, UnknownNameError
+from rrtik_ompl.base.poses import turned_z
 from rrtik_ompl.description.mjcf.values import MAIN, Settings
 from rrtik_ompl.description.package_path import MESH_SUFFIXES
 from rrtik_ompl.description.tree import MeshFile, Solid
 from rrtik_ompl.description.urdf_read import attribute, numbers
-from rrtik_ompl.errors import InputError, MissingFileError, UnknownNameError
-from rrtik_ompl.poses import turned_z
-from rrtik_ompl.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 OF_THE_SCENE = ("plane", "hfield")
 KINDS = ("box", "capsule", "cylinder", "mesh", "sphere")

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.mjcf.bodies import WORLD, Body, joined_bodies, meet, solids_apart, touchable
 from rrtik_ompl.description.mjcf.geoms import OF_THE_SCENE, masks, meshes_of, solid_of
 from rrtik_ompl.description.mjcf.unread import unread_of_mjcf
@@ -18,7 +19,6 @@ from rrtik_ompl.description.mjcf.values import MAIN, Settings
 from rrtik_ompl.description.robot_build import Mimic
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.description.urdf_read import attribute, flattened, located, numbers, parse_xml
-from rrtik_ompl.errors import InputError, UnknownNameError
 from rrtik_ompl.files.text import read_text
 
 MOST_FILES = 100  # that include each other

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from xml.etree.ElementTree import Element
 
+from rrtik_ompl.base.errors import few
 from rrtik_ompl.description.mjcf.bodies import Body
-from rrtik_ompl.errors import few
 
 SHAPES = ("flex", "flexcomp", "skin", "composite")
 OF_JOINTS = ("joint", "jointinparent")  # attributes of an actuator that name a joint

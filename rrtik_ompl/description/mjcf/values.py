@@ -12,10 +12,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.poses import pose, turned_z
 from rrtik_ompl.description.urdf_read import numbers
-from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.poses import pose, turned_z
 
 MAIN = "main"  # the class that all others build on
 Attributes = Mapping[str, str]

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
-from rrtik_ompl.fast.ik.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE
+from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.kernels.ik.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE
 
 Limits = tuple[Vector, Vector]  # lowest and highest joint values, shape (dof,) each
 
@@ -52,7 +52,7 @@ class AnalyticSolver:
             inside the limits whenever it has a solution there. The number is the slack [m, sine]: a pose that near to
             a singular one is answered as if it were singular, off by at most about that.
         nearness: From Q, shape (m, dof), to the named singular cases: 0 at the singularity, in [0, 1] or metres.
-        kernel: The function of `rrtik_ompl.fast.ik.branch_kernels` that gives the same for poses that are not singular,
+        kernel: The function of `rrtik_ompl.kernels.ik.branch_kernels` that gives the same for poses that are not singular,
             "" if there is none; and the ``numbers`` that it takes.
     """
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import joint_difference
+from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector, finite_array, frozen
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.analytic.closed_form import SWEEP, ClosedForm, form_of, solutions
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import joint_difference
+from rrtik_ompl.model.robot import Robot
 
 JUMP = 0.2  # [rad] or [m] of any joint between two points of a trajectory: more is another branch, not motion
 JUMP_COST = 1e3  # more than any motion can cost

@@ -8,14 +8,14 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, finite_array
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, finite_array
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
 from rrtik_ompl.ik.analytic.kernel_branches import kernel_branches
 from rrtik_ompl.ik.analytic.planar import planar_form
 from rrtik_ompl.ik.analytic.reference_branches import reference_branches, tip_fault
-from rrtik_ompl.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 SAME_ANGLE = 1e-6  # [rad] or [m]
 SWEEP = 72  # samples of a singular pose's curve of solutions

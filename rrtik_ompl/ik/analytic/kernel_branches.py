@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.fast.ik import branch_layout, ik_layout
-from rrtik_ompl.fast.ik.branch_layout import BRANCHES, DOF
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.fast.simd.processor import WIDTH
-from rrtik_ompl.fast.tables.memory import WORD, PlannedTable, Table, TablePlan, table
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
 from rrtik_ompl.ik.analytic.reference_branches import mountings, reference_branches
 from rrtik_ompl.ik.serial_chain import limb_of, pose_numbers
-from rrtik_ompl.robot import FEW, LIMIT_TOLERANCE, Robot
+from rrtik_ompl.kernels.ik import branch_layout, ik_layout
+from rrtik_ompl.kernels.ik.branch_layout import BRANCHES, DOF
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables.memory import WORD, PlannedTable, Table, TablePlan, table
+from rrtik_ompl.model.robot import FEW, LIMIT_TOLERANCE, Robot
 
 UNBOUNDED_ANGLE = 1e300  # limits of continuous joints: kernels know no infinity
 

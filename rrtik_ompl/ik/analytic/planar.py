@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two_links, wrapped
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 BRANCHES = ("left", "right")
 IN_PLANE = 1e-9  # [m] or sine of an angle: how well an arm or a target must lie in the plane

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Matrix
+from rrtik_ompl.base.arrays import TAU, Matrix
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, wrapped
 from rrtik_ompl.ik.tip_columns import tip_columns
-from rrtik_ompl.robot import FEW, LIMIT_TOLERANCE, Robot
+from rrtik_ompl.model.robot import FEW, LIMIT_TOLERANCE, Robot
 
 BLOCK = 2048  # targets at a time: their arrays stay in the cache
 

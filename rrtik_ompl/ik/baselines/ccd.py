@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.baselines.joint_axes import Joint, Swing, joints_to_tip, room
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import walked
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.tip_distance import reach_of
+from rrtik_ompl.model.goal import PositionGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.tip_distance import reach_of
 
 SWEEPS = 300
 AXIS_LENGTH = 0.3  # of the tip's axes, in units of the reach

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector
-from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector
+from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import shortened, twist, walked
-from rrtik_ompl.poses import working_memory
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import PositionGoal
+from rrtik_ompl.model.robot import Robot
 
 ITERATIONS = 200
 DAMPING = 0.05  # [m] or [rad]; constant, squared where it is used

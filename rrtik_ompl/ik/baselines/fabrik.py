@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.goal import PositionGoal
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.baselines.joint_axes import Joint, Swing, coupled_fault, joints_to_tip, room
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import walked
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import PositionGoal
+from rrtik_ompl.model.robot import Robot
 
 ITERATIONS = 200
 TIP_WEIGHT = 3.0  # in space, beside the other points; the next point alone never led spatial arms to the goal

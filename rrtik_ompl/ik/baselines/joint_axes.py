@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector
+from rrtik_ompl.model.robot import Robot
 
 # three rows of nine: the matrices of v -> (x, y, z axis) x v, for rows v
 CROSS = np.array(

@@ -12,10 +12,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.goal import PositionGoal, pose_errors
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import PositionGoal, pose_errors
+from rrtik_ompl.model.robot import Robot
 
 PARTICLES = 32  # of a swarm
 ITERATIONS = 400

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.ik.genetic.genes import BITS, LARGEST, Genes
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 

@@ -11,8 +11,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.robot import Robot
 
 BITS = 16
 LARGEST = 2**BITS - 1

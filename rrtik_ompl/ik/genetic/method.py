@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.genetic.options import REFINED
 from rrtik_ompl.ik.genetic.search import follow_targets
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import PositionGoal, joint_difference, pose_errors
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.tip_distance import reach_of
+from rrtik_ompl.model.goal import PositionGoal, joint_difference, pose_errors
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.tip_distance import reach_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,10 +8,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rrtik_ompl.arrays import whole_number
-from rrtik_ompl.choices import GeneticPreset
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.units import DEGREE
+from rrtik_ompl.base.arrays import whole_number
+from rrtik_ompl.base.choices import GeneticPreset
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.units import DEGREE
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector, frozen
-from rrtik_ompl.goal import PositionGoal, joint_difference
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.ik.genetic.breeding import children
 from rrtik_ompl.ik.genetic.genes import around, random_genes, whole_range
 from rrtik_ompl.ik.genetic.objective import Score, score
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.numeric.descent import descend
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import PositionGoal, joint_difference
+from rrtik_ompl.model.robot import Robot
 
 IMPROVEMENT = 0.99  # of the best cost: less counts as standing still
 

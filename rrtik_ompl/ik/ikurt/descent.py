@@ -1,6 +1,6 @@
 """Steps by the Jacobian down the metric of IKURT: Levenberg-Marquardt for many configurations at once, inside bounds.
 
-Source: [22], as in :mod:`rrtik_ompl.ik.numeric.reference_descent`: the damping is half the squared residual
+Source: [22], as in :mod:`rrtik_ompl.ik.reference_descent`: the damping is half the squared residual
 plus a small constant. Joints that a step would push through a bound are held and the step is solved for again, so that
 goals on a limit are reached.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.residual import shortened
 

@@ -11,12 +11,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector
-from rrtik_ompl.goal import PoseGoal, PositionGoal, pose_errors
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import twist
 from rrtik_ompl.ik.tip_columns import tip_columns
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import PoseGoal, PositionGoal, pose_errors
+from rrtik_ompl.model.robot import Robot
 
 REACH_PER_TURN = 1.0  # a full turn of the tip counts as far as so many times the reach, unless given
 JOINT_RADIUS = 1e-3  # [rad] from a goal configuration, which is then reached exactly

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.ik.ikurt.metric import Metric
 from rrtik_ompl.ik.ikurt.tree import IkurtTree
 

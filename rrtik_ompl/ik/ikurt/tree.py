@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 
 FIRST_ROOM = 256  # vertices; doubled whenever it is full
 PENALTY = 1.3  # a vertex from which CONNECT has failed counts as so many times as far, each time

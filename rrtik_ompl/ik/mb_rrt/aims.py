@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import TipGoal, joint_difference
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.search import search
 from rrtik_ompl.ik.targets import targets
-from rrtik_ompl.world import World
+from rrtik_ompl.model.goal import TipGoal, joint_difference
+from rrtik_ompl.world.world import World
 
 DRAWS = 16  # targets of a goal that leaves freedom
 MAX_CONFIGURATIONS = 16  # configurations

@@ -12,10 +12,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.links import ROUNDING, smallest_spans
 from rrtik_ompl.ik.tip_columns import tip_columns
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 REWEIGHTINGS = 60  # of reweighting, to find the shortest polygon through the axes
 

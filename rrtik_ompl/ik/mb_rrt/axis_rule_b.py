@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.units import wrapped
 from rrtik_ompl.ik.mb_rrt.axes import Axes
 from rrtik_ompl.ik.mb_rrt.links import directions
 from rrtik_ompl.ik.mb_rrt.run import first_hit
-from rrtik_ompl.units import wrapped
 
 
 @dataclass(frozen=True, slots=True, eq=False)

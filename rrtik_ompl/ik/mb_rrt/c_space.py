@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, finite_array
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, finite_array
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.mb_rrt.growth import PASSES
 from rrtik_ompl.ik.mb_rrt.links import Links, joints_to_chain
 from rrtik_ompl.ik.mb_rrt.run import TreeSearch, first_hit

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.mb_rrt.growth import PASSES, best_parents, one_link
 from rrtik_ompl.ik.mb_rrt.links import Links
 from rrtik_ompl.ik.mb_rrt.variants import one_link_away, surface

@@ -8,12 +8,12 @@ from typing import Any
 
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.errors import DescriptionWarning
+from rrtik_ompl.base.arrays import Mask, Matrix
+from rrtik_ompl.base.errors import DescriptionWarning
 from rrtik_ompl.ik.mb_rrt.axes import Axes
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.world import World
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.world.world import World
 
 
 class LinkWorlds:

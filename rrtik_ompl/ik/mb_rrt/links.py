@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.units import wrapped
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.units import wrapped
 
 ROUNDING = 1e-12  # of the reach: a goal this far outside counts as reachable
 

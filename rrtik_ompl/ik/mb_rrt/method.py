@@ -8,7 +8,7 @@ from rrtik_ompl.ik.mb_rrt.axes import misfit
 from rrtik_ompl.ik.mb_rrt.search import MAX_ROUNDS, search
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target
 from rrtik_ompl.ik.numeric.restarts import nearest_posture
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 ROUNDS_FOR_ALL = 8  # of the workspace tree if every solution is requested
 

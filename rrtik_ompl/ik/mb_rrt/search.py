@@ -13,14 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
-from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of, misfit
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.numeric.descent import descend
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.model.goal import PoseGoal, PositionGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.world.world import World
 
 WIDTH = 16  # passes at a time
 MAX_ROUNDS = 64  # after which it gives up

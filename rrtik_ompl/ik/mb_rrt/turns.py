@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Mask, Vector
+from rrtik_ompl.base.arrays import TAU, Mask, Vector
+from rrtik_ompl.base.units import wrapped
 from rrtik_ompl.ik.mb_rrt.axes import Axes
-from rrtik_ompl.units import wrapped
 
 SLACK = 1e-12  # in cosines and angles: what rounding may add where an interval is a single value
 FLAT = 1e-24  # [m^2] a circle this small is a point

@@ -8,8 +8,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import UnknownNameError
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import UnknownNameError
 from rrtik_ompl.ik.mb_rrt.links import Links, directions
 
 Draw = Callable[[Links, Vector, int, int, np.random.Generator], Matrix]

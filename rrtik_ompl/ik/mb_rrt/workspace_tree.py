@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.axes import Axes
 from rrtik_ompl.ik.mb_rrt.turns import draw_turns
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
 
-from rrtik_ompl.choices import IkMethod
+from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.ik.baselines.ccd import ccd
 from rrtik_ompl.ik.baselines.damped import damped_least_squares, pinocchio_iteration
 from rrtik_ompl.ik.baselines.fabrik import fabrik, fabrik_misfit
@@ -14,7 +14,7 @@ from rrtik_ompl.ik.baselines.joint_axes import coupled_fault
 from rrtik_ompl.ik.baselines.pso import PARTICLES, pso, resampled_pso
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, Target, fits_all
 from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, Walk, restarted
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.robot import Robot
 
 SUFFICIENT_STARTS = 4  # starts that arrive before the others of a round are given up
 

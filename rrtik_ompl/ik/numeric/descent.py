@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.fast.ik.ik_layout import KERNELS
-from rrtik_ompl.fast.simd.library import Library, library
-from rrtik_ompl.fast.tables.memory import Table
-from rrtik_ompl.goal import TipGoal
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.numeric.kernel_call import KernelCall, spare_calls
-from rrtik_ompl.ik.numeric.reference_descent import farness, walk_plainly
+from rrtik_ompl.ik.reference_descent import farness, walk_plainly
 from rrtik_ompl.ik.serial_chain import SEEDS, limb_of, seeded_limb_of, seeds_of
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.kernels.ik.ik_layout import KERNELS
+from rrtik_ompl.kernels.simd.library import Library, library
+from rrtik_ompl.kernels.tables.memory import Table
+from rrtik_ompl.model.goal import TipGoal
+from rrtik_ompl.model.robot import Robot
 
 STEPS = 60  # of one start
 AT_A_TIME = 4096  # goals in one call of a kernel, which nothing can interrupt

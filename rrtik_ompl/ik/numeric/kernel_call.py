@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.fast.ik import ik_layout
-from rrtik_ompl.fast.tables.memory import WORD, PlannedTable, Table, TablePlan, table
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.kernels.ik import ik_layout
+from rrtik_ompl.kernels.tables.memory import WORD, PlannedTable, Table, TablePlan, table
 
 
 class KernelCall:
@@ -20,7 +20,7 @@ class KernelCall:
         aims: Goals, one for each row or one for all, see `rrtik_ompl.ik.goal_rows`; like all arrays it is copied.
         q: Where rows begin, shape (m, dof).
         steps: Of a start, at most.
-        patience: See `rrtik_ompl.fast.ik.ik_layout`.
+        patience: See `rrtik_ompl.kernels.ik.ik_layout`.
         near: Postures to start from, shape (m, dof).
         following: Number of the next start of each row, shape (m,).
 

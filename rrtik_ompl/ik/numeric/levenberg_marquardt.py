@@ -6,16 +6,16 @@ import time
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.fast.ik.ik_layout import KERNELS
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.goal import TipGoal
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS, Search, SearchOfOne, walk
 from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, aims_of, nearest_posture
 from rrtik_ompl.ik.serial_chain import seeded_limb_of
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.kernels.ik.ik_layout import KERNELS
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.goal import TipGoal
+from rrtik_ompl.model.robot import Robot
 
 AT_ONCE = 32  # members of a goal, between two readings of the clock, when others have their turn
 

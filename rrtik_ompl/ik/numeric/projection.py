@@ -3,7 +3,7 @@
 What the region leaves free does not constrain the joints, so that arms of fewer joints than a pose needs fit as well.
 
 Sources: [23] for steps that leave free directions out; damping after [22], as in
-`rrtik_ompl.ik.numeric.reference_descent`.
+`rrtik_ompl.ik.reference_descent`.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
-from rrtik_ompl.goal import as_task_region, parts_of
+from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.base.poses import rpy_matrices
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.residual import SHARE, shortened, twist_between
-from rrtik_ompl.poses import rpy_matrices
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.task_region import TaskRegion
-from rrtik_ompl.tip_distance import PER_RADIAN, reach_of
+from rrtik_ompl.model.goal import as_task_region, parts_of
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
 
 ITERATIONS = 60
 PATIENCE, STALLED = 10, 0.5  # a walk is given up whose squared residual is not down to this share in so many steps

@@ -10,12 +10,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Matrix, Vector
-from rrtik_ompl.goal import has_task_regions, tip_errors
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target
 from rrtik_ompl.ik.numeric.descent import Search, walk
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import has_task_regions, tip_errors
+from rrtik_ompl.model.robot import Robot
 
 STARTS = 32  # in one round
 MAX_ROUNDS = 16  # after which it gives up

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.goal import TipGoal, joint_difference
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.ik.numeric.restarts import STARTS
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.model.goal import TipGoal, joint_difference
+from rrtik_ompl.model.robot import Robot
 
 ROUNDS_PER_POINT = 4  # of random starts at a point that no motion leads to
 CARRIED = 8  # solutions that are followed side by side, those nearest to the posture before

@@ -11,7 +11,8 @@ import numpy as np
 from ompl import base as ob
 from ompl import tools as ot
 
-from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.base.errors import PlannerError
+from rrtik_ompl.model.transitions import single_joint
 from rrtik_ompl.ompl_bridge.contract.problems import (
     GOAL,
     SECONDS,
@@ -29,7 +30,6 @@ from rrtik_ompl.ompl_bridge.contract.problems import (
 )
 from rrtik_ompl.ompl_bridge.contract.spaces import SPACES
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.transitions import single_joint
 
 SHORT = 0.2  # [s] for problems without a solution
 INSIDE_OBSTACLE, OUTSIDE_BOUNDS = (0.0, 0.0, 0.0), (9.0, 0.0, 0.0)

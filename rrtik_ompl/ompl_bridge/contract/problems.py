@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from ompl import base as ob
 from ompl import geometric as og
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import PlannerError
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import PlannerError
 from rrtik_ompl.ompl_bridge.states import StateIO
 
 Factory = Callable[..., ob.Planner]  # factory(si) and factory(si, seed=...) make a planner

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.files.text import write_text
 from rrtik_ompl.ompl_bridge.states import StateIO
 

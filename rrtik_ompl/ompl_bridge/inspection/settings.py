@@ -9,7 +9,7 @@ from functools import lru_cache, wraps
 from types import MappingProxyType
 from typing import Any
 
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 
 FILLED_IN = ("world", "seed", "goal")  # options that `plan()` fills in
 GIVEN = "_given"  # the attribute that keeps the arguments of a planner's constructor

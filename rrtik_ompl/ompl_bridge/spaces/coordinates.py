@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.arrays import Mask, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Mask, frozen
+from rrtik_ompl.base.errors import InputError
 
 WANTED = "needs a RealVectorStateSpace, an SO2StateSpace or a compound of them (one number a coordinate)"
 

@@ -10,8 +10,8 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
-from rrtik_ompl.units import wrapped
+from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.base.units import wrapped
 
 LONGEST = 0.75 * np.pi  # [rad] of the turn in a piece of a motion
 MOST_GOALS = 64  # with their other ways round

@@ -7,9 +7,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Vector, finite_array
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.robot import Robot
 
 DEFAULT_RATE = np.deg2rad(10.0)  # [rad/s]; of a joint whose rate is not given
 DEFAULT_SLIDING_RATE = 0.02  # [m/s]

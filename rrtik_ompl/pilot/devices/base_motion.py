@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import pose_from_rpy
+from rrtik_ompl.base.arrays import Vector, finite_array, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose_from_rpy
 
 MIN_PERIOD, MAX_SPEED, MAX_AMPLITUDE = 0.2, 2.0, 2.0  # [s], [m/s], [m]
 

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError, Picture
 
 RETRY_SECONDS = 2.0  # [s] after a camera was lost

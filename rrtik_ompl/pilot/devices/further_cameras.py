@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import RrtikError
+from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.devices.camera_feed import PictureSource
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera

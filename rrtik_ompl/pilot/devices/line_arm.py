@@ -35,11 +35,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import LARGEST, Vector
-from rrtik_ompl.errors import InputError, printable
+from rrtik_ompl.base.arrays import LARGEST, Vector
+from rrtik_ompl.base.errors import InputError, printable
 from rrtik_ompl.files.messages import message_in, quoted
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
-from rrtik_ompl.robot import Robot
 
 PROTOCOL, VERSION = "rrtik-arm", 1
 POLL_SECONDS = 1.0 / 30.0  # between two requests for the joints

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.line_arm import LineArm
 

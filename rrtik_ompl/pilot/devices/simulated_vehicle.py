@@ -12,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field
 
-from rrtik_ompl.catalog import problem_folders
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import problem_folders
 from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.pilot.devices.base_motion import BaseMotion
@@ -21,8 +21,8 @@ from rrtik_ompl.pilot.devices.further_cameras import Mount
 from rrtik_ompl.pilot.devices.wrong_arm import Faults
 from rrtik_ompl.pilot.interlock import UNSEEN_SECONDS
 from rrtik_ompl.problem_files.scene import PoseEntry
+from rrtik_ompl.sensing.camera_file import load_camera
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.cameras.camera_file import load_camera
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
 

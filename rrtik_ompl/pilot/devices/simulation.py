@@ -15,11 +15,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.overlay.augment import Augmenter
-from rrtik_ompl.poses import rigid
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.pilot.overlay.augment import Augmenter
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.markers.detection import marker_cells

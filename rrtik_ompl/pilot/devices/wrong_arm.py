@@ -13,10 +13,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Vector, finite_array, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
-from rrtik_ompl.robot import Robot
 
 MAX_LAG = 10.0  # [s]
 

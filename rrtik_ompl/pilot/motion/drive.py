@@ -10,11 +10,11 @@ import time as clock
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.devices.line_arm import LineArm
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
-from rrtik_ompl.robot import Robot
 
 LEASH_SECONDS = 0.1  # how far a set point may be ahead of the arm, at the speed of the moment
 HOLD_SECONDS = 0.25  # without a renewal for as long the drive is over

@@ -10,10 +10,12 @@ from typing import Protocol
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector, frozen
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import PoseGoal
+from rrtik_ompl.base.arrays import Vector, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import apart
 from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.model.goal import PoseGoal
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.answers import Answer, alarm, news, refused
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.guide import Guide
@@ -21,8 +23,6 @@ from rrtik_ompl.pilot.interlock import MANOEUVRE, MOVING
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import route_to
 from rrtik_ompl.pilot.surroundings import Surroundings
-from rrtik_ompl.poses import apart
-from rrtik_ompl.robot import Robot
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 
 REACH, TURN = 0.015, np.deg2rad(10.0)  # [m], [rad]; a gripper that closes this near to a grasp holds the object

@@ -6,8 +6,10 @@ from typing import Protocol
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Vector, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.units import joint_unit, reading
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.answers import Answer, alarm, news, refused
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.guide import Guide
@@ -17,9 +19,7 @@ from rrtik_ompl.pilot.motion.supervisor import FOLLOW_SECONDS, slack_of
 from rrtik_ompl.pilot.routes.follower import MADE, Follower
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange, check_move, move_refusal, way_out
 from rrtik_ompl.pilot.routes.track import Track
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.units import joint_unit, reading
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 STUCK_SECONDS = 0.8  # an arm that comes no nearer to the end of a move for as long does not get there
 MIN_SPEED = 0.05  # share of the joints' rates

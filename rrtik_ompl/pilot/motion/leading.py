@@ -9,19 +9,19 @@ from typing import Protocol
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.following.servo import Servo
-from rrtik_ompl.following.visual_servo import VisualServo
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import apart
+from rrtik_ompl.base.units import joint_unit, reading
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.motion.following.servo import Servo
+from rrtik_ompl.motion.following.visual_servo import VisualServo
 from rrtik_ompl.pilot.answers import Answer, news
 from rrtik_ompl.pilot.devices.arm import Arm
 from rrtik_ompl.pilot.motion.drive import LEASH_SECONDS
 from rrtik_ompl.pilot.motion.held import Held
 from rrtik_ompl.pilot.surroundings import Surroundings
-from rrtik_ompl.poses import apart
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.units import joint_unit, reading
-from rrtik_ompl.world import World
+from rrtik_ompl.world.world import World
 
 NEAR, TURNED = 0.15, np.deg2rad(30.0)  # [m], [rad]; from farther away there may be no straight way to a grasp
 ALIGNED, ALIGNED_SLIDING = np.deg2rad(5.0), 0.01  # [rad], [m]; a master arm that is farther away leads nothing

@@ -23,10 +23,10 @@ import threading
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Vector
+from rrtik_ompl.base.arrays import Mask, Vector
+from rrtik_ompl.base.units import joint_unit, reading
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.follower import SLIDING_TOLERANCE, TOLERANCE
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.units import joint_unit, reading
 
 FASTEST = 1.5  # times its rate, which a joint may move
 REACTION_SECONDS = 0.08  # from a reading until an arm that is told to stop then stands

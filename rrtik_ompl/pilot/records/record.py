@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 
 class GrowingFile:

@@ -11,11 +11,11 @@ from itertools import combinations, permutations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.path import JointPath
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.follower import slack
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.world import World
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
 
 MAX_JOINTS = 3  # that move between such a configuration and the grasp
 MAX_OFFSET = 0.02  # [m] from the pose before the object

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.path import JointPath
-from rrtik_ompl.world import Contact, World
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import Contact, World
 
 FARTHEST = 256  # [mm] of a proven clearance; what is farther away is not near
 CLEARANCE_ERROR = 0.002  # [m]; the least distance that is found is at most this much too large

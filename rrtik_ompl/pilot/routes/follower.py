@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.path import JointPath, Move
-from rrtik_ompl.units import joint_unit, reading
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.units import joint_unit, reading
+from rrtik_ompl.world.path import JointPath, Move
+from rrtik_ompl.world.world import World
 
 MADE = np.deg2rad(0.005)  # [rad or m]; a move is made this close to its end: the tip of an arm of 2 m is 0.2 mm off
 TOLERANCE = np.deg2rad(1.0)  # [rad]; farther from its value a joint is off the route

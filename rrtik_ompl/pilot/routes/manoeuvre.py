@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Mask, Matrix, Vector
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
-from rrtik_ompl.path import JointPath
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.clearance import closest_pair
 from rrtik_ompl.pilot.routes.follower import slack
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.units import joint_unit, reading
-from rrtik_ompl.world import World
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
 
 SINGULARITY_THRESHOLD = 0.05  # sine of an angle, or metres of a lever arm, that vanish in a singular posture
 CLEARANCE_WARNING = 0.02  # [m]; a smaller clearance is warned of

@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.moves.lattice import MoveLattice
-from rrtik_ompl.moves.values import Values, lattice_size, spread_values, values_of
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge.planner_traits import planners_with
 from rrtik_ompl.pilot.routes.no_route import NoRoute
-from rrtik_ompl.planning import plan
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.shortening.fewest_moves import turning_limits
-from rrtik_ompl.world import World
+from rrtik_ompl.planning.moves.lattice import MoveLattice
+from rrtik_ompl.planning.moves.values import Values, lattice_size, spread_values, values_of
+from rrtik_ompl.planning.plan import plan
+from rrtik_ompl.planning.shortening.fewest_moves import turning_limits
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 PLANNER_SECONDS = 5.0
 MAX_CORNERS = 256  # of a lattice of moves

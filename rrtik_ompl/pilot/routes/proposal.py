@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.goal import JointGoal, joint_difference
-from rrtik_ompl.pilot.lamps import Lamp, stage_poses
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.model.goal import JointGoal, joint_difference
+from rrtik_ompl.pilot.routes.lamps import Lamp, stage_poses
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route, route_to, route_to_grasp
 from rrtik_ompl.pilot.surroundings import Surroundings
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.world.problem import Problem
 
 
 def propose(

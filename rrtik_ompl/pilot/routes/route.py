@@ -11,17 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Vector
-from rrtik_ompl.errors import ProblemError
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import ProblemError
+from rrtik_ompl.base.poses import apart
 from rrtik_ompl.ik.batch import solve_ik_batch
-from rrtik_ompl.path import JointPath
+from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.pilot.routes.approach import approaches
 from rrtik_ompl.pilot.routes.moves import planned
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, RouteSearch, Tail
-from rrtik_ompl.poses import apart
-from rrtik_ompl.scene import Touching
-from rrtik_ompl.world import World
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
 
 END_OFFSET, END_TURN = 2e-4, np.deg2rad(0.04)  # [m], [rad] of the tip from its grasp, at the end of a route
 MAX_END_OFFSET, MAX_END_TURN = 5e-4, np.deg2rad(0.1)  # the same of an arm that has followed it

@@ -7,7 +7,7 @@ import socket
 import ssl
 from pathlib import Path
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 
 PASSIVE = socket.AI_PASSIVE  # as who wants to listen asks
 

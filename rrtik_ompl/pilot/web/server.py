@@ -35,7 +35,7 @@ import tornado.web
 import tornado.websocket
 from tornado.httputil import HTTPServerRequest
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.messages import message_in
 from rrtik_ompl.pilot.web.clients import Client, Clients
 from rrtik_ompl.pilot.web.exposure import all_addresses, tls_context

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import TAU, Matrix, not_negative, positive, whole_number
-from rrtik_ompl.choices import TickEvent
-from rrtik_ompl.copies import in_one_line
-from rrtik_ompl.errors import at_most, require
-from rrtik_ompl.fast.simd.library import library
-from rrtik_ompl.poses import pose_row
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.base.arrays import TAU, Matrix, not_negative, positive, whole_number
+from rrtik_ompl.base.choices import TickEvent
+from rrtik_ompl.base.copies import in_one_line
+from rrtik_ompl.base.errors import at_most, require
+from rrtik_ompl.base.poses import pose_row
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning.drrt_con import without_points_between
 from rrtik_ompl.replanning.feed import Snapshot, refuse_endless_turns
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
@@ -22,9 +23,8 @@ from rrtik_ompl.replanning.in_time.tree import Pace
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.trajectory.limits import RateLimits
 from rrtik_ompl.world.kept_clearance import CLEARANCE
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proof import PROOF_KERNELS
 
 NAME = "in-time"  # of the planner, in records

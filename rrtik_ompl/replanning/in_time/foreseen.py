@@ -14,16 +14,16 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.certificate import distance
-from rrtik_ompl.collision.extent import farthest
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.certificate import distance
+from rrtik_ompl.geometry.collision.extent import farthest
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.replanning.feed import ROTATION_NOISE
-from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene
-from rrtik_ompl.world import World
 from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.world import World
 
 ROUNDING = 1e-9  # [m]: of places that are computed from times
 MOST_WORLDS = 1024  # that are kept at once: 0.5 to 1.5 MB each, and there may be ten thousand slots

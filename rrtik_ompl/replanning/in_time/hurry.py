@@ -10,7 +10,7 @@ from collections import deque
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.tree import Pace
 from rrtik_ompl.world.motion_queries import Stop

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 
 GAP_WEIGHT = 0.2  # of a slot between two vertices, beside a slot that the motion needs at least
 ROUNDING = 1e-9  # [slots]

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Matrix, Vector, finite_array, finite_number, frozen
-from rrtik_ompl.copies import as_value
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, frozen
+from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.base.errors import InputError
 
 ORIGIN = np.zeros(3)
 UNDISTORT: Any = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 made one function of two

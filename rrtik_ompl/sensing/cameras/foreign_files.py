@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.sections import Name, Number, Section, parse
 from rrtik_ompl.files.strict_yaml import YamlDocument
 from rrtik_ompl.sensing.cameras.camera import Camera

@@ -12,9 +12,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.arrays import Vector, finite_array, finite_number, frozen
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.poses import rigid
+from rrtik_ompl.base.arrays import Vector, finite_array, finite_number, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import InputError, at_most
+from rrtik_ompl.base.errors import InputError, at_most
 from rrtik_ompl.files.text import write_bytes
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")

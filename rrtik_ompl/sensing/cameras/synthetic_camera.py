@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 PUBLISHED_MATRIX = ((877.6915, 0.0, 320.6451), (0.0, 869.8953, 242.8119), (0.0, 0.0, 1.0))

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.sensing.cameras.tone import LINEAR, SRGB, TONES
 from rrtik_ompl.sensing.markers.corner_spread import corner_spread
 from rrtik_ompl.sensing.markers.lighting import likenesses, shown

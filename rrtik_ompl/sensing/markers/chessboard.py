@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import LARGEST, Matrix, frozen
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.arrays import LARGEST, Matrix, frozen
+from rrtik_ompl.base.errors import InputError
 
 SMALLEST_SIDE = 1e-6  # [m] of a square or a marker
 PIECE = 2  # squares along a side

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, frozen
+from rrtik_ompl.base.arrays import Matrix, frozen
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 MIN_ERROR_RATIO = 6.0  # of the two errors of a square; below it are 27 % of near-frontal views and all wrong choices

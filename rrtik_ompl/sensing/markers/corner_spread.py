@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.sensing.markers.lighting import CUT_OFF
 
 Pixels = NDArray[np.float32]

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import LARGEST, Matrix, frozen
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.arrays import LARGEST, Matrix, frozen
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.sensing.markers.alignment import Look, aligned_corners
 from rrtik_ompl.sensing.markers.chessboard import SMALLEST_SIDE
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Vector
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.sensing.cameras.tone import coded_values, light_of
 
 Pixels = NDArray[np.float32]

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 import pinocchio as pin
 
-from rrtik_ompl.arrays import Matrix, frozen, not_negative
-from rrtik_ompl.errors import InputError, UnknownNameError
-from rrtik_ompl.poses import rigid
-from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.base.arrays import Matrix, frozen, not_negative
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
 
 ROLES = ("base", "arm", "target", "obstacle")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.errors import InputError
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import check_target, write_bytes
 from rrtik_ompl.sensing.markers.detection import charuco_board, marker_cells
 

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.poses import turned_z
 from rrtik_ompl.constraints.held_region import ANYWHERE, HeldRegion, Turning
-from rrtik_ompl.poses import turned_z
-from rrtik_ompl.shapes import Box
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape, look_of_triangles

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.arrays import Matrix, Vector
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape
 
 SURROUNDINGS_RATIO = 3.0  # of an obstacle's size to the arm's box, above which the picture shows only a part of it

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix, frozen
-from rrtik_ompl.shapes.surfaces import Faces, round_ended
+from rrtik_ompl.base.arrays import Matrix, frozen
+from rrtik_ompl.model.shapes.surfaces import Faces, round_ended
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import look_of_triangles
 from rrtik_ompl.viewer.drawing.nodes import Node

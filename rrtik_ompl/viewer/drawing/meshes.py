@@ -10,12 +10,12 @@ import coal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.collision.shape_table import shape_of
-from rrtik_ompl.collision.solids import is_mesh, once_per_geometry
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.shapes import Box, Cylinder, HalfSpace, Mesh, PointCloud, Shape, Sphere
-from rrtik_ompl.shapes.surfaces import Faces
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.shape_table import shape_of
+from rrtik_ompl.geometry.collision.solids import is_mesh, once_per_geometry
+from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, Mesh, PointCloud, Shape, Sphere
+from rrtik_ompl.model.shapes.surfaces import Faces
 from rrtik_ompl.viewer.drawing.objects import (
     BoxGeometry,
     CylinderGeometry,

@@ -13,8 +13,8 @@ import numpy as np
 import umsgpack
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.shapes.surfaces import Faces
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.model.shapes.surfaces import Faces
 
 BOTH_SIDES = 2  # three.js's DoubleSide
 IDENTITY = np.eye(4).ravel().tolist()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.reach.grid_map import ReachMap
+from rrtik_ompl.ik.reach.grid_map import ReachMap
 from rrtik_ompl.viewer.drawing.marks import Mark, cubes
 
 SCALE = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # of viridis, low to high

@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import AttachedObject, Scene
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import UnknownNameError
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import AttachedObject, Scene
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import Look, look_of_coal, look_of_shape, triangle_count
 from rrtik_ompl.viewer.drawing.nodes import Node

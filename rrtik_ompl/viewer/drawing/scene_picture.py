@@ -6,11 +6,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import TAU, Matrix
-from rrtik_ompl.goal import Goal, JointGoal, PoseGoal, parts_of
-from rrtik_ompl.scene import ConstantVelocity, Motion, Obstacle, Scene
-from rrtik_ompl.shapes import Box, HalfSpace, Sphere
-from rrtik_ompl.task_region import TaskRegion
+from rrtik_ompl.base.arrays import TAU, Matrix
+from rrtik_ompl.model.goal import Goal, JointGoal, PoseGoal, parts_of
+from rrtik_ompl.model.scene import ConstantVelocity, Motion, Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.meshes import Look, half_space_plate, look_of_margin, look_of_shape, look_of_triangles

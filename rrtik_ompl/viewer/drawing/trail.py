@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.arrays import Matrix
-from rrtik_ompl.robot import Robot
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.nodes import Node
 from rrtik_ompl.viewer.drawing.objects import Material, SphereGeometry

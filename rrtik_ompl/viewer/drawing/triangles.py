@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from rrtik_ompl.arrays import TAU, Matrix
-from rrtik_ompl.shapes.surfaces import Faces, wrap
+from rrtik_ompl.base.arrays import TAU, Matrix
+from rrtik_ompl.model.shapes.surfaces import Faces, wrap
 
 CREASE = np.deg2rad(35.0)  # faces that meet at a larger angle are drawn with an edge between them
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.arrays import Mask, Matrix, Vector
-from rrtik_ompl.scene import Obstacle, Scene
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape
 
 DEFAULT_AZIMUTH = np.deg2rad(-50.0)  # from in front of the arm (x), on its right

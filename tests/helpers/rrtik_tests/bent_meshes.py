@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrtik_ompl.collision.solids import bvh
+from rrtik_ompl.geometry.collision.solids import bvh
 
 KINDS = ["angle", "open", "two shells", "dented", "hollow"]
 

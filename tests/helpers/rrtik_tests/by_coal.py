@@ -1,8 +1,8 @@
 """Configurations judged by coal alone: what proofs and the checks of planners are compared with."""
 
-from rrtik_ompl.arrays import Mask, Matrix
-from rrtik_ompl.collision.certificate import Certificate
-from rrtik_ompl.world import World
+from rrtik_ompl.base.arrays import Mask, Matrix
+from rrtik_ompl.geometry.collision.certificate import Certificate
+from rrtik_ompl.world.world import World
 
 
 def free_by_coal(world: World, Q: Matrix) -> Mask:

@@ -6,8 +6,8 @@ import coal
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from rrtik_ompl.collision.enclosure import enclosure
-from rrtik_ompl.collision.solids import bvh, inside_mesh, is_closed, is_mesh, mesh_arrays
+from rrtik_ompl.geometry.collision.enclosure import enclosure
+from rrtik_ompl.geometry.collision.solids import bvh, inside_mesh, is_closed, is_mesh, mesh_arrays
 
 TOLERANCE = 1e-9
 SOLIDS = {

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.goal import JointGoal
-from rrtik_ompl.robot import Robot
-from rrtik_ompl.scene import Scene
-from rrtik_ompl.shapes import Mesh
+from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.shapes import Mesh
 
 URDF = """
 <robot name="crane">

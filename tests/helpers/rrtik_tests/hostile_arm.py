@@ -7,10 +7,10 @@ from contextlib import ExitStack, closing
 
 import numpy as np
 
-from rrtik_ompl.overlay.virtual_camera import pinhole_camera
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
 from rrtik_ompl.pilot.engine import Engine
+from rrtik_ompl.pilot.overlay.virtual_camera import pinhole_camera
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.web.server import PilotServer

@@ -3,12 +3,12 @@
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.poses import pose
-from rrtik_ompl.scene import Obstacle
+from rrtik_ompl.base.poses import pose
+from rrtik_ompl.model.scene import Obstacle
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MountedMarker
-from rrtik_ompl.shapes import Box
 
 CAMERA = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.03))
 SIDE = 0.08

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.scene import ConstantVelocity, Obstacle, Scene
-from rrtik_ompl.shapes import Box
-from rrtik_ompl.trajectory.limits import RateLimits
-from rrtik_ompl.world import World
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
+from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.motion.trajectory.limits import RateLimits
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 FAST = RateLimits([1e3, 1e3], [1e3, 1e3])
 OPTIONS = {"step": 0.5, "rate": 10.0, "max_edge": 1.0, "repair_budget": 30.0, "limits": FAST}

@@ -4,13 +4,13 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl import load_problem
+from rrtik_ompl.base.poses import pose_from_rpy
+from rrtik_ompl.model.scene import Obstacle
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.poses import pose_from_rpy
-from rrtik_ompl.scene import Obstacle
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import SeenObject
-from rrtik_ompl.shapes import Box
 
 PROBLEM = load_problem("titan4_sdu")
 ROBOT, WORLD = PROBLEM.robot, PROBLEM.world

@@ -7,15 +7,14 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.collision.bodies import Body
-from rrtik_ompl.collision.solids import bvh, hull
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.fast import FastWorld
-from rrtik_ompl.fast.checks import check_kernels as kernels
-from rrtik_ompl.fast.simd.processor import WIDTH
-from rrtik_ompl.fast.tables import layout
-from rrtik_ompl.fast.tables import robot_tables as tables
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.solids import bvh, hull
+from rrtik_ompl.kernels import FastWorld, layout
+from rrtik_ompl.kernels.checks import check_kernels as kernels
+from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables import robot_tables as tables
 
 SLIDER = """
 <robot name="slider"><link name="base"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>

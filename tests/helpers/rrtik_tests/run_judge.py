@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rrtik_ompl.problem import Problem
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.replanning import ReplanRun
 from rrtik_ompl.replanning.feed import Feed
-from rrtik_ompl.scene import Scene
+from rrtik_ompl.world.problem import Problem
 
 
 def judged(

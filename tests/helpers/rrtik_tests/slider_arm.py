@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.ik.goal_configurations import goal_configurations
-from rrtik_ompl.problem import Problem
 from rrtik_ompl.problem_files.problem import load_problem
+from rrtik_ompl.world.problem import Problem
 
 NAMES = ("env_e", "planar3_a", "planar3_c", "planar3_boxes", "planar6_c", "titan4_prisms", "titan4_sdu", "cut_two_ls")
 

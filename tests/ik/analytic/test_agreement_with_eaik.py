@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import solutions
 

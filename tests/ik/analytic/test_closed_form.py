@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rrtik_ompl.catalog import load_robot
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose_from_rpy
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.analytic.analytic_solver import two_links, wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.tip_columns import tip_columns
-from rrtik_ompl.poses import pose_from_rpy
 
 BASE = pose_from_rpy([1.0, -2.0, 0.5], [0.4, -0.7, 2.0])
 

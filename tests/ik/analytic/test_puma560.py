@@ -6,13 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import PoseGoal, PositionGoal
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
 from rrtik_ompl.ik.singularity import singularity_report
 from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.model.goal import PoseGoal, PositionGoal
 from rrtik_robots.puma560.singular_samples import CASES, singular_configurations
 from rrtik_tests.inverse_kinematics import distance_to_branches
 

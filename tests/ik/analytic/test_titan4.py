@@ -4,12 +4,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.errors import UnknownNameError
-from rrtik_ompl.goal import pose_errors
+from rrtik_ompl.base.errors import UnknownNameError
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import family, form_of, solutions
 from rrtik_ompl.ik.singularity import singularity_report
+from rrtik_ompl.model.goal import pose_errors
 from rrtik_robots.titan4 import TitanGeometry
 from rrtik_robots.titan4.families import psi_interval
 from rrtik_robots.titan4.singular_samples import CASES, singular_configurations

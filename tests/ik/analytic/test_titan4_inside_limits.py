@@ -5,9 +5,8 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from rrtik_ompl.arrays import TAU
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import PoseGoal
+from rrtik_ompl.base.arrays import TAU
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik import solve as module
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
@@ -15,6 +14,7 @@ from rrtik_ompl.ik.batch import solve_ik_batch
 from rrtik_ompl.ik.method_interface import IkResponse, Method
 from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.model.goal import PoseGoal
 from rrtik_robots.titan4.singular_samples import CASES, configurations_inside, singular_configurations
 
 FAMILIES = ("shoulder", "wrist", "shoulder wrist")

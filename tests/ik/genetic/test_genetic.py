@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import rrtik_ompl as rrtik
 from rrtik_bench.genetic.published import INCH, curve
-from rrtik_ompl.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.breeding import children
@@ -17,7 +17,7 @@ from rrtik_ompl.ik.genetic.genes import LARGEST, Window, around, from_gray, rand
 from rrtik_ompl.ik.genetic.objective import manipulability, score
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
-from rrtik_ompl.tip_distance import reach_of
+from rrtik_ompl.model.tip_distance import reach_of
 
 TOLERANCE = 0.002 * INCH
 EVERY_NUMBER = np.arange(LARGEST + 1, dtype=np.uint16)

@@ -10,17 +10,17 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.cli.plan_report import summary
-from rrtik_ompl.errors import InputError
-from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.ik.ikurt.descent import descend
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.ik.ikurt.tree import FIRST_ROOM, IkurtTree
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal
+from rrtik_ompl.model.shapes import Sphere
 from rrtik_ompl.ompl_bridge.contract.problems import small_problem
-from rrtik_ompl.poses import pose
-from rrtik_ompl.shapes import Sphere
 from rrtik_planners import IKURT, IKURTPublished
 from rrtik_tests.inverse_kinematics import random_rows
 

@@ -7,17 +7,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
-from rrtik_ompl.errors import InputError
 from rrtik_ompl.ik.mb_rrt.axes import axes_of
 from rrtik_ompl.ik.mb_rrt.axis_rule_b import grow_by_rule_b
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.search import search
 from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.model.shapes import Cylinder
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
-from rrtik_ompl.planning import plan
-from rrtik_ompl.shapes import Cylinder
+from rrtik_ompl.planning.plan import plan
 from rrtik_planners import MBRRT
 from rrtik_robots.planar import planar
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.catalog import load_robot
-from rrtik_ompl.goal import GoalSet, PoseGoal, PositionGoal
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
 from rrtik_ompl.ik.targets import targets
-from rrtik_ompl.problem import Problem
-from rrtik_ompl.world import World
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 ARMS = ["titan4", "puma560", "panda", "ur5", "kinova", "planar6"]
 

@@ -1,0 +1,300 @@
+"""Array types and the checks that every array from outside passes: shape, finiteness, a private read-only copy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import chain
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from rrtik_ompl.base.errors import InputError, at_most
+
+Vector: TypeAlias = NDArray[np.float64]  # shape (n,)
+Matrix: TypeAlias = NDArray[np.float64]  # shape (m, n)
+Mask: TypeAlias = NDArray[np.bool_]  # shape (m,)
+
+TAU = 2.0 * np.pi  # [rad] a full turn
+MOST_NUMBERS = 100_000_000  # of one array, 0.8 GB; whoever has more asks in parts
+BLOCK_ROWS = 16_384  # that a batch computes at a time
+MOST_ROWS = 1_000_000  # waypoints of a path, times of a motion
+_LISTS = frozenset((list, tuple))
+LARGEST = 1e6  # [m] or [rad]; numbers beyond are a slip of the pen, and the kernels' float32 cannot hold them
+
+
+def in_blocks(work: Callable[..., NDArray[Any]], *rows: NDArray[Any]) -> NDArray[Any]:
+    """``work`` of many rows, block by block, so that it needs little memory beyond its answer.
+
+    Args:
+        work: What makes rows of some rows, of arrays of equal length.
+        rows: These arrays.
+    """
+    count = len(rows[0])
+    if count <= BLOCK_ROWS:
+        return work(*rows)
+    answer: NDArray[Any] | None = None
+    for begin in range(0, count, BLOCK_ROWS):
+        part = work(*(each[begin : begin + BLOCK_ROWS] for each in rows))
+        answer = room((count, *part.shape[1:]), part.dtype) if answer is None else answer
+        answer[begin : begin + BLOCK_ROWS] = part
+    assert answer is not None
+    return answer
+
+
+def room(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
+    """Memory for an answer.
+
+    Raises:
+        InputError: If this machine has not so much.
+    """
+    try:
+        return np.empty(shape, dtype)
+    except MemoryError:
+        size = np.dtype(dtype).itemsize * float(np.prod([float(n) for n in shape])) / 1e9
+        raise InputError(f"the answer takes {size:.1f} GB, more than this machine has left; ask in parts") from None
+
+
+def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
+    """Return a read-only, contiguous private copy of ``values``."""
+    array = np.array(values, dtype=dtype, order="C", copy=True)
+    array.setflags(write=False)
+    return array
+
+
+def distinct(values: ArrayLike) -> NDArray[Any]:
+    """The different ones of some numbers, ascending: as ``numpy.unique``, which takes longer for few, and to load."""
+    ordered = np.sort(np.asarray(values), axis=None)
+    first = np.ones(len(ordered), dtype=bool)
+    np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
+    return ordered[first]
+
+
+def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> NDArray[np.float64]:
+    """Check an array given by a user and return it as float64.
+
+    Args:
+        values: Anything numpy can turn into numbers.
+        shape: Wanted shape; ``None`` stands for any length in that place.
+        what: Name of the value, used in the error message.
+
+    Raises:
+        InputError: If the values are not numbers, have another shape, or are not all finite.
+    """
+    # Most are floats already, and to ask what else they may be takes longer than all other questions.
+    array = values if type(values) is np.ndarray and values.dtype == np.float64 else _as_floats(values, what)
+    if array.size > MOST_NUMBERS:
+        raise too_many(array.size, what)
+    if array.shape != shape and not _has_shape(array, shape):
+        wanted = ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
+        raise InputError(f"{what}: expected an array of shape ({wanted}), got shape {array.shape}")
+    if not np.isfinite(array).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        if not place:
+            raise InputError(f"{what}: must be a finite number, got {array}")
+        raise InputError(f"{what}: every number must be finite, but entry {list(place)} is {array[place]}")
+    return array
+
+
+def _as_floats(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Numbers given by a user as float64; the one place that says what is a number.
+
+    Raises:
+        InputError: If they are none (truths, texts and complex numbers are none), or too many.
+    """
+    try:
+        if (count := _count(values)) > MOST_NUMBERS:
+            raise too_many(count, what)
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiuO" or (isinstance(values, list | tuple) and _has_truths(values)):
+            raise TypeError("not numbers")
+        return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{what}: expected numbers, got {_short(values)}") from error
+    except MemoryError:
+        raise InputError(f"{what}: too many numbers for the memory of this machine; give them in parts") from None
+
+
+def _count(values: object) -> int:
+    """How many members a value given by a user has, before they are copied; 0 if it does not say."""
+    if isinstance(values, np.ndarray):
+        return values.size
+    try:
+        return len(values)  # type: ignore[arg-type]
+    except (TypeError, OverflowError):
+        return MOST_NUMBERS + 1 if isinstance(values, range) else 0
+
+
+def _has_truths(values: Iterable[Any]) -> bool:
+    """Whether True or False is among numbers, which numpy takes for 1 and 0; level by level of lists in lists."""
+    while True:
+        kinds = set(map(type, values))
+        if bool in kinds or np.bool_ in kinds:
+            return True
+        if np.ndarray in kinds and any(type(each) is np.ndarray and each.dtype == np.bool_ for each in values):
+            return True
+        if kinds.isdisjoint(_LISTS):
+            return False
+        values = list(chain.from_iterable(each for each in values if type(each) in _LISTS))
+
+
+def too_many(count: int, what: str) -> InputError:
+    """The error for more numbers than a call takes."""
+    return InputError(f"{what}: {count} are more numbers than the {MOST_NUMBERS} of one call; give them in parts")
+
+
+def dimensions(values: object) -> int:
+    """How many dimensions a value given by a user has; 0 for nested lists that make no array."""
+    if not isinstance(values, np.ndarray) and _count(values) > MOST_NUMBERS:
+        return 0
+    try:
+        return np.ndim(values)  # type: ignore[arg-type]
+    except (ValueError, MemoryError):
+        return 0
+
+
+def bounded_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> NDArray[np.float64]:
+    """As :func:`finite_array`, of numbers that reach the tables of the kernels: none beyond ``LARGEST``.
+
+    Raises:
+        InputError: As :func:`finite_array`, or if a number is larger.
+    """
+    array = finite_array(values, shape, what)
+    if (largest := np.abs(array).max(initial=0.0)) > LARGEST:
+        raise InputError(f"{what}: found {largest:g}, more than {LARGEST:g}; check units: metres, radians")
+    return array
+
+
+def usable_waypoints(rows: Matrix) -> Matrix:
+    """Finite waypoints of a path, shape (k, n).
+
+    Raises:
+        InputError: If there are none or too many, or a number is larger than ``LARGEST``.
+    """
+    if rows.size == 0:
+        raise InputError("path waypoints: a path needs at least one configuration of at least one joint")
+    at_most(len(rows), MOST_ROWS, "path waypoints")
+    if (most := np.abs(rows).max()) > LARGEST:
+        raise InputError(f"path waypoints: found {most:g}, more than {LARGEST:g} rad or m; check units")
+    return rows
+
+
+def _has_shape(array: NDArray[np.float64], shape: tuple[int | None, ...]) -> bool:
+    return array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
+
+
+def number_rows(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Numbers given by a user as rows, one row or several; neither their number nor that they are finite is checked.
+
+    Raises:
+        InputError: If they are not numbers, or too many.
+    """
+    array = values if type(values) is np.ndarray and values.dtype == np.float64 else _as_floats(values, what)
+    if array.size > MOST_NUMBERS:
+        raise too_many(array.size, what)
+    return array if array.ndim >= 2 else array.reshape(1, -1)
+
+
+def rows_of(values: ArrayLike, columns: int, what: str) -> Matrix:
+    """As :func:`number_rows`, shape (k, columns).
+
+    Raises:
+        InputError: If they are no such rows.
+    """
+    rows = number_rows(values, what)
+    if rows.shape[1:] != (columns,):
+        raise InputError(f"{what}: expected shape (any, {columns}), got {rows.shape}")
+    return rows
+
+
+def filled_rows(values: ArrayLike, columns: int, what: str) -> Matrix:
+    """As :func:`finite_array`, of one row at least, shape (k, columns).
+
+    Raises:
+        InputError: If they are no such rows.
+    """
+    rows = finite_array(values, (None, columns), what)
+    if len(rows) == 0:
+        raise InputError(f"{what}: at least one row is needed")
+    return rows
+
+
+def truths(values: ArrayLike, what: str) -> Mask:
+    """Truths given by a user, or 0 and 1 in their place, as one row, shape (n,).
+
+    Raises:
+        InputError: If they are neither.
+    """
+    array = np.asarray(values) if isinstance(values, list | tuple | np.ndarray) and dimensions(values) else None
+    if array is None or array.dtype != np.bool_:
+        array = number_rows(values, what)
+    mask: Mask = array.reshape(-1).astype(bool)
+    return mask
+
+
+def finite_number(value: ArrayLike, what: str) -> float:
+    """A number given by a user.
+
+    Raises:
+        InputError: If it is none, or not finite.
+    """
+    if type(value) is float and -np.inf < value < np.inf:
+        return value
+    return float(finite_array(value, (), what))
+
+
+def positive(value: ArrayLike, what: str, remedy: str = "") -> float:
+    """A number greater than 0 given by a user.
+
+    Args:
+        value: What was given.
+        what: Name of the value, with which the error message begins.
+        remedy: What to give instead; the error message ends with it.
+
+    Raises:
+        InputError: If it is none.
+    """
+    number = finite_number(value, what)
+    if number <= 0.0:
+        raise InputError(f"{what}: must be greater than 0, got {number:g}" + (f"; {remedy}" if remedy else ""))
+    return number
+
+
+def length(value: ArrayLike, what: str) -> float:
+    """A length of a solid [m] given by a user: greater than 0, at most ``LARGEST``.
+
+    Raises:
+        InputError: If it is none.
+    """
+    return positive(bounded_array(value, (), what), what)
+
+
+def not_negative(value: ArrayLike, what: str) -> float:
+    """A number of at least 0 given by a user.
+
+    Raises:
+        InputError: If it is none.
+    """
+    number = finite_number(value, what)
+    if number < 0.0:
+        raise InputError(f"{what} must not be negative, got {number:g}")
+    return number
+
+
+def whole_number(value: object, what: str, least: int = 0) -> int:
+    """A whole number given by a user, such as a seed.
+
+    Raises:
+        InputError: If it is none, or less than ``least``.
+    """
+    if type(value) is int and value >= least:
+        return value
+    odd = isinstance(value, bool | np.timedelta64)  # which are of the kinds of whole numbers all the same
+    if odd or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(f"{what} must be a whole number of at least {least}, got {value!r}")
+    return int(value)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

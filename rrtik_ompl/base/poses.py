@@ -1,0 +1,212 @@
+"""Poses: ``pinocchio.SE3`` inside, position plus quaternion (x, y, z, w) or roll-pitch-yaw in files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import LARGEST, Mask, Matrix, Vector, bounded_array, dimensions, finite_array, frozen
+from rrtik_ompl.base.errors import InputError, at_most
+
+IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
+LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # of every pose
+LAST_ROW_TOLERANCE = 1e-8
+NOT_RIGID = 1e-6  # largest entry of R R^T - 1 that still counts as rounding, and is removed
+ROUNDING = 1e-12  # the same of a rotation that stays as it is
+MOST_MOVING = 200  # joints with which Pinocchio computes: its memory grows with their cube, 32 GB at 1,000
+
+
+def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike | None = None, what: str = "pose") -> Any:
+    """Make a pose from a position [m] and a unit quaternion in the order x, y, z, w.
+
+    Args:
+        xyz: The position, shape (3,); without ``quat_xyzw`` a pose in any form that :func:`rigid` takes, such as
+            [x, y, z, roll, pitch, yaw] in radians or a 4 x 4 matrix.
+        quat_xyzw: The orientation, shape (4,).
+        what: Its name, for messages.
+
+    Raises:
+        InputError: If a number is not finite, or the quaternion's length differs from 1 by more than 1e-3.
+
+    Example:
+        >>> rrtik.pose([0.1, 0.2, 0.3], [0.0, 0.0, 1.0, 0.0]).translation
+        array([0.1, 0.2, 0.3])
+        >>> rrtik.pose([0.1, 0.2, 0.3, 0.0, 0.0, 1.57]).translation
+        array([0.1, 0.2, 0.3])
+    """
+    if quat_xyzw is None:
+        return rigid(xyz, what)
+    position = bounded_array(xyz, (3,), f"{what}: xyz")
+    quaternion = finite_array(quat_xyzw, (4,), f"{what}: quat_xyzw")
+    length = float(np.linalg.norm(quaternion))
+    if abs(length - 1.0) > 1e-3:
+        raise InputError(f"{what}: quat_xyzw must have length 1, but has {length:.4g}; the order is x, y, z, w")
+    x, y, z, w = quaternion / length
+    return pin.SE3(pin.Quaternion(w, x, y, z).matrix(), position)
+
+
+def pose_from_rpy(xyz: ArrayLike, rpy: ArrayLike, what: str = "pose") -> Any:
+    """Make a pose from a position [m] and fixed-axis roll, pitch, yaw [rad] (URDF's convention)."""
+    roll, pitch, yaw = bounded_array(rpy, (3,), f"{what}: rpy")
+    return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), bounded_array(xyz, (3,), f"{what}: xyz"))
+
+
+def quaternion_xyzw(placement: Any) -> Vector:
+    """Unit quaternion (x, y, z, w) of a pose, w not negative, so that equal rotations read equal. Shape (4,)."""
+    quaternion: Vector = np.asarray(pin.Quaternion(placement.rotation).coeffs(), dtype=np.float64)
+    return -quaternion if quaternion[3] < 0.0 else quaternion
+
+
+def pose_row(placement: pin.SE3) -> Vector:
+    """A pose as x, y, z [m] and the quaternion x, y, z, w, shape (7,)."""
+    return np.concatenate([placement.translation, quaternion_xyzw(placement)])
+
+
+def apart(first: pin.SE3, second: pin.SE3) -> tuple[float, float]:
+    """How far two poses are apart [m], and by which angle they are turned to each other [rad]."""
+    off = first.actInv(second)
+    return float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
+
+
+def working_memory(model: pin.Model) -> pin.Data:
+    """What Pinocchio needs to compute with a model (``pinocchio.Model``): its ``pinocchio.Data``.
+
+    Raises:
+        InputError: If the model has so many joints that this may be more than the machine has.
+    """
+    few_joints(model)
+    return model.createData()
+
+
+def few_joints(model: pin.Model) -> None:
+    """Refuse a model (``pinocchio.Model``) with more joints than :func:`working_memory` has room for.
+
+    Raises:
+        InputError: If it has.
+    """
+    at_most(int(model.nv), MOST_MOVING, f"robot '{model.name}': moving joints", "fix some; fk and jacobian take more")
+
+
+def rigid(T: Any, what: str) -> Any:
+    """A copy (``pinocchio.SE3``) of a pose in any form that a person may give: every pose from outside passes here.
+
+    What rounding has left of a rotation, up to ``NOT_RIGID``, is made one again.
+
+    Args:
+        T: ``pinocchio.SE3``; a matrix, shape (4, 4); a position [x, y, z] alone [m], which is not turned; with roll,
+            pitch, yaw [rad] behind it, shape (6,); or with a quaternion x, y, z, w, shape (7,).
+        what: Its name, for messages.
+
+    Raises:
+        InputError: If it is none of these, has a number that is not finite, lies beyond ``LARGEST`` [m], or scales,
+            skews or mirrors.
+    """
+    if not isinstance(T, pin.SE3) and dimensions(T) == 1:
+        return _written_pose(T, what)
+    matrix = finite_array(T.homogeneous if isinstance(T, pin.SE3) else T, (4, 4), what)
+    x, y, z, last = matrix.tolist()  # numbers of Python's own: four rows are too few for numpy
+    if max(abs(last[0]), abs(last[1]), abs(last[2]), abs(last[3] - 1.0)) > LAST_ROW_TOLERANCE:
+        raise InputError(f"{what}: the last row must be 0 0 0 1, got {last}")
+    if max(abs(x[3]), abs(y[3]), abs(z[3])) > LARGEST:
+        raise InputError(f"{what}: its position {[x[3], y[3], z[3]]} is farther than {LARGEST:g} m away; check units")
+    lengths, corners = (_dot(x, x), _dot(y, y), _dot(z, z)), (_dot(x, y), _dot(y, z), _dot(z, x))
+    off = max(*(abs(square - 1.0) for square in lengths), *map(abs, corners))  # lengths first: they are never nan
+    if off > NOT_RIGID:
+        raise InputError(
+            f"{what}: its upper left 3 x 3 part is no rotation: {off:.3g} away from orthonormal "
+            f"(at most {NOT_RIGID:g}); make it orthonormal"
+        )
+    if left_handed(x, y, z):
+        raise InputError(
+            f"{what}: its upper left 3 x 3 part mirrors (determinant -1); make it orthonormal and right-handed"
+        )
+    if off > ROUNDING:
+        outer, _, inner = np.linalg.svd(matrix[:3, :3])  # the nearest rotation
+        return pin.SE3(outer @ inner, matrix[:3, 3])
+    return pin.SE3(matrix)
+
+
+def _written_pose(numbers: ArrayLike, what: str) -> Any:
+    values = finite_array(numbers, (None,), what)
+    if len(values) == 3:
+        return pin.SE3(np.eye(3), bounded_array(values, (3,), what))
+    if len(values) == 6:
+        return pose_from_rpy(values[:3], values[3:], what)
+    if len(values) == 7:
+        return pose(values[:3], values[3:], what)
+    raise InputError(
+        f"{what}: a pose is a pinocchio.SE3, a 4 x 4 matrix, [x, y, z], [x, y, z, roll, pitch, yaw] or "
+        f"[x, y, z, qx, qy, qz, qw], not {len(values)} numbers"
+    )
+
+
+def left_handed(x: Any, y: Any, z: Any) -> Any:
+    """Whether the determinant of three vectors is negative; their coordinates are numbers or arrays of them."""
+    return x[0] * (y[1] * z[2] - y[2] * z[1]) < x[1] * (y[0] * z[2] - y[2] * z[0]) - x[2] * (y[0] * z[1] - y[1] * z[0])
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def unit_vector(values: ArrayLike, what: str) -> Vector:
+    """A direction, shape (3,).
+
+    Raises:
+        InputError: If its length differs from 1 by more than 1e-3.
+    """
+    vector = finite_array(values, (3,), what)
+    length = float(np.linalg.norm(vector))
+    if abs(length - 1.0) > 1e-3:
+        raise InputError(f"{what} must have length 1, but has {length:.4g}; divide it by its length")
+    return vector / length
+
+
+def turned_z(direction: Vector) -> NDArray[np.float64]:
+    """The shortest rotation that takes z to a unit vector, shape (3,): (3, 3)."""
+    rotation: NDArray[np.float64] = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
+    return rotation
+
+
+def rotation_angles(rotations: NDArray[np.float64]) -> Vector:
+    """Angle of rotations, shape (m, 3, 3): atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2), accurate near 0 and pi."""
+    skew = (rotations - rotations.transpose(0, 2, 1)).reshape(len(rotations), 9)
+    sine = np.sqrt(np.vecdot(skew, skew) / 8.0)
+    angle: Vector = np.arctan2(sine, 0.5 * (rotations.trace(axis1=1, axis2=2) - 1.0))
+    return angle
+
+
+def rpy_matrices(angles: Matrix) -> NDArray[np.float64]:
+    """Rotations Rz(yaw) Ry(pitch) Rx(roll) for rows of roll, pitch, yaw [rad], shape (m, 3): (m, 3, 3)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(angles).T, np.sin(angles).T
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    matrices: NDArray[np.float64] = np.array(rows).transpose(2, 0, 1)
+    return matrices
+
+
+def joint_motions(axes: Matrix, prismatic: Mask, values: Matrix) -> NDArray[np.float64]:
+    """Transforms of n joints for values of shape (m, n): translations, or Rodrigues' rotation formula. (m, n, 4, 4)."""
+    motions = np.zeros((*values.shape, 4, 4))
+    motions[..., [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
+    cross = np.zeros((len(axes), 3, 3))
+    cross[:, [2, 0, 1], [1, 2, 0]], cross[:, [1, 2, 0], [2, 0, 1]] = axes, -axes
+    cross[prismatic] = 0.0  # they do not turn
+    sine, cosine = np.sin(values)[..., None, None], np.cos(values)[..., None, None]
+    motions[..., :3, :3] += sine * cross + (1.0 - cosine) * (cross @ cross)
+    motions[..., :3, 3][:, prismatic] = values[:, prismatic, None] * axes[prismatic]
+    return motions
+
+
+def cross_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cross products of rows, shape (m, 3); numpy's own is some five times slower for few rows."""
+    product = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
+    product -= a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+    return product

@@ -1,0 +1,331 @@
+"""Names to things: robots, planners and problems that installed packages offer through entry points, and robot files.
+
+Another package adds its own by entry points in the groups ``rrtik_ompl.robots`` (name -> a function that takes keyword
+options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrtik_ompl.problems`` (any name -> the
+``Path`` of a folder of problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``),
+``rrtik_ompl.tables`` (any name -> published tables for ``rrtik reproduce``, see `rrtik_bench.tables.Collection`) and
+``rrtik_ompl.workspaces`` (name of a robot -> a function that returns slices of its effective workspace, see
+`rrtik_ompl.ik.reach.grid_map.Slice`).
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.joint_ranges import narrowed
+from rrtik_ompl.description.joint_weights import weighted
+from rrtik_ompl.description.padding import padded
+from rrtik_ompl.description.robot_cache import RobotCache
+from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
+from rrtik_ompl.description.scaling import scaled
+from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
+from rrtik_ompl.description.xacro_text import expanding
+from rrtik_ompl.files.text import file_name
+from rrtik_ompl.model.robot import Robot
+
+# What an option of a robot can be: a name, a number, a file, a pose, or groups and lists of these.
+RobotOption: TypeAlias = (
+    str | float | os.PathLike[str] | Mapping[str, object] | Sequence[object] | NDArray[np.float64] | pin.SE3 | None
+)
+
+FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
+FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
+PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
+OF_CALLERS = ("trust_xacro", "xacro_limits")  # which no file may give
+OF_ALL: Mapping[str, Callable[..., Robot]] = {  # options of any robot
+    "scale": scaled,
+    "padding": padded,
+    "joint_ranges": narrowed,
+    "joint_weights": weighted,
+}
+MOUNTING = ("base_pose", "tip", *OF_ALL)  # keys that stand beside that group
+
+
+def list_robots() -> tuple[str, ...]:
+    """Names that `load_robot` knows."""
+    return tuple(sorted(_offers("robots")))
+
+
+def list_planners() -> tuple[str, ...]:
+    """Names of the planners that packages offer (OMPL's own are not among them)."""
+    return tuple(sorted(_offers("planners")))
+
+
+def find_planner(name: str) -> Any:
+    """Planner class of a name.
+
+    Raises:
+        UnknownNameError: If no package offers it.
+    """
+    return _load("planner", "planners", name)
+
+
+def find_workspace(robot: str) -> Callable[[], Any]:
+    """What draws a robot's effective workspace: a function without arguments that returns slices.
+
+    Raises:
+        UnknownNameError: If no package offers one for this robot.
+    """
+    found: Callable[[], Any] = _load("effective workspace of robot", "workspaces", robot)
+    return found
+
+
+def list_problems() -> tuple[str, ...]:
+    """Names of the problems that packages ship."""
+    return tuple(sorted(_problem_files()))
+
+
+def find_problem(name: str) -> Path:
+    """File of a shipped problem.
+
+    Raises:
+        UnknownNameError: If no package ships it.
+    """
+    files = _problem_files()
+    if name not in files:
+        raise UnknownNameError("problem", name, files)
+    return files[name]
+
+
+def list_suites() -> tuple[str, ...]:
+    """Names of the suites of benchmarks that packages ship."""
+    return tuple(sorted(_shipped("suite", "suites")))
+
+
+def find_suite(name: str) -> Path:
+    """File of a shipped suite.
+
+    Raises:
+        UnknownNameError: If no package ships it.
+    """
+    files = _shipped("suite", "suites")
+    if name not in files:
+        raise UnknownNameError("suite", name, files)
+    return files[name]
+
+
+def find_tables() -> tuple[Any, ...]:
+    """Collections of published tables that packages offer, one a package.
+
+    Raises:
+        InputError: If one of them cannot be loaded.
+    """
+    return tuple(_load("published tables", "tables", name) for name in sorted(_offers("tables")))
+
+
+def problem_folders() -> tuple[Path, ...]:
+    """Folders of the problems that packages ship."""
+    return _folders("problem", "problems")
+
+
+def task_files() -> dict[str, Path]:
+    """Files of the tasks that packages ship, by name; they lie in a folder below that of the problems."""
+    return _shipped("problem", "problems", "tasks/")
+
+
+def load_robot(
+    name: str | os.PathLike[str],
+    *,
+    trust_xacro: bool = False,
+    xacro_limits: Mapping[str, float] | None = None,
+    **options: RobotOption,
+) -> Robot:
+    """Load a robot by name or from a file; the same call gives the same object, unless a file of it has changed.
+
+    Args:
+        name: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
+            xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt configuration folder.
+        trust_xacro: Whether the expressions of macros go to xacro's own evaluator, which can run anything, and macros
+            may read files anywhere. Without it expressions that are not on a list are refused.
+        xacro_limits: What the expansion of macros may take: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
+        **options: What the robot takes: any ``scale`` (see `rrtik_ompl.scaled`), ``padding`` (`padded`),
+            ``joint_ranges`` (`narrowed`) and ``joint_weights`` (`weighted`), and ``base_pose``, ``tip`` and ``locked``
+            where they apply; a URDF ``srdf, group, joints, joint_limits, packages, xacro_args``, a folder also
+            ``urdf``; a shipped robot for instance ``limits="envelope"``. ``base_pose`` is a ``pinocchio.SE3`` or
+            ``{"xyz": [..], "quat_xyzw": [..]}``. With ``strict=True`` a URDF, folder or MJCF is refused of which a
+            `DescriptionWarning` would say that a name in it does not exist, that a posture is outside the limits, or
+            that something in it is not read.
+
+    Raises:
+        UnknownNameError: If there is no robot of that name.
+        InputError: If the robot does not take an option, or a file or value cannot be used.
+    """
+    recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
+    for option in options:
+        if option not in (*recipe.options, *OF_ALL):
+            takes = ", ".join(sorted((*recipe.options, *OF_ALL)))
+            raise InputError(f"robot '{os.fspath(name)}' takes no option '{option}'; it takes {takes}")
+    given = {key: _absolute(key, value) for key, value in options.items() if value is not None}
+    if "base_pose" in given:
+        given["base_pose"] = base_pose(given["base_pose"], f"robot '{os.fspath(name)}': base_pose")
+    key = json.dumps([recipe.target, plain(given)], sort_keys=True, default=repr)
+    cached = _cache.get(key)
+    if cached is None:
+        with expanding(trusted=trust_xacro, limits=xacro_limits):
+            robot = recipe.make(**{option: value for option, value in given.items() if option not in OF_ALL})
+        for option, of_all in OF_ALL.items():
+            robot = of_all(robot, given[option]) if option in given else robot
+        files = [recipe.target, *recipe.beside, *_paths(given), *_paths(robot.source)]
+        cached = _cache.put(key, replace(robot, source=recipe.source(given)), files)
+    return cached
+
+
+def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Robot:
+    """Robot that a problem file names under ``robot``.
+
+    Args:
+        entry: A name; or ``{name: .., options}``; or ``{urdf: FILE, options}``, ``{moveit: FOLDER, options}``, and so
+            with ``mjcf`` and ``dh``; ``{planar: {..}}``, ``{point2d: {..}}``, which take ``base_pose`` beside them.
+        folder: Folder of the problem file; files are named relative to it.
+
+    Raises:
+        InputError: If the entry has another form, or the robot cannot be loaded.
+    """
+    if isinstance(entry, str):
+        return load_robot(_beside(entry, folder) if Path(entry).suffix.lower() in FILE_KINDS else entry)
+    kinds = ("name", "moveit", "mjcf", "urdf", "dh", *PARAMETRIC)
+    if not isinstance(entry, Mapping):
+        raise InputError(f"robot: expected a name or one of the keys {', '.join(kinds)}")
+    _refuse_words_of_callers(entry)
+    found = [key for key in kinds if key in entry and not (key == "urdf" and "moveit" in entry)]
+    if len(found) != 1:
+        raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {', '.join(found) or 'none'}")
+    kind = found[0]
+    options = {key: _resolved(key, value, folder) for key, value in entry.items() if key != kind}
+    if kind in PARAMETRIC:
+        if not isinstance(entry[kind], Mapping):
+            raise InputError(f"robot: {kind}: expected a group of keys such as {{radius: 0.1}}")
+        return load_robot(kind, **dict(entry[kind]), **options)
+    target = entry[kind]
+    if not isinstance(target, str):
+        raise InputError(f"robot: {kind}: expected text, found {target!r}")
+    return load_robot(target if kind == "name" else _beside(target, folder), **options)
+
+
+def _refuse_words_of_callers(entry: Mapping[str, object]) -> None:
+    for key in OF_CALLERS:
+        if key in entry:
+            raise InputError(f"robot: {key} is for whoever opens the file to give, not for the file; take it out")
+
+
+@dataclass(frozen=True, slots=True)
+class _Recipe:
+    """How to make a robot: from what, with which options."""
+
+    kind: str
+    target: str
+    make: Callable[..., Robot]
+    options: tuple[str, ...]
+    beside: tuple[str, ...] = ()  # files that say how to make it, besides the target and the options
+
+    def source(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        options = source_entry(given)
+        if self.target not in PARAMETRIC:
+            return {self.kind: self.target} | options
+        beside = {key: options.pop(key) for key in MOUNTING if key in options}
+        return {self.target: options} | beside
+
+
+def _recipe(name: str | os.PathLike[str]) -> _Recipe:
+    text = os.fspath(name)
+    path = Path(text)
+    if isinstance(name, str) and text in _offers("robots"):
+        make = _load("robot", "robots", text)
+        return _Recipe("name", text, make, tuple(sorted(inspect.signature(make).parameters)))
+    suffix = path.suffix.lower()
+    if suffix in (".yaml", ".yml"):  # what reads YAML is not loaded before there is some
+        from rrtik_ompl.description.dh_file import DH_OPTIONS, robot_from_dh_file
+
+        return _Recipe("dh", str(path.resolve()), lambda **given: robot_from_dh_file(path, **given), DH_OPTIONS)
+    if suffix in (".xml", ".mjcf"):
+        from rrtik_ompl.description.mjcf import MJCF_OPTIONS, is_mjcf, robot_from_mjcf
+
+        if is_mjcf(path):
+            return _Recipe("mjcf", str(path.resolve()), lambda **given: robot_from_mjcf(path, **given), MJCF_OPTIONS)
+    if suffix in (".urdf", ".xml", ".xacro"):
+        return _Recipe("urdf", str(path.resolve()), lambda **given: robot_from_urdf(path, **given), URDF_OPTIONS)
+    if os.path.isdir(path):
+        from rrtik_ompl.description.moveit_config import CHOOSING_FILES, CONFIG_OPTIONS, robot_from_moveit
+
+        target = path.resolve()
+        beside = tuple(str(target / file) for file in CHOOSING_FILES)
+        return _Recipe("moveit", str(target), lambda **given: robot_from_moveit(path, **given), CONFIG_OPTIONS, beside)
+    if path.parent != Path() or os.path.exists(path):  # which takes a name of any length
+        raise InputError(f"{text}: not a robot file; expected a URDF (.urdf, .xacro), a DH table (.yaml) or a folder")
+    raise UnknownNameError("robot", text, list_robots())
+
+
+@cache
+def _offers(group: str) -> dict[str, Any]:
+    return {entry.name: entry for entry in _entry_points().select(group=f"rrtik_ompl.{group}")}
+
+
+@cache
+def _entry_points() -> Any:
+    """Those of all groups: looking through the installed packages takes most of the time, loading this 2 MB."""
+    return import_module("importlib.metadata").entry_points()
+
+
+@cache
+def _load(what: str, group: str, name: str) -> Any:
+    offers = _offers(group)
+    if name not in offers:
+        raise UnknownNameError(what, name, offers)
+    try:
+        return offers[name].load()
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"{what} '{name}': {offers[name].value} cannot be loaded: {error}; reinstall it") from error
+
+
+def _problem_files() -> dict[str, Path]:
+    return _shipped("problem", "problems")
+
+
+def _shipped(what: str, group: str, below: str = "") -> dict[str, Path]:
+    """YAML files by name in the folders that packages offer."""
+    return {file.stem: file for folder in _folders(what, group) for file in sorted(folder.glob(f"{below}*.yaml"))}
+
+
+def _folders(what: str, group: str) -> tuple[Path, ...]:
+    return tuple(Path(_load(f"{what} folder", group, name)) for name in _offers(group))
+
+
+def _beside(path: str, folder: str | os.PathLike[str]) -> Path:
+    return Path(folder) / path
+
+
+def _resolved(key: str, value: Any, folder: str | os.PathLike[str]) -> Any:
+    if key in FILE_OPTIONS and isinstance(value, str):
+        return _beside(value, folder)
+    if key == "packages" and not isinstance(value, Mapping):
+        return [_beside(str(item), folder) for item in ([value] if isinstance(value, str) else value)]
+    return value
+
+
+def _absolute(key: str, value: Any) -> Any:
+    """Files by their absolute path, so that the cache does not depend on the current folder."""
+    if key in FILE_OPTIONS and isinstance(value, (str, os.PathLike)):
+        return Path(value).absolute()
+    if key == "packages":
+        return [Path(item).absolute() for item in ([value] if isinstance(value, (str, os.PathLike)) else value)]
+    return value
+
+
+def _paths(options: Mapping[str, Any]) -> list[str]:
+    return [os.fspath(options[key]) for key in FILE_OPTIONS if isinstance(options.get(key), (str, os.PathLike))]
+
+
+_cache = RobotCache()

@@ -1,0 +1,89 @@
+"""MoveIt's ``joint_limits.yaml``: velocity, acceleration, jerk and position limits by joint."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.base.errors import UnknownNameError, few
+from rrtik_ompl.description.robot_build import JointLimits
+from rrtik_ompl.description.ros_parameters import parameters
+from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe, read_yaml
+
+RATES = ("velocity", "acceleration", "jerk")
+_FLAGS = ("position", "velocity", "acceleration", "deceleration", "jerk", "effort", "soft")
+_NUMBERS = ("min_position", "max_position", "max_velocity", "max_acceleration", "max_jerk")
+_UNUSED = ("max_deceleration", "min_jerk", "max_effort", "angle_wraparound", "k_position", "k_velocity")
+_SOFT = ("soft_lower_limit", "soft_upper_limit")
+_NARROWING = {"max_deceleration": "deceleration", "min_jerk": "jerk", **dict.fromkeys(_SOFT, "soft")}  # of _UNUSED
+_KEYS = (*(f"has_{flag}_limits" for flag in _FLAGS), *_NUMBERS, *_UNUSED, *_SOFT)
+
+
+def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> dict[str, JointLimits]:
+    """Read the limits of a robot's joints.
+
+    A limit counts unless its ``has_..._limits`` says false; ``has_velocity_limits: false`` lifts the URDF's own limit.
+
+    Args:
+        path: The file.
+        joints: Names of the robot's joints; any other name in the file is an error.
+
+    Raises:
+        InputError: If the file cannot be read, or a name, key or value in it makes no sense; with its line.
+    """
+    document = read_yaml(path)
+    known = tuple(joints)
+    top, found = parameters(document, "robot_description_planning")
+    table = found.get("joint_limits")
+    if not isinstance(table, Mapping):
+        raise document.error((*top, "joint_limits"), "expected 'joint_limits:' with one group of keys per joint")
+    limits = {}
+    for joint, values in table.items():
+        location: Location = (*top, "joint_limits", joint)
+        if joint not in known:
+            raise UnknownNameError("joint", joint, known, where=document.place(location))
+        if not isinstance(values, Mapping):
+            raise document.error(location, f"expected keys such as max_velocity, found {describe(values)}")
+        limits[joint] = _joint(document, location, values)
+    return limits
+
+
+def unread_limits(path: str | os.PathLike[str]) -> list[str]:
+    """What a file that :func:`read_joint_limits` takes says about limits and is not read: "max_deceleration of 'a'"."""
+    _, found = parameters(read_yaml(path), "robot_description_planning")
+    named: dict[str, list[str]] = {}
+    for joint, values in found["joint_limits"].items():
+        for key, flag in _NARROWING.items():
+            if values.get(key) is not None and values.get(f"has_{flag}_limits") is not False:
+                named.setdefault(key, []).append(f"'{joint}'")
+    return [f"{key} of {few(joints, 3)}" for key, joints in named.items()]
+
+
+def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]) -> JointLimits:
+    for key, value in values.items():
+        if key not in _KEYS:
+            raise UnknownNameError("key", key, _KEYS, where=document.place((*location, key)))
+        if key.startswith("has_") and not isinstance(value, bool):
+            raise document.error((*location, key), f"expected true or false, found {describe(value)}")
+        if key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False:  # else MoveIt writes 0
+            _number(document, (*location, key), value, positive=not key.endswith("position"))
+    found: dict[str, float | None] = {}
+    for rate in RATES:
+        has = values.get(f"has_{rate}_limits")
+        found[rate] = np.inf if has is False else values.get(f"max_{rate}")
+    if values.get("has_position_limits") is not False:
+        found |= {"lower": values.get("min_position"), "upper": values.get("max_position")}
+    low, high = found.get("lower"), found.get("upper")
+    if low is not None and high is not None and low >= high:
+        raise document.error((*location, "min_position"), f"{low:g} is not below max_position {high:g}; swap them")
+    return JointLimits(**{key: None if value is None else float(value) for key, value in found.items()})
+
+
+def _number(document: YamlDocument, location: Location, value: object, *, positive: bool) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        raise document.error(location, f"expected a finite number, found {describe(value)}")
+    if positive and value <= 0:
+        raise document.error(location, f"must be greater than 0, got {value:g}")

@@ -1,0 +1,198 @@
+"""A MoveIt configuration folder: which files describe the robot, and which group of its joints is the arm."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.package_path import package_folder
+from rrtik_ompl.description.ros_parameters import parameters
+from rrtik_ompl.description.srdf import Srdf, read_srdf
+from rrtik_ompl.description.tree import Tree
+from rrtik_ompl.description.urdf import URDF_OPTIONS, package_roots, robot_from_urdf
+from rrtik_ompl.description.urdf_read import read_urdf
+from rrtik_ompl.description.xacro_text import is_xacro, robot_text
+from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.model.robot import Robot
+
+ASSISTANT = ".setup_assistant"  # where MoveIt's setup assistant writes which URDF a folder is for
+CHOOSING_FILES = (ASSISTANT, "kinematics.yaml", "config/kinematics.yaml", ".", "config")  # which URDF, which group
+SIMULATED = "gazebo_"  # begins the name of the URDF that the assistant writes for Gazebo, maybe long ago
+CONFIG_OPTIONS = tuple(sorted({*URDF_OPTIONS, "urdf"}))
+FilePath = str | os.PathLike[str]
+
+
+def robot_from_moveit(folder: FilePath, **options: Any) -> Robot:
+    """Load a robot from a folder that MoveIt's setup assistant wrote.
+
+    Read are the SRDF (groups, postures, allowed collisions, end effectors), ``joint_limits.yaml``, ``kinematics.yaml``
+    (which groups have inverse kinematics; the solver is ours), and the URDF: one in the folder, that of the package
+    which ``.setup_assistant`` names, with the arguments that stand there, or a ``.urdf.xacro`` in the folder. Robots of
+    several groups need ``group`` if not exactly one has a solver.
+
+    Args:
+        folder: With the files, or with a folder ``config`` that has them.
+        **options: As of `rrtik_ompl.description.urdf.robot_from_urdf_text`, and ``urdf``; a file that is given is read
+            in place of the folder's; ``xacro_args`` are added to the folder's.
+
+    Raises:
+        InputError: If a file is missing or cannot be used; one line names it and the remedy.
+    """
+    found = {**options, **config_files(folder, options)}
+    return robot_from_urdf(found.pop("urdf"), **found)
+
+
+def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The files of a folder, ``urdf, srdf, joint_limits``, the arguments of macros, and the ``group``.
+
+    What is given stays so; arguments of macros that are given are added to the folder's.
+
+    Raises:
+        InputError: See :func:`robot_from_moveit`.
+    """
+    home = Path(folder)
+    config = home / "config" if os.path.isdir(home / "config") else home
+    if not os.path.isdir(config):
+        raise InputError(f"{folder}: no such folder; give a MoveIt configuration folder")
+    packages = package_roots(given.get("packages", ()))
+    named = _assistant(home, config)
+    srdf = given.get("srdf") or _srdf(home, config, named)
+    urdf = Path(given.get("urdf") or _urdf(home, config, named, packages))
+    found: dict[str, Any] = {"urdf": urdf, "srdf": Path(srdf)}
+    arguments = dict(given.get("xacro_args") or {})
+    if is_xacro(urdf) and not given.get("urdf"):
+        arguments = _xacro_args(home, named) | arguments
+    if arguments:
+        found["xacro_args"] = arguments
+    limits = given.get("joint_limits") or config / "joint_limits.yaml"
+    if given.get("joint_limits") or os.path.isfile(limits):
+        found["joint_limits"] = Path(limits)
+    if given.get("group") is None and given.get("joints") is None:
+        found["group"] = _group(home, config, found, packages)
+    return found
+
+
+def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
+    """What the setup assistant wrote about the URDF and the SRDF: ``{"urdf": {..}, "srdf": {..}}``."""
+    file = next((each for each in (home / ASSISTANT, config.parent / ASSISTANT) if os.path.isfile(each)), None)
+    if file is None:
+        return {}
+    document = read_yaml(file)
+    top = document.data.get("moveit_setup_assistant_config")
+    if not isinstance(top, Mapping):
+        raise document.error(("moveit_setup_assistant_config",), "expected a group of keys of MoveIt's setup assistant")
+    return {str(key).lower(): value for key, value in top.items() if isinstance(value, Mapping)}
+
+
+def _srdf(home: Path, config: Path, named: Mapping[str, Any]) -> Path:
+    relative = named.get("srdf", {}).get("relative_path")
+    if isinstance(relative, str) and os.path.isfile(home / relative):
+        return home / relative
+    return _only(config, ("*.srdf", "*.srdf.xacro"), "SRDF", "srdf") or _missing(config, "SRDF", "srdf")
+
+
+def _xacro_args(home: Path, named: Mapping[str, Any]) -> dict[str, str]:
+    """Arguments with which the setup assistant has expanded the URDF, as behind the command xacro.
+
+    One text, or a list of words; words such as ``--inorder`` are switches of the command and not for the macros.
+    """
+    given = named.get("urdf", {}).get("xacro_args") or ""
+    texts = given if isinstance(given, list) else [given]
+    found = {}
+    for word in (word for text in texts for word in str(text).split()):
+        name, assigned, value = word.partition(":=")
+        if assigned and name:
+            found[name] = value
+        elif not name.startswith("-"):
+            raise InputError(f"{home / ASSISTANT}: xacro_args: expected words such as name:=value, found '{word}'")
+    return found
+
+
+def _urdf(home: Path, config: Path, named: Mapping[str, Any], packages: Iterable[Path]) -> Path:
+    own = _only(config, ("*.urdf",), "URDF", "urdf")
+    if own is not None:
+        return own
+    package, relative = (named.get("urdf", {}).get(key) for key in ("package", "relative_path"))
+    where = package_folder(package, home.resolve(), packages) if isinstance(package, str) else None
+    if where is not None and isinstance(relative, str) and os.path.isfile(where / relative):
+        return where / relative
+    own = _only(config, ("*.urdf.xacro",), "URDF", "urdf") or _only(config, (f"{SIMULATED}*.urdf",), "URDF", "urdf")
+    if own is None and isinstance(package, str):
+        raise InputError(
+            f"{home / ASSISTANT}: the URDF {relative} of package '{package}' is not found; "
+            f"give packages=[the folder that holds '{package}'], or urdf=FILE"
+        )
+    return own or _missing(config, "URDF", "urdf")
+
+
+def _missing(config: Path, kind: str, option: str) -> Path:
+    raise InputError(f"{config}: no {kind} in this folder; is it of MoveIt? give {option}=FILE")
+
+
+def _only(config: Path, patterns: Iterable[str], kind: str, option: str) -> Path | None:
+    """The only file of the first pattern that any file has; None if none has. Those for Gazebo must be asked for."""
+    for pattern in patterns:
+        asked_for = pattern.startswith(SIMULATED)
+        found = sorted(file for file in config.glob(pattern) if asked_for or not file.name.startswith(SIMULATED))
+        if len(found) > 1:
+            names = ", ".join(each.name for each in found)
+            raise InputError(f"{config}: {len(found)} files are an {kind}: {names}; choose one by {option}=FILE")
+        if found:
+            return found[0]
+    return None
+
+
+def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Path]) -> str:
+    """The group that is the arm: the only one that has a solver, or the only one that moves; but no gripper's."""
+    semantics = read_srdf(robot_text(files["srdf"], packages), str(files["srdf"]))
+    urdf = files["urdf"]
+    text = robot_text(urdf, packages, files.get("xacro_args"))
+    tree = read_urdf(text, where=str(urdf), folder=urdf.resolve().parent, packages=packages).tree
+    sizes = {name: _size(semantics, name, tree) for name in semantics.groups}
+    moving = [name for name, size in sizes.items() if size > 0]
+    solved = _solved(config, semantics)
+    grippers = _grippers(semantics, sizes, solved)
+    arms = [name for name in moving if name not in grippers] or moving
+    for names in ([name for name in arms if name in solved], arms):
+        if len(names) == 1:
+            return names[0]
+    choice = ", ".join(arms) or "none that moves"
+    raise InputError(f"{home}: which group is the arm? choose one by group=, of {choice}")
+
+
+def _size(semantics: Srdf, group: str, tree: Tree) -> int:
+    """Number of movable joints of a group; 1 if it names what is not there, which an error says if it is chosen."""
+    try:
+        return len(semantics.movable(group, tree))
+    except InputError:
+        return 1
+
+
+def _grippers(semantics: Srdf, sizes: Mapping[str, int], solved: set[str]) -> set[str]:
+    """Groups of end effectors, but for one that an SRDF calls so by mistake: it has more joints than any other one.
+
+    Where another one has as many, a solver tells.
+    """
+    found = set()
+    for end in semantics.end_effectors:
+        if end.group in sizes and end.group != end.parent_group:
+            most = max((size for name, size in sizes.items() if name != end.group), default=0)
+            if (sizes[end.group], end.group in solved) <= (most, False):
+                found.add(end.group)
+    return found
+
+
+def _solved(config: Path, semantics: Srdf) -> set[str]:
+    """Groups for which ``kinematics.yaml`` names a solver."""
+    file = config / "kinematics.yaml"
+    if not os.path.isfile(file):
+        return set()
+    document = read_yaml(file)
+    top, found = parameters(document, "robot_description_kinematics")
+    for name in found:
+        if name not in semantics.groups:
+            raise UnknownNameError("group", name, semantics.groups, where=document.place((*top, name)))
+    return set(found)

@@ -1,0 +1,281 @@
+"""SRDF (MoveIt's semantic description): groups of joints, named states, pairs of links that are never checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from xml.etree.ElementTree import Element
+
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.faults import nearest_name
+from rrtik_ompl.description.tree import Tree
+from rrtik_ompl.description.urdf_read import attribute, element_lines, numbers, parse_xml
+
+# Where an SRDF names something that must be there: elements, the attribute, what is named by it.
+MENTIONS = (
+    ("disable_collisions", "link1", "link"),
+    ("disable_collisions", "link2", "link"),
+    ("enable_collisions", "link1", "link"),
+    ("enable_collisions", "link2", "link"),
+    ("disable_default_collisions", "link", "link"),
+    ("group/link", "name", "link"),
+    ("group/chain", "base_link", "link"),
+    ("group/chain", "tip_link", "link"),
+    ("group/joint", "name", "joint"),
+    ("group/group", "name", "group"),
+    ("group_state", "group", "group"),
+    ("group_state/joint", "name", "joint"),
+    ("end_effector", "parent_link", "link"),
+    ("end_effector", "group", "group"),
+    ("end_effector", "parent_group", "group"),
+    ("passive_joint", "name", "joint"),
+    ("virtual_joint", "child_link", "link"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Mention:
+    """That an element names a link, joint or group: where it stands, its tag, which of the three, and the name."""
+
+    place: str
+    tag: str
+    kind: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """One planning group: what its joints are collected from."""
+
+    name: str
+    chains: tuple[tuple[str, str], ...] = ()
+    joints: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
+    subgroups: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EndEffector:
+    """What is at the end of a group: the link that holds it, the group of its own joints, the group that it ends."""
+
+    name: str
+    parent_link: str
+    group: str
+    parent_group: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Srdf:
+    """What an SRDF says.
+
+    Attributes:
+        where: File name for messages.
+        name: Of the robot.
+        groups: By name.
+        states: Joint values [rad or m] by (group, state).
+        allowed: Pairs of link names never checked against each other.
+        never: Links that are checked against none, but those that a pair of ``checked`` names.
+        checked: Pairs that are checked although one of them is in ``never``.
+        end_effectors: In the order of the file.
+        passive: Joints that no motor moves.
+        virtual: Joints between the world and the base.
+        mentions: All names of links, joints and groups that must exist.
+        places: File and line of each state, by (group, state).
+    """
+
+    where: str
+    name: str = ""
+    groups: Mapping[str, Group] = field(default_factory=dict)
+    states: Mapping[tuple[str, str], Mapping[str, float]] = field(default_factory=dict)
+    allowed: frozenset[frozenset[str]] = frozenset()
+    never: frozenset[str] = frozenset()
+    checked: frozenset[frozenset[str]] = frozenset()
+    end_effectors: tuple[EndEffector, ...] = ()
+    passive: frozenset[str] = frozenset()
+    virtual: frozenset[str] = frozenset()
+    mentions: tuple[Mention, ...] = ()
+    places: Mapping[tuple[str, str], str] = field(default_factory=dict)
+
+    def unknown_names(self, tree: Tree) -> list[str]:
+        """A line for each name that neither the robot nor the file has, with its place and the nearest name."""
+        known = {
+            "link": {link.name for link in tree.links},
+            "joint": {joint.name for joint in tree.joints} | self.virtual,
+            "group": set(self.groups),
+        }
+        first: dict[tuple[str, str], Mention] = {}
+        for mention in self.mentions:
+            if mention.name not in known[mention.kind]:
+                first.setdefault((mention.kind, mention.name), mention)
+        return [
+            f"{each.place}: <{each.tag}>: no {each.kind} '{each.name}'{nearest_name(each.name, known[each.kind])}"
+            for each in first.values()
+        ]
+
+    def short_states(self, group: str | None, joints: Iterable[str]) -> list[str]:
+        """A line for each state of a group that lacks a value of one of some joints, and is thus no posture."""
+        found = []
+        for (owner, state), values in self.states.items():
+            lacking = [joint for joint in joints if joint not in values]
+            if owner == group and lacking:
+                place = self.places[owner, state]
+                found.append(f"{place}: group_state '{state}' has no value of joint '{lacking[0]}' and is left out")
+        return found
+
+    def of_another(self, name: str, where: str) -> list[str]:
+        """A line if the file is of a robot of another name than the one that a URDF describes."""
+        if not self.name or not name or self.name == name:
+            return []
+        return [f"{self.where}: it is of robot '{self.name}', and {where} describes '{name}'; is it the right file?"]
+
+    def moved_passive(self, joints: Iterable[str]) -> list[str]:
+        """A line for each of some joints, which move, that has no motor."""
+        moving = set(joints)
+        return [
+            f"{each.place}: <{each.tag}>: joint '{each.name}' has no motor and is moved like the others; "
+            "choose by group= or joints="
+            for each in self.mentions
+            if each.tag == "passive_joint" and each.name in moving
+        ]
+
+    def place_of(self, state: str, group: str | None) -> str:
+        """File and line of a state of a group, or of another group if this one has no such state."""
+        places = [place for (_, name), place in self.places.items() if name == state]
+        return self.places.get((group or "", state), places[-1] if places else self.where)
+
+    def group_joints(self, group: str, tree: Tree) -> tuple[str, ...]:
+        """Movable joints of a group, parents before children.
+
+        Raises:
+            InputError: If the group does not exist, is empty, or names a joint or link that the robot does not have.
+        """
+        chosen = self.movable(group, tree)
+        if not chosen:
+            raise InputError(f"{self.where}: group '{group}' holds no movable joint; choose another group")
+        return chosen
+
+    def movable(self, group: str, tree: Tree) -> tuple[str, ...]:
+        """As :meth:`group_joints`, of a group that may have none.
+
+        Raises:
+            InputError: If the group does not exist, or names a joint or link that the robot does not have.
+        """
+        wanted = self._members(group, tree, ()) - self.passive
+        return tuple(joint.name for joint in tree.walk() if joint.name in wanted and joint.kind != "fixed")
+
+    def allowed_pairs(self, tree: Tree) -> frozenset[frozenset[str]]:
+        """Pairs of links of a robot that are never checked against each other."""
+        everything = {frozenset((link, other.name)) for link in self.never for other in tree.links}
+        return self.allowed | frozenset(pair for pair in everything - self.checked if len(pair) == 2)
+
+    def group_tip(self, group: str, tree: Tree) -> str:
+        """Link at the end of a group: its chain's, else its end effector's, else the child of its last joint."""
+        chains = self.groups[group].chains
+        if chains:
+            return chains[-1][1]
+        links = {link.name for link in tree.links}
+        for end in self.end_effectors:
+            if group in (end.parent_group, end.group) and end.parent_link in links:
+                return end.parent_link
+        last = self.group_joints(group, tree)[-1]
+        return next(joint.child for joint in tree.joints if joint.name == last)
+
+    def postures(self, group: str | None) -> dict[str, dict[str, float]]:
+        """Named states merged over all groups; those of ``group`` win where two share a name."""
+        merged: dict[str, dict[str, float]] = {}
+        for (_, state), values in sorted(self.states.items(), key=lambda item: item[0][0] == group):
+            merged.setdefault(state, {}).update(values)
+        return merged
+
+    def _members(self, name: str, tree: Tree, above: tuple[str, ...]) -> set[str]:
+        if name not in self.groups:
+            raise UnknownNameError("group", name, self.groups, where=self.where)
+        if name in above:
+            raise InputError(f"{self.where}: group '{name}' contains itself; take it out")
+        group, where = self.groups[name], f"{self.where}: group '{name}'"
+        joints = [joint.name for joint in tree.joints]
+        above_link = {joint.child: joint.name for joint in tree.joints}
+        members = set()
+        for joint in group.joints:
+            if joint not in joints and joint not in self.virtual:
+                raise UnknownNameError("joint", joint, joints, where=where)
+            members.add(joint)
+        for link in group.links:
+            if link not in above_link and link != tree.root.name:
+                raise UnknownNameError("link", link, [x.name for x in tree.links], where=where)
+            members |= {above_link[link]} if link in above_link else set()
+        for base, tip in group.chains:
+            members |= {joint.name for joint in tree.chain(tip, base)}
+        for subgroup in group.subgroups:
+            members |= self._members(subgroup, tree, (*above, name))
+        return members
+
+
+def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
+    """Read SRDF text. Names are compared with the robot only when they are used.
+
+    Raises:
+        InputError: If the text is not XML, or an element lacks what it must have; the message names it.
+    """
+    robot = parse_xml(text, "robot", where)
+    lines = element_lines(robot, text, where)
+    groups = [_group(element, where) for element in robot.findall("group")]
+    states: dict[tuple[str, str], dict[str, float]] = {}
+    places: dict[tuple[str, str], str] = {}
+    for element in robot.findall("group_state"):
+        name = attribute(element, "group_state", "name", where)
+        states[(element.get("group", ""), name)] = _state(element, f"{where}: group_state '{name}'")
+        places[(element.get("group", ""), name)] = lines[element]
+    mentions = tuple(
+        Mention(lines[element], element.tag, kind, element.get(key, ""))
+        for tags, key, kind in MENTIONS
+        for element in robot.findall(tags)
+        if element.get(key)
+    )
+    ends = tuple(
+        EndEffector(*(element.get(key, "") for key in ("name", "parent_link", "group", "parent_group")))
+        for element in robot.findall("end_effector")
+    )
+    return Srdf(
+        where=where,
+        name=robot.get("name", ""),
+        groups={group.name: group for group in groups},
+        states=states,
+        allowed=_pairs(robot, "disable_collisions"),
+        never=frozenset(e.get("link", "") for e in robot.findall("disable_default_collisions")),
+        checked=_pairs(robot, "enable_collisions"),
+        end_effectors=ends,
+        passive=frozenset(e.get("name", "") for e in robot.findall("passive_joint")),
+        virtual=frozenset(e.get("name", "") for e in robot.findall("virtual_joint")),
+        mentions=mentions,
+        places=places,
+    )
+
+
+def _pairs(robot: Element, tag: str) -> frozenset[frozenset[str]]:
+    pairs = (frozenset((e.get("link1", ""), e.get("link2", ""))) for e in robot.findall(tag))
+    return frozenset(pair for pair in pairs if len(pair) == 2)
+
+
+def _group(element: Element, where: str) -> Group:
+    name = attribute(element, "group", "name", where)
+    place = f"{where}: group '{name}'"
+
+    def names(tag: str) -> tuple[str, ...]:
+        return tuple(attribute(item, tag, "name", place) for item in element.findall(tag))
+
+    chains = tuple(
+        (attribute(c, "chain", "base_link", place), attribute(c, "chain", "tip_link", place))
+        for c in element.findall("chain")
+    )
+    return Group(name, chains, names("joint"), names("link"), names("group"))
+
+
+def _state(element: Element, where: str) -> dict[str, float]:
+    values = {}
+    for joint in element.findall("joint"):
+        name = attribute(joint, "joint", "name", where)
+        words = (joint.get("value") or "").split()
+        if len(words) == 1:  # states of planar and floating joints hold more numbers and are not ours
+            values[name] = numbers(joint, "value", 1, None, f"{where}: joint '{name}'")[0]
+    return values

@@ -1,0 +1,1 @@
+"""Solids, the pairs that must not touch, and spheres around solids."""

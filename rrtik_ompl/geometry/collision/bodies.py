@@ -1,0 +1,324 @@
+"""The solids of a world, robot links and obstacles alike, and the pairs of them that must not touch."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import chain, combinations, compress
+from operator import not_
+from typing import Any, TypeAlias
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, UnknownNameError, few
+from rrtik_ompl.geometry.collision.collector import collector_waits
+from rrtik_ompl.geometry.collision.joined_links import joined_links
+from rrtik_ompl.geometry.collision.shape_table import Piece, pieces
+from rrtik_ompl.geometry.collision.solids import robot_solids
+from rrtik_ompl.geometry.collision.thickness import SHARE, least_width
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
+
+ALWAYS_COLLIDING_SAMPLES = 64
+DEPTH_TOLERANCE = 1e-9  # [m] of rounding, of depths that files hold
+
+Pairs: TypeAlias = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """One coal geometry that moves with a joint.
+
+    Attributes:
+        name: The link, obstacle or attached object that it belongs to; several bodies may share a name.
+        joint: Pinocchio joint number; 0 stands still.
+        placement: ``pinocchio.SE3`` in the joint's frame.
+        geometry: The coal geometry.
+        kind: "link", "attached" or "obstacle".
+        margin: Of an obstacle how far what moves must stay from it, of a link or attached object how far other ones
+            must [m].
+        padding: How much thicker a link or attached object is than its geometry [m]; of the latter with its own margin.
+        within: Of an obstacle or attached object of several pieces: where this one is in the frame of the whole
+            (``pinocchio.SE3``). Whoever puts an obstacle elsewhere puts this piece at ``pose * within``.
+        contacts: Names of what it is in contact with, and how near each other the two may come [m], in the place of
+            margins and paddings; negative is a depth.
+    """
+
+    name: str
+    joint: int
+    placement: Any
+    geometry: Any
+    kind: str
+    margin: float = 0.0
+    padding: float = 0.0
+    within: Any = field(default_factory=pin.SE3.Identity)
+    contacts: tuple[tuple[str, float], ...] = ()
+
+
+@lru_cache(maxsize=16)
+def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
+    """The robot's own bodies, with a margin [m] and their paddings."""
+    own = [(item, robot.link_of(item)) for item in robot.collision.geometryObjects]
+    return tuple(
+        Body(link, item.parentJoint, item.placement, solid, "link", margin, robot.padding.get(link, 0.0))
+        for (item, link), solid in zip(own, robot_solids(robot), strict=True)
+    )
+
+
+@collector_waits
+def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body, ...]:
+    """Bodies of all obstacles and attached objects, these with a margin [m].
+
+    Raises:
+        UnknownNameError: If an attached object names a link that the robot does not have.
+        InputError: If an obstacle has the name of a link.
+    """
+    links = robot.link_names
+    for name in scene.names:
+        if name in links:
+            raise InputError(f"scene: '{name}' is also the name of a link of robot '{robot.name}'; rename the obstacle")
+    found = []
+    for obstacle in scene.obstacles:
+        found += [
+            Body(
+                obstacle.name,
+                0,
+                obstacle.pose * piece.placement,
+                piece.geometry,
+                "obstacle",
+                obstacle.margin,
+                within=piece.placement,
+            )
+            for piece in _pieces(obstacle)
+        ]
+    for item in scene.attached:
+        if item.link not in links:
+            raise UnknownNameError(f"link of robot '{robot.name}'", item.link, links, where=f"attached '{item.name}'")
+        for name in item.allow:
+            if name not in links and name not in scene.names:
+                known = (*links, *scene.names)
+                raise UnknownNameError("link or obstacle", name, known, where=f"allow of attached '{item.name}'")
+        frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
+        mount = frame.placement * item.pose
+        thickness = item.margin + (robot.padding.get(item.link, 0.0) if item.padding is None else item.padding)
+        found += [
+            Body(
+                item.name,
+                frame.parentJoint,
+                mount * piece.placement,
+                piece.geometry,
+                "attached",
+                margin,
+                thickness,
+                piece.placement,
+            )
+            for piece in _pieces(item)
+        ]
+    return tuple(found)
+
+
+def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
+    """How deep two things in contact may overlap at most [m], by their names; infinite if one has no body.
+
+    Args:
+        bodies: All bodies of a world.
+        first: Name of a link, obstacle or attached object.
+        second: That of the other.
+    """
+    least = {first: np.inf, second: np.inf}
+    for body in bodies:
+        if body.name in least:
+            least[body.name] = min(least[body.name], least_width(body.geometry))
+    return SHARE * sum(least.values())
+
+
+def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
+    """The bodies of a world, with the contacts of its scene.
+
+    Raises:
+        UnknownNameError: If a contact names something that does not exist.
+        InputError: If it is between two links, or lets two overlap so deep that they could pass through each other.
+    """
+    if not scene.contacts:
+        return tuple(bodies)
+    known = {*robot.link_names, *scene.names}
+    found: dict[str, list[tuple[str, float]]] = {}
+    for contact in scene.contacts:
+        for name in contact.names:
+            if name not in known:
+                raise UnknownNameError("link or obstacle", name, known, where="contacts of a scene")
+        if not contact.pair & set(scene.names):
+            raise InputError(f"contacts of a scene: '{contact.first}' and '{contact.second}' are links; name an object")
+        deepest = deepest_contact(bodies, *contact.names)
+        if contact.distance < -deepest - DEPTH_TOLERANCE:
+            raise InputError(
+                f"contacts of a scene: {contact}, and could pass through each other: they are too thin for more than "
+                f"{1e3 * deepest:.3g} mm"
+            )
+        for name, other in (contact.names, contact.names[::-1]):
+            found.setdefault(name, []).append((other, contact.distance))
+    return tuple(replace(body, contacts=tuple(found[body.name])) if body.name in found else body for body in bodies)
+
+
+def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
+    try:
+        return pieces(item.shape)
+    except InputError as error:
+        raise InputError(f"scene: '{item.name}': {error}") from None
+
+
+@collector_waits
+def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:
+    """Numbers of the bodies that must not touch: all but what is rigidly joined or allowed, and adjacent links.
+
+    Links are adjacent if one joint of the description joins them (`joined_links`): they overlap at it by construction.
+    What a link holds does not, so it is checked against all links but its own and those that it is allowed to touch.
+
+    Args:
+        robot: The robot.
+        scene: What surrounds it, and what it holds.
+        bodies: Those of `link_bodies`, then those of `scene_bodies`.
+
+    Raises:
+        UnknownNameError: If an allowed collision names something that does not exist.
+    """
+    allowed = _allowed(robot, scene)
+    of_links = _pairs_of_links(robot)
+    own = [k for k, body in enumerate(bodies) if body.kind != "obstacle"]
+    found = [
+        (i, j)
+        for place, i in enumerate(own if robot.self_collision else ())
+        for j in own[place + 1 :]
+        if ((i, j) in of_links if bodies[j].kind == "link" else _may_meet(bodies[i], bodies[j]))
+        and frozenset((bodies[i].name, bodies[j].name)) not in allowed
+    ]
+    obstacles = [(k, body.name) for k, body in enumerate(bodies) if body.kind == "obstacle"]
+    for i in own:
+        met = {name for pair in allowed if bodies[i].name in pair for name in pair}
+        found += [(i, j) if i < j else (j, i) for j, name in obstacles if name not in met]
+    return tuple(sorted(found))
+
+
+def by_motion(bodies: Sequence[Body], pairs: Pairs) -> tuple[Pairs, Pairs]:
+    """The pairs of which a body moves, and those that both stand still."""
+    moves = np.array([body.joint > 0 for body in bodies], dtype=bool)
+    some: list[bool] = np.logical_or(*moves[pair_array(pairs).T]).tolist()
+    return tuple(compress(pairs, some)), tuple(compress(pairs, map(not_, some)))
+
+
+def pair_array(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+    """Pairs as an array, shape (n, 2); made of many tuples it takes numpy itself five times as long."""
+    return np.fromiter(chain.from_iterable(pairs), np.int64, 2 * len(pairs)).reshape(-1, 2)
+
+
+def _may_meet(first: Body, second: Body) -> bool:
+    """Whether two bodies of the robot, or what it holds, are neither one thing nor rigidly joined."""
+    return first.name != second.name and first.joint != second.joint
+
+
+def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
+    known = {*robot.link_names, *scene.names}
+    for pair in scene.allowed_collisions:
+        for name in pair:
+            if name not in known:
+                raise UnknownNameError("link or obstacle", name, known, where="allowed_collisions")
+    allowed = {frozenset(pair) for pair in scene.allowed_collisions}
+    for item in scene.attached:
+        allowed |= {frozenset((item.name, link)) for link in (item.link, *item.allow)}
+    return allowed
+
+
+@lru_cache(maxsize=16)
+def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
+    """Numbers of the bodies of links that must not touch.
+
+    A description without a list of allowed pairs says nothing about solids that overlap by construction; two that
+    touch in every one of many random postures can only be such ones. They are left out, and a warning names them. With
+    a list that is done only for links between which other programs may not look: those joined by links without solids
+    or by joints that are fixed or held, and those that are asked for although a joint joins them.
+    """
+    bodies = link_bodies(robot)
+    solids = [item.name for item in robot.collision.geometryObjects]
+    joined = joined_links(robot)
+    nearest = _carrying_parents(robot, bodies)
+    pairs: list[tuple[int, int]] = []
+    doubtful: list[tuple[int, int]] = []
+    for i, j in combinations(range(len(bodies)), 2):
+        first, second = bodies[i], bodies[j]
+        names = frozenset((first.name, second.name))
+        wanted = names in robot.checked_collisions
+        if (
+            not _may_meet(first, second)
+            or (names in joined and not wanted)
+            or names in robot.allowed_collisions
+            or frozenset((solids[i], solids[j])) in robot.unchecked_solids
+        ):
+            continue
+        pairs.append((i, j))
+        if not robot.allowed_collisions or wanted or _adjacent(first.joint, second.joint, nearest):
+            doubtful.append((i, j))
+    if not robot.self_collision:
+        return frozenset(pairs)
+    return frozenset(pairs) - _always_touching(robot, bodies, doubtful)
+
+
+def _carrying_parents(robot: Robot, bodies: Iterable[Body]) -> dict[int, int]:
+    """For each joint that carries a body: the nearest joint towards the base that also does."""
+    carrying = {0} | {body.joint for body in bodies}
+    found = {0: 0}
+    for joint in carrying - {0}:
+        above = int(robot.model.parents[joint])
+        while above not in carrying:
+            above = int(robot.model.parents[above])
+        found[joint] = above
+    return found
+
+
+def _adjacent(first: int, second: int, parents: Mapping[int, int]) -> bool:
+    """Whether one of two joints is the parent of the other."""
+    return bool(parents[first] == second or parents[second] == first)
+
+
+def _always_touching(robot: Robot, bodies: tuple[Body, ...], pairs: Sequence[tuple[int, int]]) -> set[tuple[int, int]]:
+    """Those of the pairs that touch in every posture of a sample; a warning names them."""
+    rng = np.random.default_rng(0)
+    samples = robot.joint_frames(rng.uniform(*robot.finite_range(), (ALWAYS_COLLIDING_SAMPLES, robot.dof)))
+    suspects = set(pairs)
+    for frames in samples:
+        suspects = {p for p in suspects if _touch(bodies[p[0]], bodies[p[1]], frames)}
+    if suspects:
+        names = [" and ".join(_solid_name(bodies, k) for k in pair) for pair in sorted(suspects)]
+        message = (
+            f"robot '{robot.name}': not checked, as they touch in each of {ALWAYS_COLLIDING_SAMPLES} random postures: "
+            f"{few(names)}; correct them, or let them touch: <disable_collisions> of an SRDF, <exclude> of an MJCF"
+        )
+        warnings.warn(DescriptionWarning(message), stacklevel=2)
+    return suspects
+
+
+def _solid_name(bodies: tuple[Body, ...], number: int) -> str:
+    """The link of a body; with its number in the link, counted from 1, if that has several."""
+    link = bodies[number].name
+    own = [k for k, body in enumerate(bodies) if body.name == link]
+    return f"'{link}'" if len(own) == 1 else f"'{link}' (solid {own.index(number) + 1})"
+
+
+def far_apart(first: Body, second: Body, distance: float) -> bool:
+    """Whether the balls around two bodies that stand still are farther apart than a distance [m]."""
+    one, other = (body.placement.act(body.geometry.aabb_center).tolist() for body in (first, second))
+    reach = first.geometry.aabb_radius + second.geometry.aabb_radius + distance
+    return bool(math.dist(one, other) > reach)  # no number where one of them has no end
+
+
+def _touch(first: Body, second: Body, frames: Sequence[pin.SE3]) -> bool:
+    poses = [pin.SE3(frames[b.joint]) * b.placement for b in (first, second)]
+    transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
+    result = coal.CollisionResult()
+    request = coal.CollisionRequest()
+    return bool(coal.collide(first.geometry, transforms[0], second.geometry, transforms[1], request, result))

@@ -1,0 +1,111 @@
+"""What the checks of a world ask of every body, as arrays: one call for thousands of bodies, whatever their number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from weakref import WeakValueDictionary
+
+import coal
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.margins import contact_distance
+
+UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box
+
+
+@dataclass(frozen=True, eq=False)
+class BodyArrays:
+    """Numbers of n bodies.
+
+    Attributes:
+        joints: Pinocchio's numbers of their joints, 0 for what stands still, shape (n,).
+        placements: Their poses in the joints' frames, shape (n, 4, 4).
+        centres, halves: Of their bounding boxes in their own frames [m], shape (n, 3) each; a half-space has an endless
+            box about its origin.
+        half_spaces, obstacles: Which are half-spaces and which obstacles, shape (n,) each.
+        margins: What has to stay away from each [m], shape (n,).
+        paddings: How much thicker each is than its geometry [m], shape (n,).
+        touching: Which are in contact with another body, shape (n,).
+        contacts: The least distance of two bodies that are in contact [m], by their numbers, the smaller one first.
+    """
+
+    joints: NDArray[np.int64]
+    placements: NDArray[np.float64]
+    centres: Matrix
+    halves: Matrix
+    half_spaces: Mask
+    obstacles: Mask
+    margins: Vector
+    paddings: Vector
+    touching: Mask
+    contacts: Mapping[tuple[int, int], float]
+
+    def kept_apart(self, pairs: NDArray[np.int64]) -> Vector:
+        """How far the bodies of pairs, shape (k, 2), must stay apart [m]; see :func:`.margins.kept_apart`."""
+        first, second = pairs.T
+        standing = (self.joints[first] == 0) & (self.joints[second] == 0)
+        kept = self.margins[np.where(self.obstacles[second], second, first)]
+        found: Vector = np.where(standing, 0.0, kept + self.paddings[first] + self.paddings[second])
+        for row in np.flatnonzero(self.in_contact(pairs)):
+            found[row] = min(found[row], self.contacts[_ordered(pairs[row])])
+        return found
+
+    def in_contact(self, pairs: NDArray[np.int64]) -> Mask:
+        """Which of some pairs of bodies, shape (k, 2), are in contact, shape (k,)."""
+        found: Mask = np.asarray(self.touching[pairs].all(axis=1))
+        for row in np.flatnonzero(found):
+            found[row] = _ordered(pairs[row]) in self.contacts
+        return found
+
+
+def _ordered(pair: NDArray[np.int64]) -> tuple[int, int]:
+    first, second = pair.tolist()
+    return min(first, second), max(first, second)
+
+
+def _contacts(bodies: Sequence[Body]) -> dict[tuple[int, int], float]:
+    """See :attr:`BodyArrays.contacts`."""
+    found = {}
+    touching = [k for k, body in enumerate(bodies) if body.contacts]
+    for i, j in combinations(touching, 2):
+        distance = contact_distance(bodies[i], bodies[j])
+        if distance is not None:
+            found[i, j] = distance
+    return found
+
+
+# Several checks of one world ask for the same; kept for as long as one of them holds them.
+_KNOWN: WeakValueDictionary[tuple[Body, ...], BodyArrays] = WeakValueDictionary()
+
+
+def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
+    """Numbers of bodies."""
+    key = tuple(bodies)
+    known = _KNOWN.get(key)
+    if known is None:
+        _KNOWN[key] = known = _body_arrays(key)
+    return known
+
+
+def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
+    boxes = [body.geometry.aabb_local for body in bodies]
+    half_spaces = np.array([isinstance(body.geometry, coal.Halfspace) for body in bodies], dtype=bool)
+    low, high = (np.array(ends).reshape(-1, 3) for ends in ([b.min_ for b in boxes], [b.max_ for b in boxes]))
+    low[half_spaces], high[half_spaces] = -UNBOUNDED_METRES, UNBOUNDED_METRES
+    return BodyArrays(
+        joints=np.array([body.joint for body in bodies], dtype=np.int64),
+        placements=np.array([body.placement.homogeneous for body in bodies]).reshape(-1, 4, 4),
+        centres=0.5 * low + 0.5 * high,
+        halves=0.5 * high - 0.5 * low,
+        half_spaces=half_spaces,
+        obstacles=np.array([body.kind == "obstacle" for body in bodies], dtype=bool),
+        margins=np.array([body.margin for body in bodies]),
+        paddings=np.array([body.padding for body in bodies]),
+        touching=np.array([bool(body.contacts) for body in bodies], dtype=bool),
+        contacts=_contacts(bodies),
+    )

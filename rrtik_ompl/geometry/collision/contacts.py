@@ -1,0 +1,110 @@
+"""Pairs of bodies that touch or come too near, measured by coal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.copies import as_value, in_one_line
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.cloud_solid import Ends
+from rrtik_ompl.geometry.collision.margins import kept_apart, request
+from rrtik_ompl.geometry.collision.own_distances import is_ours, own_gap, own_nearest
+from rrtik_ompl.geometry.collision.solids import is_mesh, solids_of
+
+TOUCHING = 1e-6  # [m] of overlap, below which bodies only touch: coal tells no less
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """Two bodies that touch or are nearer than they may be, or the two that are nearest to that.
+
+    Attributes:
+        first, second: Names of link, obstacle or attached object.
+        distance: Signed distance [m]: positive is a gap, negative a penetration depth.
+        point_first, point_second: Witness points in the world [m], shape (3,).
+        margin: Distance that must be kept between the two [m]; negative is a depth to which they may overlap.
+    """
+
+    first: str
+    second: str
+    distance: float
+    point_first: Vector
+    point_second: Vector
+    margin: float = 0.0
+
+    __reduce__, __repr__ = as_value, in_one_line
+
+    @property
+    def clearance(self) -> float:
+        """The distance less the margin [m]; what is not above 0 is not allowed."""
+        return self.distance - self.margin
+
+    def __str__(self) -> str:
+        pair = f"'{self.first}' and '{self.second}'"
+        if self.margin < self.distance < 0.0:
+            return f"{pair} overlap by {-1e3 * self.distance:.3g} mm, and may by {-1e3 * self.margin:.3g} mm"
+        if self.distance > self.margin:
+            return f"{pair} are {1e3 * self.distance:.4g} mm apart"
+        if self.distance > 0.0:
+            return f"{pair} are {1e3 * self.distance:.4g} mm apart, within the margin of {1e3 * self.margin:.4g} mm"
+        known = np.isfinite(self.point_first).all()
+        if known and abs(self.distance) < TOUCHING:
+            return f"{pair} touch"
+        return f"{pair} overlap{f' by {1e3 * abs(self.distance):.3g} mm' if known else ''}"
+
+
+def measured(
+    bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], frames: NDArray[np.float64], *, near_only: bool
+) -> Iterator[Contact]:
+    """The pairs of bodies and their distances; with ``near_only`` only those that touch or come too near.
+
+    Args:
+        bodies: The solids.
+        pairs: Numbers of those that must not touch.
+        frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
+        near_only: Leave out what keeps its margin.
+    """
+    poses = [pin.SE3(frames[b.joint]) * b.placement for b in bodies]
+    transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
+    for i, j in pairs:
+        margin = kept_apart(bodies[i], bodies[j])
+        ends = (bodies[i].geometry, transforms[i], bodies[j].geometry, transforms[j])
+        if near_only and not _near(ends, margin):
+            continue
+        distance, first, second = _distance(ends, depth=near_only)
+        distance = min(distance, margin) if near_only else distance
+        yield Contact(bodies[i].name, bodies[j].name, distance, first, second, margin)
+
+
+def _near(ends: Ends, margin: float) -> bool:
+    """Whether two geometries touch or come nearer than a margin [m]."""
+    ends, margin = solids_of(ends, margin)
+    if is_ours(ends):
+        return own_gap(ends, margin) is None
+    return bool(coal.collide(*ends, request(margin), coal.CollisionResult()))
+
+
+def inside(first: str, second: str) -> Contact:
+    """A body wholly inside another: there are no witness points and no meaningful depth."""
+    nowhere = np.full(3, np.nan)
+    return Contact(first, second, 0.0, nowhere, nowhere)
+
+
+def _distance(ends: Ends, *, depth: bool) -> tuple[float, Vector, Vector]:
+    """Signed distance of two geometries at their places [m], and the points that it is between."""
+    if is_ours(ends):
+        return own_nearest(ends)
+    touching, result = coal.CollisionResult(), coal.DistanceResult()
+    distance = float(coal.distance(*ends, coal.DistanceRequest(), result))
+    meshes = depth and distance <= 0.0 and is_mesh(ends[0]) and is_mesh(ends[2])
+    if meshes and coal.collide(*ends, request(0.0), touching):
+        result = touching.getContact(0)  # between two meshes that overlap coal knows no distance
+        distance = float(result.penetration_depth)
+    return distance, np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())

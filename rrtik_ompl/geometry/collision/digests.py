@@ -1,0 +1,90 @@
+"""Short names of what a proof is about: the robot's geometry and joints, the scene's geometry, pairs and margins.
+
+Numbers are rounded before they are hashed, so that machines whose sines differ in the last bit agree. A digest says in
+one word why a certificate does not belong to a world; what it proves is computed again all the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Any
+
+import coal
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.files.digest import sha256
+from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
+from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
+from rrtik_ompl.geometry.collision.shape_table import sizes_of
+from rrtik_ompl.geometry.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.model.robot import Robot
+
+DIGITS = 16  # of a digest, in hexadecimal
+DECIMALS = 12  # [m] or [rad]
+
+
+@lru_cache(maxsize=16)
+def robot_digest(robot: Robot) -> str:
+    """Of a robot's joint tree and the geometry of its links."""
+    chain = robot.chain
+    numbers = (chain.parent, chain.placement, chain.axis, chain.prismatic, chain.gain, chain.offset)
+    names = " ".join([robot.name, *robot.joint_names]).encode()
+    return _hash([names, *map(_numbers, numbers), *_bodies(link_bodies(robot))])
+
+
+def scene_digest(bodies: tuple[Body, ...], pairs: Iterable[tuple[int, int]]) -> str:
+    """Of the bodies that are no links, all margins, and the numbers of those that must not touch and move."""
+    moving = [_numbers(pair) for pair in pairs if any(bodies[k].joint > 0 for k in pair)]
+    margins = [_numbers(body.margin) for body in bodies if body.kind == "link" and body.margin > 0.0]
+    return _hash([*_bodies(body for body in bodies if body.kind != "link"), *margins, b"pairs", *moving])
+
+
+def world_digest(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> str:
+    """Both digests, one behind the other."""
+    return robot_digest(robot) + scene_digest(bodies, pairs)
+
+
+def _bodies(bodies: Iterable[Body]) -> Iterable[bytes]:
+    for body in bodies:
+        yield f"{body.kind} {body.name} {body.joint} {type(body.geometry).__name__}".encode()
+        yield _numbers([body.margin, *np.array(body.placement.homogeneous).ravel(), *_swept(body.geometry)])
+        yield from map(_numbers, _shape(body.geometry))
+        if body.padding:
+            yield _numbers(body.padding)
+        for name, distance in body.contacts:
+            yield f"in contact with {name}".encode()
+            yield _numbers(distance)
+
+
+def _shape(geometry: Any) -> Iterable[ArrayLike]:
+    """The numbers that give a coal geometry, as arrays."""
+    sizes = sizes_of(geometry)
+    if sizes is not None:
+        return (sizes,)
+    if isinstance(geometry, CloudSolid):
+        return (geometry.cloud.points, geometry.cloud.radius)
+    if is_mesh(geometry):
+        return mesh_arrays(geometry)
+    if isinstance(geometry, coal.Halfspace):
+        return (np.array(geometry.n), geometry.d)
+    if isinstance(geometry, coal.ConvexBase):
+        return (np.array(geometry.points(), dtype=np.float64),)
+    return (np.array(geometry.aabb_center), geometry.aabb_radius)  # a kind of which nothing is ever proven
+
+
+def _swept(geometry: Any) -> list[float]:
+    return [float(geometry.getSweptSphereRadius())] if hasattr(geometry, "getSweptSphereRadius") else []
+
+
+def _numbers(values: ArrayLike) -> bytes:
+    array = np.asarray(values, dtype=np.float64)
+    return f"{array.shape}".encode() + (np.round(array, DECIMALS) + 0.0).tobytes()  # + 0.0 makes one zero of both
+
+
+def _hash(parts: Iterable[bytes]) -> str:
+    found = sha256()
+    for part in parts:
+        found.update(len(part).to_bytes(8, "big") + part)
+    return found.hexdigest()[:DIGITS]

@@ -1,0 +1,86 @@
+"""How thin solids are: two in contact may not overlap so deep that they could pass through each other.
+
+Two that pass through each other are at some time as deep in one another as half of both thicknesses together. Half of
+that is left to what nobody measures: turns, and the depth at which a contact is seen.
+"""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
+from rrtik_ompl.geometry.collision.shape_table import core_of
+from rrtik_ompl.geometry.collision.solids import (
+    convex_arrays,
+    face_normals,
+    is_closed,
+    is_mesh,
+    mesh_arrays,
+    once_per_geometry,
+)
+
+SHARE = 0.25  # of both thicknesses together, to which two bodies in contact may overlap
+MOST_RAYS = 256  # through the wall of a hollow mesh
+COMPARED = 2_000_000  # rays times triangles
+PARALLEL = 1e-12  # of a ray and a triangle, times twice its area [m^2]
+
+
+@once_per_geometry
+def least_width(geometry: coal.CollisionGeometry) -> float:
+    """A lower bound of a geometry's width in any direction [m]; 0 for a surface without an inside.
+
+    It is exact for boxes, cylinders, capsules, balls, and the balls of a cloud. Of another convex solid it is the
+    diameter of a ball inside. The wall of a hollow mesh is measured along rays, and counts half.
+    """
+    if isinstance(geometry, coal.Halfspace):
+        return float("inf")
+    if isinstance(geometry, CloudSolid):
+        return 2.0 * float(geometry.cloud.radius)
+    if is_mesh(geometry):
+        wall = _thinnest_wall(*mesh_arrays(geometry)) if is_closed(geometry) else 0.0
+        return 0.5 * wall if np.isfinite(wall) else 0.0  # no ray came through: its wall is not known
+    core = core_of(geometry)
+    if core is not None:
+        half = 0.0
+        if core.half_sides is not None:
+            half = float(core.half_sides.min())
+        elif core.disc is not None:
+            half = min(core.disc, core.half_length)
+        return 2.0 * (half + core.radius + float(geometry.getSweptSphereRadius()))
+    if isinstance(geometry, coal.Convex):
+        points, triangles = convex_arrays(geometry)
+        normals, _ = face_normals(points, triangles)
+        centre = np.array(geometry.computeCOM())
+        return 2.0 * max(float(((points @ normals.T).max(axis=0) - normals @ centre).min()), 0.0)
+    return 0.0
+
+
+def _thinnest_wall(vertices: Matrix, triangles: NDArray[np.int64]) -> float:
+    """The shortest way through the wall of a closed mesh [m], from the middles of its largest triangles."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    rays = np.argsort(-areas, kind="stable")[: max(1, min(MOST_RAYS, COMPARED // len(triangles)))]
+    rays = rays[areas[rays] > 0.0]
+    if not len(rays):
+        return 0.0
+    return min(_way_through(k, (a, b, c), normals, areas) for k in rays.tolist())
+
+
+def _way_through(number: int, corners: tuple[Matrix, Matrix, Matrix], normals: Matrix, areas: Vector) -> float:
+    """From the middle of a triangle straight to the next one [m], on either side; after Moeller and Trumbore."""
+    a, b, c = corners
+    origin = (a[number] + b[number] + c[number]) / 3.0
+    direction = normals[number] / areas[number]
+    across = normals @ direction
+    crossing = np.abs(across) > PARALLEL
+    crossing[number] = False
+    a, b, c = a[crossing], b[crossing], c[crossing]
+    away = np.einsum("ij,ij->i", a - origin, normals[crossing]) / across[crossing]
+    places = origin + away[:, None] * direction
+    sides = [np.einsum("ij,ij->i", np.cross(q - p, places - p), normals[crossing]) for p, q in ((a, b), (b, c), (c, a))]
+    hit = (np.array(sides) >= 0.0).all(axis=0)
+    return float(np.abs(away[hit]).min(initial=np.inf))

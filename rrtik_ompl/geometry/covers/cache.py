@@ -1,0 +1,141 @@
+"""Covers kept on disk, so that a geometry is covered once per machine. Nothing here ever fails: no cache, no gain.
+
+One file per geometry, parameters and algorithm, named by a hash of all three; the package brings those of the robots
+that come along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.files.cache import cache_folder, nobody_else_s, write_whole
+from rrtik_ompl.files.digest import sha256
+from rrtik_ompl.files.named_arrays import NamedArrays
+from rrtik_ompl.files.notice import COVERING, tell_once
+from rrtik_ompl.geometry.collision.shape_table import sizes_of
+from rrtik_ompl.geometry.collision.solids import around, fills_its_hull, is_mesh, mesh_arrays
+from rrtik_ompl.geometry.covers.shipped import shipped_cover
+
+LAYOUT = 1
+ALGORITHM = 3  # counts up when rrtik_ompl.geometry.covers.spheres makes other spheres of the same geometry
+PIECES = 2  # counts up when rrtik_ompl.geometry.covers.mesh_pieces makes other pieces of the same mesh
+
+
+def cached_outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
+    """``outer_cover``, from the cache if it is there; of the hull of a mesh that nearly fills it, which is tighter."""
+    covered = around(geometry) if fills_its_hull(geometry) else geometry
+
+    def make() -> Matrix:
+        from rrtik_ompl.geometry.covers.spheres import (
+            outer_cover,  # with scipy, which takes longer to load than covers to read
+        )
+
+        return outer_cover(covered, protrusion=protrusion)
+
+    return _cached(covered, f"outer {protrusion!r}", make)
+
+
+def cached_inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None) -> Matrix:
+    """``inner_spheres``, from the cache if they are there."""
+
+    def make() -> Matrix:
+        from rrtik_ompl.geometry.covers.spheres import inner_spheres
+
+        return inner_spheres(geometry, count=count)
+
+    return _cached(geometry, f"inner {count!r}", make)
+
+
+def cached_convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], ...]:
+    """``convex_pieces``, from the cache if they are there; as rows of a corner and a number of piece and kind."""
+
+    def make() -> Matrix:
+        from rrtik_ompl.geometry.covers.mesh_pieces import convex_pieces
+
+        kinds = convex_pieces(mesh)
+        numbered = [(len(kinds) * k + kind, p) for kind, pieces in enumerate(kinds) for k, p in enumerate(pieces)]
+        rows = [np.column_stack([corners, np.full(len(corners), float(number))]) for number, corners in numbered]
+        return np.concatenate([np.empty((0, 4)), *rows])
+
+    rows = _cached(mesh, f"convex pieces {PIECES}", make)
+    numbers = np.unique(rows[:, 3])
+    return tuple([rows[rows[:, 3] == k, :3] for k in numbers if k % 3 == kind] for kind in range(3))
+
+
+def geometry_bytes(geometry: coal.CollisionGeometry) -> bytes | None:
+    """All that a cover depends on, or None for a kind that is not cached."""
+    numbers: list[Any]
+    sizes = sizes_of(geometry)
+    if sizes is not None:
+        numbers = [sizes]
+    elif isinstance(geometry, coal.ConvexBase):
+        numbers = [np.array(geometry.points(), dtype=np.float64)]
+    elif is_mesh(geometry):
+        numbers = [*mesh_arrays(geometry)]
+    else:
+        return None
+    swept = geometry.getSweptSphereRadius() if hasattr(geometry, "getSweptSphereRadius") else 0.0
+    parts = [f"{type(geometry).__name__} {swept!r}".encode()]
+    for array in numbers:
+        parts += [f"{array.dtype} {array.shape}".encode(), np.ascontiguousarray(array).tobytes()]
+    return b"\0".join(parts)
+
+
+def cover_key(geometry: coal.CollisionGeometry, parameters: str) -> str | None:
+    """Hash of a geometry, of parameters and of the algorithm; None for a kind that is not cached."""
+    data = geometry_bytes(geometry)
+    if data is None:
+        return None
+    head = f"layout {LAYOUT} algorithm {ALGORITHM} {parameters}\0".encode()
+    return sha256(head + data).hexdigest()
+
+
+def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[], Matrix]) -> Matrix:
+    """A cover from the package, from the user's cache, or made and kept there."""
+    folder, key = cache_folder("covers"), cover_key(geometry, parameters)
+    if key is not None and (shipped := shipped_cover(key)) is not None:
+        return shipped
+    file = None if folder is None or key is None else folder / f"{key}.npz"
+    found = _read(file, key) if file is not None and key is not None and nobody_else_s(file) else None
+    if found is None:
+        if needs_long(geometry):
+            tell_once(COVERING)
+        found = make()
+        if file is not None and key is not None:
+            _write(file, key, found)
+    return found
+
+
+def needs_long(geometry: coal.CollisionGeometry) -> bool:
+    """Whether a cover takes so long that somebody may wonder: of a mesh or a hull, a second or so."""
+    return is_mesh(geometry) or isinstance(geometry, coal.ConvexBase)
+
+
+def _read(file: Path, key: str) -> Matrix | None:
+    """The spheres in a file, or None if it is absent, damaged or another's."""
+    try:
+        stored = NamedArrays(file)
+        spheres, name, check = stored["spheres"], str(stored["key"]), str(stored["check"])
+    except InputError:
+        return None
+    whole = spheres.dtype == np.float64 and spheres.ndim == 2 and spheres.shape[1] == 4
+    if not whole or name != key or check != _check(spheres):
+        return None
+    sound = np.isfinite(spheres[:, :3]).all() and (spheres[:, 3] >= 0.0).all()
+    return np.asarray(spheres) if sound else None
+
+
+def _check(spheres: Matrix) -> str:
+    return sha256(np.ascontiguousarray(spheres).tobytes()).hexdigest()
+
+
+def _write(file: Path, key: str, spheres: Matrix) -> None:
+    name, check = np.array(key), np.array(_check(spheres))
+    write_whole(file, lambda stream: np.savez(stream, spheres=spheres, key=name, check=check))

@@ -1,0 +1,277 @@
+"""Solids as covers see them: a surface of triangles, and how deep a point lies inside.
+
+Everything here is in the solid's own frame, moved and scaled so that the solid is about one unit across; ``Frame``
+leads back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
+
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector
+from rrtik_ompl.geometry.collision.solids import inside_mesh
+
+ROUNDING = 1e-12  # relative to the extent of the solid; far above float64's rounding, far below any length that matters
+CYLINDER_SIDES = 64
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])  # of a cell
+
+Triangles = NDArray[np.float64]  # shape (m, 3, 3): triangle, corner, coordinate
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """Where the unit-sized solid stands: ``point = centre + scale * rotation @ local``."""
+
+    centre: Vector
+    rotation: Matrix
+    scale: float
+
+    def to_local(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points, shape (..., 3), in the frame of the unit-sized solid."""
+        return np.asarray((points - self.centre) @ self.rotation / self.scale)
+
+    def spheres_out(self, spheres: Matrix, slack: float) -> Matrix:
+        """Spheres, shape (n, 4), in the geometry's frame, each radius grown by ``slack`` (relative) and rounding."""
+        centres = self.centre + self.scale * spheres[:, :3] @ self.rotation.T
+        rounding = 4e-15 * float(np.abs(self.centre).max())
+        grow = slack * self.scale + np.sign(slack) * rounding
+        return np.column_stack([centres, self.scale * spheres[:, 3] + grow])
+
+
+class Solid(Protocol):
+    """What a cover needs to know of a solid."""
+
+    @property
+    def triangles(self) -> Triangles:
+        """The surface, oriented; it may lie outside the true surface, never inside."""
+
+    @property
+    def rim(self) -> Triangles:
+        """Caps, shape (b, 3, 3), that close an open surface; empty where it is closed."""
+
+    @property
+    def enclosed(self) -> NDArray[np.float64]:
+        """Corners of boxes that an open surface encloses, shape (k, 8, 3); none where it is closed."""
+
+    @property
+    def slack(self) -> float:
+        """How far the true solid may reach beyond ``triangles`` by rounding."""
+
+    def depth(self, points: Matrix) -> Vector:
+        """Distance of points, shape (n, 3), to the surface, negative outside; rounding is on the safe side."""
+
+    def distance(self, points: Matrix) -> Vector:
+        """The same for points that are known to be inside; quicker."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConvexSolid:
+    """Convex hull of points; ``normals @ x <= offsets`` inside."""
+
+    triangles: Triangles
+    normals: Matrix
+    offsets: Vector
+    slack: float
+    rim: Triangles = field(default_factory=lambda: np.empty((0, 3, 3)))
+    enclosed: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 8, 3)))
+
+    def depth(self, points: Matrix) -> Vector:
+        """Smallest distance to the planes."""
+        return np.asarray((self.offsets - points @ self.normals.T).min(axis=1) - self.slack)
+
+    def distance(self, points: Matrix) -> Vector:
+        """The same."""
+        return self.depth(points)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CylinderSolid:
+    """Cylinder about z; ``triangles`` is a prism around it."""
+
+    radius: float
+    half_length: float
+    triangles: Triangles
+    slack: float
+    rim: Triangles = field(default_factory=lambda: np.empty((0, 3, 3)))
+    enclosed: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 8, 3)))
+
+    def depth(self, points: Matrix) -> Vector:
+        """Smallest distance to mantle and caps (outside: to the farther of the two)."""
+        radial = self.radius - np.hypot(points[:, 0], points[:, 1])
+        axial = self.half_length - np.abs(points[:, 2])
+        outside = -np.hypot(np.minimum(radial, 0.0), np.minimum(axial, 0.0))
+        return np.asarray(np.where(outside < 0.0, outside, np.minimum(radial, axial)) - ROUNDING)
+
+    def distance(self, points: Matrix) -> Vector:
+        """The same."""
+        return self.depth(points)
+
+
+class MeshSolid:
+    """A triangle mesh: its surface and, if that is closed, all points whose winding number is not 0; else ``enclosed``.
+
+    Depth is measured to the surface and to the caps that close it, if it is open.
+    """
+
+    slack = ROUNDING
+
+    def __init__(self, vertices: Matrix, faces: NDArray[np.int64], enclosed: NDArray[np.float64]) -> None:
+        self.triangles = vertices[faces]
+        self.enclosed = enclosed
+        self.rim = rim_caps(vertices, faces)
+        self._closed = np.concatenate([self.triangles, self.rim])
+        self._centres, self._reach = _round_about(self._closed)
+        self._corners = self._closed.reshape(-1, 3)
+        self._indices = np.arange(len(self._corners)).reshape(-1, 3)
+
+    def depth(self, points: Matrix) -> Vector:
+        """Distance to the surface, negative outside."""
+        inside = np.array([inside_mesh(self._corners, self._indices, p) for p in points], dtype=bool)
+        return np.asarray(np.where(inside, 1.0, -1.0) * (self.distance(points) + ROUNDING) - ROUNDING)
+
+    def distance(self, points: Matrix) -> Vector:
+        """Distance to the surface."""
+        return np.asarray(np.array([self._distance(p) for p in points]) - ROUNDING)
+
+    def _distance(self, point: Vector) -> float:
+        to_centre = np.linalg.norm(self._centres - point, axis=1)
+        could_be = to_centre - self._reach <= (to_centre + self._reach).min()
+        rows = self._closed[could_be]
+        return float(distance_to_triangles(np.broadcast_to(point, (len(rows), 3)), rows).min())
+
+
+def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
+    """The hull of points, shape (n, 3), in the frame of its principal axes.
+
+    The hull is found after stretching every axis to the same size, which keeps it sound for very thin solids.
+
+    Raises:
+        ValueError: If the points lie in a plane.
+    """
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    turned = (points - middle) @ axes.T
+    centre = middle + 0.5 * (turned.min(axis=0) + turned.max(axis=0)) @ axes
+    extent = np.ptp(turned, axis=0)
+    frame = Frame(centre, axes.T, float(np.linalg.norm(extent)))
+    if not extent.min() > 1e-13 * frame.scale:
+        raise ValueError("points in a plane")
+    local = frame.to_local(points)
+    stretch = extent / frame.scale
+    hull = ConvexHull(local / stretch, qhull_options="Qt")
+    normals = hull.equations[:, :3] / stretch
+    length = np.linalg.norm(normals, axis=1)
+    normals, offsets = normals / length[:, None], -hull.equations[:, 3] / length
+    triangles = local[hull.simplices]
+    a, b, c = (triangles[:, k] for k in range(3))
+    outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals)
+    triangles[outward < 0.0] = triangles[outward < 0.0][:, ::-1]
+    beyond = float((local @ normals.T - offsets).max())
+    below = float((offsets[:, None] - np.einsum("ijk,ik->ij", triangles, normals)).max())
+    return ConvexSolid(triangles, normals, offsets, max(beyond, 0.0) + max(below, 0.0) + ROUNDING), frame
+
+
+def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Frame]:
+    """A cylinder about z, inside a regular prism."""
+    frame = Frame(np.zeros(3), np.eye(3), 2.0 * float(np.hypot(radius, half_length)))
+    small, high = radius / frame.scale, half_length / frame.scale
+    turn = (np.arange(CYLINDER_SIDES) + 0.5) * (TAU / CYLINDER_SIDES)
+    ring = np.column_stack([np.cos(turn), np.sin(turn)]) * (small / np.cos(np.pi / CYLINDER_SIDES))
+    return CylinderSolid(small, high, _prism(ring, high), ROUNDING), frame
+
+
+def _prism(ring: Matrix, high: float) -> Triangles:
+    """Outward triangles of a prism over a convex counter-clockwise ring."""
+    low, top = (np.column_stack([ring, np.full(len(ring), z)]) for z in (-high, high))
+    low_next, top_next = np.roll(low, -1, axis=0), np.roll(top, -1, axis=0)
+    zeros = np.zeros_like(low)
+    floor, roof = zeros - np.array([0.0, 0.0, high]), zeros + np.array([0.0, 0.0, high])
+    sides = [(low, low_next, top_next), (low, top_next, top), (floor, low_next, low), (roof, top, top_next)]
+    return np.concatenate([np.stack(side, axis=1) for side in sides])
+
+
+def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matrix, Matrix]) -> tuple[MeshSolid, Frame]:
+    """A mesh and, if it is open, boxes that it encloses; degenerate triangles are kept, they are part of the surface.
+
+    Args:
+        vertices: Shape (n, 3).
+        triangles: Vertex numbers, shape (m, 3).
+        boxes: Lowest and highest corners, shape (k, 3) each.
+    """
+    used, number = np.unique(triangles, return_inverse=True)
+    points, same = np.unique(vertices[used], axis=0, return_inverse=True)
+    low, high = points.min(axis=0), points.max(axis=0)
+    frame = Frame(0.5 * (low + high), np.eye(3), float(np.linalg.norm(high - low)))
+    enclosed = np.where(CORNERS[None] == 1, boxes[1][:, None], boxes[0][:, None])
+    local = frame.to_local(enclosed.reshape(-1, 3)).reshape(-1, 8, 3)
+    return MeshSolid(frame.to_local(points), same.ravel()[number.reshape(-1, 3)], local), frame
+
+
+def _round_about(triangles: Triangles) -> tuple[Matrix, Vector]:
+    """A ball around each triangle: centres, shape (m, 3), and radii, shape (m,)."""
+    centres = 0.5 * (triangles.min(axis=1) + triangles.max(axis=1))
+    return centres, np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
+
+
+def rim_caps(vertices: Matrix, faces: NDArray[np.int64]) -> Triangles:
+    """Triangles that close a surface: one for each edge that the orientations of its triangles leave open.
+
+    The open edges form loops (the boundary of a boundary is empty), so coning each group of loops that hang together
+    to one point closes the surface. The open edge of a cap is the one opposite to its first corner.
+
+    Args:
+        vertices: Shape (n, 3), no two of them equal.
+        faces: Vertex numbers, shape (m, 3).
+    """
+    start, end = faces.T.ravel(), np.roll(faces, -1, axis=1).T.ravel()
+    key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
+    edges, which = np.unique(key, return_inverse=True)
+    turns = np.bincount(which.ravel(), weights=np.sign(end - start), minlength=len(edges)).astype(np.int64)
+    open_edges = np.flatnonzero(turns)
+    low, high = vertices[edges[open_edges] // len(vertices)], vertices[edges[open_edges] % len(vertices)]
+    flip = (turns[open_edges] < 0)[:, None]
+    ends = np.stack([np.where(flip, low, high), np.where(flip, high, low)], axis=1)
+    ends = np.repeat(ends, np.abs(turns[open_edges]), axis=0)
+    if not len(ends):
+        return np.empty((0, 3, 3))
+    apex = _loop_centres(ends)
+    return np.concatenate([apex[:, None], ends], axis=1)
+
+
+def _loop_centres(ends: NDArray[np.float64]) -> Matrix:
+    """For each edge, shape (b, 2, 3): the middle of all edges that hang together with it, shape (b, 3)."""
+    _, number = np.unique(ends.reshape(-1, 3), axis=0, return_inverse=True)
+    start, end = number.reshape(-1, 2).T
+    size = int(number.max()) + 1
+    links = coo_matrix((np.ones(len(start)), (start, end)), shape=(size, size))
+    _, loop = connected_components(links, directed=False)
+    edge_loop = loop[start]
+    weight = np.bincount(edge_loop)
+    middles = ends.mean(axis=1)
+    sums = np.column_stack([np.bincount(edge_loop, weights=middles[:, k]) for k in range(3)])
+    return np.asarray((sums / np.maximum(weight, 1)[:, None])[edge_loop])
+
+
+def distance_to_triangles(points: Matrix, triangles: Triangles) -> Vector:
+    """Distance of each point, shape (n, 3), to its own triangle, shape (n, 3, 3)."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    normal = np.cross(b - a, c - a)
+    area = np.einsum("ij,ij->i", normal, normal)
+    above = np.ones(len(points), dtype=bool)
+    nearest = np.full(len(points), np.inf)
+    for p, q in ((a, b), (b, c), (c, a)):
+        side, away = q - p, points - p
+        length = np.einsum("ij,ij->i", side, side)
+        along = np.clip(np.einsum("ij,ij->i", away, side) / np.maximum(length, 1e-300), 0.0, 1.0)
+        gap = away - along[:, None] * side
+        nearest = np.minimum(nearest, np.einsum("ij,ij->i", gap, gap))
+        above &= np.einsum("ij,ij->i", np.cross(side, away), normal) >= 0.0
+    plane = np.einsum("ij,ij->i", points - a, normal) ** 2 / np.maximum(area, 1e-300)
+    return np.asarray(np.sqrt(np.where(above & (area > 0.0), np.minimum(nearest, plane), nearest)))

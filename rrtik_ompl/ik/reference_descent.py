@@ -1,0 +1,116 @@
+"""Levenberg-Marquardt from many starts in numpy: the reference implementation of :mod:`rrtik_ompl.kernels.ik.ik_kernels`.
+
+Source: [22]: the damping is the residual itself plus a small constant, so that steps are short far
+from the target and in singular postures, and Newton's near the solution.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.kernels.ik.ik_layout import ANY_TURN, BOX, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.tip_distance import reach_of
+
+PER_CHORD = 0.3  # weight of a turn (its chord 2 sin(angle / 2)) where the position counts in reaches
+DAMPING = 1e-9  # the constant part, in units of the squared residual
+DAMPING_SHARE = 0.1  # of the squared residual, which goes into the damping
+SHARE_GROWTH = (
+    4.0  # of that share after a step that led away: it was too bold, as it is in front of what is out of reach
+)
+LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one step
+STALLED = 0.5  # a start whose squared residual has not fallen to this share in some steps is given up
+HALF_TURN_COSINE = 1e-12
+
+
+def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: int) -> tuple[Matrix, Mask, int]:
+    """Walk from every row of Q, shape (m, dof), to its goal among ``aims``, shape (m, 18) or (1, 18).
+
+    Returns:
+        Where the rows have come to, whether that is at their goals, shape (m,), and the most steps taken.
+    """
+    Q, aims = np.clip(Q, robot.lower, robot.upper), np.broadcast_to(aims, (len(Q), aims.shape[1]))
+    reached, going = np.zeros(len(Q), dtype=bool), np.arange(len(Q))
+    mark, before, share = np.full(len(Q), np.inf), np.full(len(Q), np.inf), np.full(len(Q), DAMPING_SHARE)
+    weights = np.repeat([1.0 / reach_of(robot), PER_CHORD], 3)
+    for step in range(steps + 1):
+        error, felt, there = residuals(aims[going], robot.fk_batch(Q[going]))
+        reached[going] = there
+        error = error * weights
+        square = (error * error).sum(axis=1)
+        kept = ~there
+        if step > 0 and step % patience == 0:
+            kept &= square <= STALLED * mark[going]
+            mark[going] = square
+        going, error, felt, square = going[kept], error[kept], felt[kept], square[kept]
+        if len(going) == 0 or step == steps:
+            break
+        share[going[square > before[going]]] *= SHARE_GROWTH
+        before[going] = square
+        J = _jacobians(robot, aims[going], felt, Q[going]) * weights[:, None]
+        J[:, :3][(aims[going, BOX : BOX + 3] > 0.0) & (error[:, :3] == 0.0)] = 0.0  # free to move inside the box
+        Q[going] = np.clip(
+            Q[going] + _changes(robot, J, error, DAMPING + share[going] * square, Q[going]), robot.lower, robot.upper
+        )
+    return Q, reached, step
+
+
+def residuals(aims: Matrix, tips: NDArray[np.float64]) -> tuple[Matrix, NDArray[np.float64], Mask]:
+    """What separates tips, shape (m, 4, 4), from their goals: [m] and chords in the goals' axes, shape (m, 6).
+
+    Returns:
+        The residuals; what of a turn they feel as matrices, shape (m, 3, 3), not the part about an axis of the tip
+        that may point anywhere in its own turn; and whether they are within tolerance, shape (m,).
+    """
+    turned, free = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1), aims[:, FREE_TURN].astype(int)
+    place = (turned @ (tips[:, :3, 3] - aims[:, 9:12])[..., None])[..., 0]
+    room = aims[:, BOX : BOX + 3]
+    R = turned @ tips[:, :3, :3]
+    skew = -0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    cosine = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
+    felt = np.tile(np.eye(3), (len(aims), 1, 1))
+    for axis in range(3):
+        rows = free == axis
+        own = R[rows, :, axis]
+        skew[rows], cosine[rows] = np.cross(own, np.eye(3)[axis]), own[:, axis]
+        felt[rows] -= own[:, :, None] * own[:, None]
+    skew[free == ANY_TURN], cosine[free == ANY_TURN], felt[free == ANY_TURN] = 0.0, 1.0, 0.0
+    half = np.sqrt(np.maximum(0.5 * (1.0 + cosine), 0.0))
+    hidden = (
+        half < HALF_TURN_COSINE
+    )  # half a turn about an axis that rounding hides: any will do, the next step sees better
+    skew[hidden], half[hidden] = np.eye(3)[np.where(free[hidden] == 0, 1, 0)], 0.5
+    error = np.hstack([np.clip(place, -room, room) - place, skew / half[:, None]])
+    away, turn = np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)
+    return error, felt, (away <= aims[:, POSITION_TOLERANCE]) & (turn <= aims[:, CHORD_TOLERANCE])
+
+
+def farness(robot: Robot, aims: Matrix, tips: NDArray[np.float64]) -> Matrix:
+    """How far each of the tips, shape (n, 4, 4), is from each goal, squared and without units, shape (m, n)."""
+    away = tips[None, :, :3, 3] - aims[:, None, 9:12]
+    free = aims[:, FREE_TURN].astype(int)
+    same = np.einsum("nij,mij->mnj", tips[:, :3, :3], aims[:, :9].reshape(-1, 3, 3))
+    counts = (free[:, None] == NO_TURN) | (free[:, None] == np.arange(3))
+    turned = ((1.0 - same) * counts[:, None]).sum(axis=2)
+    squared: Matrix = (away * away).sum(axis=2) / reach_of(robot) ** 2 + PER_CHORD**2 * turned
+    return squared
+
+
+def _jacobians(robot: Robot, aims: Matrix, felt: NDArray[np.float64], Q: Matrix) -> NDArray[np.float64]:
+    """Jacobians in the axes of the goals, turns as far as they are felt, shape (m, 6, dof)."""
+    turned, J = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1), robot.jacobian_batch(Q)
+    return np.concatenate([turned @ J[:, :3], felt @ turned @ J[:, 3:]], axis=1)
+
+
+def _changes(robot: Robot, J: NDArray[np.float64], error: Matrix, damping: Vector, Q: Matrix) -> Matrix:
+    """Steps J^T (J J^T + damping)^-1 e without the joints at a limit that would go on beyond it, shape (m, dof)."""
+    pull = np.einsum("mki,mk->mi", J, error)
+    pinned = ((robot.lower >= Q) & (pull < 0.0)) | ((robot.upper <= Q) & (pull > 0.0))
+    J = np.where(pinned[:, None], 0.0, J)
+    square = J @ J.transpose(0, 2, 1) + damping[:, None, None] * np.eye(6)
+    solved = np.linalg.solve(square, error[..., None])
+    change: Matrix = (J.transpose(0, 2, 1) @ solved)[..., 0]
+    change *= LARGEST_STEP / np.maximum(np.abs(change).max(axis=1, keepdims=True), LARGEST_STEP)
+    return change

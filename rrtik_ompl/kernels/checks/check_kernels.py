@@ -1,0 +1,299 @@
+"""Collision checks of configurations and motions in kernels: ``WIDTH`` configurations at a time, one to a SIMD lane.
+
+Configurations are FREE if the outer balls (a cover around every body) meet nothing, COLLIDING if the inner balls
+(inside them) do or the narrow phase proves it, UNDECIDED otherwise. The configurations checked along a motion are those
+of :class:`rrtik_ompl.world.world.World`. Python calls the functions marked ``@entry`` with addresses; other kernels call
+:func:`check_part` and :func:`check_edge`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rrtik_ompl.kernels.checks.kinematics import first_frames, forward_kinematics
+from rrtik_ompl.kernels.checks.likely_kernels import likely_collision
+from rrtik_ompl.kernels.checks.narrow_phase import narrow_phase
+from rrtik_ompl.kernels.checks.obstacle_kernels import ALL_LANES, kinds_known
+from rrtik_ompl.kernels.checks.self_kernels import self_collision
+from rrtik_ompl.kernels.checks.sphere_kernels import prepare, scene_collision
+from rrtik_ompl.kernels.checks.watch_kernels import joints_left, watch_motion
+from rrtik_ompl.kernels.layout import (
+    COLLIDING,
+    FREE,
+    NO_MARKS,
+    NO_WATCH,
+    UNDECIDED,
+    UNSOUND,
+    BallTable,
+    IntArray,
+    JointValues,
+    LikelyBalls,
+    PrimitiveTable,
+    Watch,
+    WorldTable,
+)
+from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
+from rrtik_ompl.kernels.simd.lanes import (
+    bits,
+    double_at,
+    int_at,
+    lane_numbers,
+    larger,
+    set_double,
+    set_int,
+    set_wide_lanes,
+    smaller,
+)
+from rrtik_ompl.kernels.tables.accessors import (
+    arm_of,
+    body_count_of,
+    inner_balls_of,
+    inner_likely_of,
+    inner_primitives_of,
+    joint_count_of,
+    joint_row,
+    outer_balls_of,
+    outer_likely_of,
+    outer_primitives_of,
+    pair_count_of,
+    scratch_of,
+    standing_count_of,
+    values_of,
+    waiting_of,
+    watch_of,
+)
+
+TO_WHOLE = 1.5 * 2.0**52  # added and taken away again it leaves whole numbers
+
+
+@kernel
+def in_collision(
+    world: WorldTable,
+    balls: BallTable,
+    primitives: PrimitiveTable,
+    wanted: int,
+    likely: LikelyBalls,
+    one: bool,
+    watch: Watch,
+    joints: int,
+) -> Any:
+    """Lanes among ``wanted`` in which these balls meet these primitives or each other; just one lane if ``one``.
+
+    What is watched no more may be carried by other joints than the first ``joints``.
+    """
+    scratch = scratch_of(world)
+    prepare(balls, scratch, joints)
+    found = scene_collision(balls, primitives, scratch, wanted, NO_MARKS, one, likely, watch)
+    if found == 0:
+        return self_collision(balls, scratch, wanted, NO_MARKS, one, watch)
+    if found != wanted and not one:
+        found |= self_collision(balls, scratch, wanted & ~found, NO_MARKS, one, NO_WATCH)
+    return found
+
+
+@inlined
+def outer_collision(world: WorldTable, wanted: int, one: bool, watch: Watch, joints: int) -> Any:
+    """Lanes that the outer balls cannot prove free, for the frames in the scratch memory."""
+    likely = outer_likely_of(scratch_of(world))
+    return in_collision(world, outer_balls_of(world), outer_primitives_of(world), wanted, likely, one, watch, joints)
+
+
+@inlined
+def inner_collision(world: WorldTable, wanted: int, one: bool) -> Any:
+    """Lanes that the inner balls prove colliding, for the frames in the scratch memory."""
+    likely = inner_likely_of(scratch_of(world))
+    balls, primitives, joints = inner_balls_of(world), inner_primitives_of(world), joint_count_of(arm_of(world))
+    return in_collision(world, balls, primitives, wanted, likely, one, NO_WATCH, joints)
+
+
+@kernel
+def likely_in_collision(world: WorldTable, wanted: int, inner: bool) -> int:
+    """Lanes in which an outer or inner ball that met something lately does so again; 0 says nothing."""
+    scratch = scratch_of(world)
+    balls, primitives, likely = outer_balls_of(world), outer_primitives_of(world), outer_likely_of(scratch)
+    if inner:
+        balls, primitives, likely = inner_balls_of(world), inner_primitives_of(world), inner_likely_of(scratch)
+    return likely_collision(balls, primitives, scratch, wanted, likely)
+
+
+@inlined
+def load_row(world: WorldTable, rows: JointValues, row: int, lane: int) -> None:
+    """Set the joint values of a lane to a row of an array of float64."""
+    joints = joint_count_of(arm_of(world))
+    values = values_of(scratch_of(world))
+    for joint in range(joints):
+        set_double(values, joint * WIDTH + lane, double_at(rows, row * joints + joint))
+
+
+@inlined
+def sound_count(world: WorldTable, count: int) -> int:
+    """``count``, or UNSOUND if a table holds a primitive of an unknown kind."""
+    return count if kinds_known(outer_primitives_of(world)) and kinds_known(inner_primitives_of(world)) else UNSOUND
+
+
+@kernel
+def resolve_doubtful(world: WorldTable, rows: JointValues, waiting: int, answers: IntArray) -> None:
+    """Answer what a second check finds for the rows that wait: by their inner balls, then by the narrow phase."""
+    queue = waiting_of(scratch_of(world))
+    for lane in range(WIDTH):
+        load_row(world, rows, int_at(queue, min(lane, waiting - 1)), lane)
+    forward_kinematics(arm_of(world), scratch_of(world))
+    wanted = ALL_LANES >> (WIDTH - waiting)
+    colliding, open_ = inner_collision(world, wanted, waiting < 0), 0
+    if colliding != wanted:
+        open_, overlapping = narrow_phase(world, wanted & ~colliding)
+        colliding |= overlapping
+    for lane in range(waiting):
+        answer = COLLIDING if (colliding >> lane) & 1 else UNDECIDED if (open_ >> lane) & 1 else FREE
+        set_int(answers, int_at(queue, lane), answer)
+
+
+@entry
+def classify(world: WorldTable, rows: JointValues, count: int, answers: IntArray, resolve: int) -> int:
+    """Check ``count`` rows of joint values (float64) at an address; int32 answers go to another.
+
+    Rows that are not proven free wait until there are enough of them to fill all lanes of a second check. Returns
+    ``count``, or UNSOUND.
+    """
+    queue, waiting, joints = waiting_of(scratch_of(world)), 0, joint_count_of(arm_of(world))
+    for start in range(0, count, WIDTH):
+        filled = min(WIDTH, count - start)
+        for lane in range(WIDTH):
+            load_row(world, rows, start + min(lane, filled - 1), lane)
+        forward_kinematics(arm_of(world), scratch_of(world))
+        doubtful = outer_collision(world, ALL_LANES >> (WIDTH - filled), filled < 0, NO_WATCH, joints)
+        for lane in range(filled):
+            open_ = (doubtful >> lane) & 1
+            set_int(answers, start + lane, open_)
+            if open_ and resolve != 0:
+                set_int(queue, waiting, start + lane)
+                waiting += 1
+                if waiting == WIDTH:
+                    resolve_doubtful(world, rows, waiting, answers)
+                    waiting = 0
+    if waiting:
+        resolve_doubtful(world, rows, waiting, answers)
+    return sound_count(world, count)
+
+
+@inlined
+def place(world: WorldTable, start: JointValues, end: JointValues, share: Any, joints: int) -> None:
+    """Frames of the first joints at some shares, in wide lanes, of a motion between two rows of joint values."""
+    scratch = scratch_of(world)
+    for joint in range(joints):
+        value = (1.0 - share) * double_at(start, joint) + share * double_at(end, joint)
+        set_wide_lanes(values_of(scratch), joint, value)
+    first_frames(arm_of(world), scratch, joints)
+
+
+@inlined
+def places_in(number: int, blocks: int, middle: int) -> Any:
+    """The configurations of a motion that a block of lanes checks, in wide lanes.
+
+    Those of the first block lie ``blocks`` apart; the others take what is between, neighbours together, so that a few
+    primitives are near all lanes.
+    """
+    if number == 0:
+        return lane_numbers() * float(blocks) + float(middle)
+    among, between = lane_numbers() + float((number - 1) * WIDTH), float(blocks - 1)
+    gap = ((among + 0.5) * (1.0 / between) - 0.5 + TO_WHOLE) - TO_WHOLE  # rounded down
+    rest = among - gap * between
+    return gap * float(blocks) + rest + smaller(larger(rest - float(middle - 1), 0.0), 1.0)
+
+
+@kernel
+def resolved_block(world: WorldTable, doubtful: int, one: bool) -> int:
+    """What inner balls and solids say of lanes that outer balls leave in doubt: the worst answer; ``one`` is enough."""
+    if inner_collision(world, doubtful, one) != 0:
+        return COLLIDING
+    open_, overlapping = narrow_phase(world, doubtful)
+    if overlapping != 0:
+        return COLLIDING
+    return UNDECIDED if open_ != 0 else FREE
+
+
+@kernel
+def check_part(
+    world: WorldTable, start: JointValues, end: JointValues, last: int, first: int, count: int, resolve: bool
+) -> int:
+    """Check ``count`` configurations of a motion between two rows of joint values: those at k / last, k = first, ...
+
+    The lanes of the first block are spread over the whole part, so that a collision anywhere shows early; what keeps
+    its distance there from all that lies between is watched no more. Without ``resolve`` the outer balls alone decide.
+    """
+    scratch, joints = scratch_of(world), joint_count_of(arm_of(world))
+    blocks = (count + WIDTH - 1) // WIDTH
+    every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
+    answer, middle, watch, left = FREE, blocks // 2, NO_WATCH, joints
+    for number in range(blocks):
+        places = smaller(places_in(number, blocks, middle), float(count - 1)) + float(first)
+        share = places / float(last)
+        place(world, start, end, share, left)
+        if number == 0:
+            if likely_in_collision(world, every, resolve) != 0:
+                answer = COLLIDING if resolve else UNDECIDED
+                break
+            if blocks > 1:
+                watch = watch_of(scratch)
+                watch_motion(world, start, end, float(middle) / float(last))
+        doubtful = outer_collision(world, every, not resolve, watch, left)
+        if doubtful != 0 and left < joints:
+            place(world, start, end, share, joints)
+        if number == 0 and blocks > 1:
+            left = joints_left(world)
+        if doubtful == 0:
+            if left == 0:
+                break
+            continue
+        if not resolve:
+            answer = UNDECIDED
+            break
+        resolved = resolved_block(world, doubtful, resolve)
+        if resolved != FREE:
+            answer = resolved
+        if resolved == COLLIDING:
+            break
+    return answer
+
+
+@kernel
+def check_edge(world: WorldTable, start: JointValues, end: JointValues, last: int, resolve: bool) -> int:
+    """Check the motion between two rows of joint values by its configurations at k / last, k = 0..last."""
+    return check_part(world, start, end, last, 0, last + 1, resolve)
+
+
+@entry
+def classify_edges(
+    world: WorldTable,
+    starts: JointValues,
+    ends: JointValues,
+    steps: IntArray,
+    count: int,
+    answers: IntArray,
+    resolve: int,
+) -> int:
+    """Check ``count`` motions between rows of two arrays in the given numbers of steps; int32 answers.
+
+    Returns ``count``, or UNSOUND.
+    """
+    joints = joint_count_of(arm_of(world))
+    for k in range(count):
+        start, end = joint_row(starts, joints, k), joint_row(ends, joints, k)
+        set_int(answers, k, check_edge(world, start, end, int_at(steps, k), resolve != 0))
+    return sound_count(world, count)
+
+
+@entry
+def mark_pairs(world: WorldTable, row: JointValues, count: int) -> int:
+    """For up to ``WIDTH`` rows of joint values: in which of them a pair is not proven free, as bits; see ``mark``.
+
+    Returns the number of marks, or UNSOUND.
+    """
+    scratch, wanted = scratch_of(world), ALL_LANES >> (WIDTH - count)
+    for lane in range(WIDTH):
+        load_row(world, row, min(lane, count - 1), lane)
+    forward_kinematics(arm_of(world), scratch)
+    narrow_phase(world, wanted)
+    balls = outer_balls_of(world)
+    crossing = body_count_of(balls) * standing_count_of(outer_primitives_of(world))
+    return sound_count(world, crossing + pair_count_of(balls))

@@ -1,0 +1,271 @@
+"""The narrow phase in kernels: bodies that balls leave in doubt, compared by the solids around and inside them.
+
+It goes body by body, in the lanes in doubt; what it does not decide is left to an exact checker. A set of lanes is an
+integer, one bit a lane. Solids: see :mod:`rrtik_ompl.kernels.tables.solid_tables`.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+from rrtik_ompl.kernels import layout
+from rrtik_ompl.kernels.checks.cloud_phase import compare_cloud, is_cloud
+from rrtik_ompl.kernels.checks.gjk import (
+    SHORTEST,
+    Frames,
+    carried,
+    compare,
+    dot,
+    farthest,
+    minus,
+    scaled,
+    slack_between,
+)
+from rrtik_ompl.kernels.checks.obstacle_kernels import ZERO, primitive_gap
+from rrtik_ompl.kernels.checks.self_kernels import self_collision
+from rrtik_ompl.kernels.checks.sphere_kernels import prepare, scene_collision
+from rrtik_ompl.kernels.layout import (
+    COLLIDING,
+    FREE,
+    NO_WATCH,
+    UNDECIDED,
+    Frame,
+    PrimitiveTable,
+    ScratchTable,
+    SolidTable,
+    WorldTable,
+)
+from rrtik_ompl.kernels.simd.access import nonzero_ints
+from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
+from rrtik_ompl.kernels.simd.lanes import first_bit, float_at, int_at, lowest, set_int, set_lanes, spread
+from rrtik_ompl.kernels.tables.accessors import (
+    arm_of,
+    axis_of,
+    body_count_of,
+    bound_centre_of,
+    bound_radius_of,
+    corner_block,
+    corners_of,
+    disc_of,
+    end_around_of,
+    end_block_of,
+    end_inside_of,
+    first_around_of,
+    first_block_of,
+    first_inside_of,
+    frame_at,
+    frame_of_span,
+    frames_of,
+    inner_primitives_of,
+    is_inside,
+    joint_count_of,
+    kind_of_solid,
+    marks_of,
+    marks_row,
+    moving_solids_of,
+    note_of,
+    one_body_of,
+    other_body_of,
+    outer_balls_of,
+    outer_likely_of,
+    outer_primitives_of,
+    own_of,
+    pair_at,
+    pair_count_of,
+    pairs_of,
+    round_of,
+    scratch_of,
+    sizes_of,
+    slack_of,
+    solid_of,
+    span_of,
+    standing_count_of,
+    standing_solids_of,
+    wider_solids_of,
+)
+
+
+@inlined
+def outset(mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, lane: int) -> Any:
+    """Where the bounding ball of the first solid lies as seen from that of the second: the direction, and the gap."""
+    own, other = sizes_of(mine, first), sizes_of(others, second)
+    p = carried(frames[0], lane, bound_centre_of(own))
+    direction = minus(p, carried(frames[1], lane, bound_centre_of(other)))
+    length = sqrt(dot(direction, direction))
+    gap = length - bound_radius_of(own) - bound_radius_of(other)
+    if length < SHORTEST:
+        return (1.0, 0.0, 0.0), gap
+    return scaled(direction, 1.0 / length), gap
+
+
+@kernel
+def beyond_plane(mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, lane: int) -> int:
+    """Compare a solid with a half-space that stands still."""
+    half_space = sizes_of(others, second)
+    normal = axis_of(half_space)
+    p = farthest(mine, first, frames[0], frames[2], lane, scaled(normal, -1.0))
+    height = dot(normal, p) - disc_of(half_space) - round_of(sizes_of(mine, first))
+    slack = slack_between(mine, first, others, second)
+    if height > slack:
+        return FREE
+    return COLLIDING if height < -slack and is_inside(solid_of(mine, first)) != 0 else UNDECIDED
+
+
+@kernel
+def compare_solids(mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, wanted: int) -> Any:
+    """Lanes among ``wanted`` in which two solids are not proven apart, and those in which they are proven to overlap.
+
+    A plane that lies between two solids in one lane often does in the next.
+    """
+    kind, own = kind_of_solid(solid_of(others, second)), kind_of_solid(solid_of(mine, first))
+    if own != layout.CONVEX_SOLID or (kind != layout.CONVEX_SOLID and kind != layout.HALF_SPACE_SOLID):
+        return wanted, 0
+    open_, overlapping, known, last = 0, 0, False, (1.0, 0.0, 0.0)
+    while wanted != 0:
+        lane = first_bit(wanted)
+        wanted &= wanted - 1
+        if kind == layout.HALF_SPACE_SOLID:
+            answer = beyond_plane(mine, first, others, second, frames, lane)
+        else:
+            direction, gap = outset(mine, first, others, second, frames, lane)
+            if gap > slack_between(mine, first, others, second):
+                continue
+            answer, last = compare(mine, first, others, second, frames, lane, last if known else direction)
+            known = True
+        if answer != FREE:
+            open_ |= 1 << lane
+        if answer == COLLIDING:
+            overlapping |= 1 << lane
+    return open_, overlapping
+
+
+@kernel
+def compare_bodies(
+    scratch: ScratchTable, mine: SolidTable, first: int, others: SolidTable, second: int, wanted: int
+) -> Any:
+    """As ``compare_solids``, for bodies: the solids around them, and then those inside them where they differ."""
+    own, other_own = span_of(mine, first), span_of(others, second)
+    frames = (
+        frame_at(frames_of(scratch), frame_of_span(own)),
+        frame_at(frames_of(scratch), frame_of_span(other_own)),
+        note_of(scratch),
+    )
+    open_, overlapping = 0, 0
+    for one in range(first_around_of(own), end_around_of(own)):
+        for other in range(first_around_of(other_own), end_around_of(other_own)):
+            left, hit = compare_solids(mine, one, others, other, frames, wanted & ~overlapping)
+            open_ |= left
+            overlapping |= hit
+    if first_around_of(own) == first_inside_of(own) and first_around_of(other_own) == first_inside_of(other_own):
+        return open_, overlapping
+    for one in range(first_inside_of(own), end_inside_of(own)):
+        for other in range(first_inside_of(other_own), end_inside_of(other_own)):
+            _, hit = compare_solids(mine, one, others, other, frames, open_ & ~overlapping)
+            overlapping |= hit
+    return open_, overlapping
+
+
+@kernel
+def carried_axis(frame: Frame, lane: int, axis: int, a: Any, b: Any, c: Any) -> Any:
+    """A coordinate in the world of points of a frame. Here lanes hold points; ``lane`` is that of the frame."""
+    place = (layout.ROTATION + layout.AXES * axis) * WIDTH + lane
+    turned = a * float_at(frame, place) + b * float_at(frame, place + WIDTH) + c * float_at(frame, place + 2 * WIDTH)
+    return turned + float_at(frame, (layout.ORIGIN + axis) * WIDTH + lane)
+
+
+@kernel
+def corner_inside(
+    mine: SolidTable, one: int, frame: Frame, lane: int, primitives: PrimitiveTable, primitive: int
+) -> bool:
+    """Whether a corner of a solid lies inside a primitive, in one lane."""
+    solid, corners = solid_of(mine, one), corners_of(mine)
+    for block in range(first_block_of(solid), end_block_of(solid)):
+        a, b, c = corner_block(corners, block)
+        x, y = carried_axis(frame, lane, 0, a, b, c), carried_axis(frame, lane, 1, a, b, c)
+        gap = primitive_gap(primitives, primitive, x, y, carried_axis(frame, lane, 2, a, b, c), False)
+        if lowest(gap) < -slack_of(sizes_of(mine, one)):
+            return True
+    return False
+
+
+@kernel
+def corners_inside(world: WorldTable, body: int, standing: int, wanted: int) -> int:
+    """Lanes among ``wanted`` in which a point of a moving body lies inside one that stands still."""
+    mine, primitives, overlapping = moving_solids_of(world), inner_primitives_of(world), 0
+    primitive, span = int_at(own_of(primitives), standing), span_of(mine, body)
+    frame = frame_at(frames_of(scratch_of(world)), frame_of_span(span))
+    if primitive < 0:
+        return 0
+    for one in range(first_inside_of(span), end_inside_of(span)):
+        if kind_of_solid(solid_of(mine, one)) == layout.MERE_CORNERS:
+            left = wanted & ~overlapping
+            while left != 0:
+                lane = first_bit(left)
+                left &= left - 1
+                if corner_inside(mine, one, frame, lane, primitives, primitive):
+                    overlapping |= 1 << lane
+    return overlapping
+
+
+@kernel
+def mark(world: WorldTable, wanted: int) -> int:
+    """Collect for each pair of bodies the lanes in which the outer balls cannot prove it free; returns their number.
+
+    The numbers of moving and standing bodies come first, then those of the pairs of moving bodies.
+    """
+    scratch, balls, primitives = scratch_of(world), outer_balls_of(world), outer_primitives_of(world)
+    prepare(balls, scratch, joint_count_of(arm_of(world)))
+    marks = marks_of(scratch)
+    crossing = body_count_of(balls) * standing_count_of(primitives)
+    total = crossing + pair_count_of(balls)
+    for block in range((total + WIDTH - 1) // WIDTH):  # a scene of ten thousand bodies has as many for each link
+        set_lanes(marks, block, spread(ZERO))
+    scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, outer_likely_of(scratch), NO_WATCH)
+    self_collision(balls, scratch, wanted, marks_row(marks, crossing, 1), wanted < 0, NO_WATCH)
+    return total
+
+
+@kernel
+def compare_pair(world: WorldTable, number: int, wanted: int) -> Any:
+    """Lanes among ``wanted`` in which a marked pair is not proven apart, and those in which it is proven to overlap."""
+    scratch, balls, mine = scratch_of(world), outer_balls_of(world), moving_solids_of(world)
+    standing = standing_count_of(outer_primitives_of(world))
+    crossing = body_count_of(balls) * standing
+    if number >= crossing:
+        pair = pair_at(pairs_of(balls), number - crossing)
+        return compare_bodies(scratch, mine, one_body_of(pair), wider_solids_of(world), other_body_of(pair), wanted)
+    first, second, others = number // standing, number % standing, standing_solids_of(world)
+    if is_cloud(others, second):
+        return compare_cloud(world, first, second, wanted)
+    left, hit = compare_bodies(scratch, mine, first, others, second, wanted)
+    if left != hit:
+        hit |= corners_inside(world, first, second, left & ~hit)
+    return left, hit
+
+
+@kernel
+def narrow_phase(world: WorldTable, wanted: int) -> Any:
+    """Compare the pairs of bodies that the outer balls leave open in the lanes ``wanted``, solid by solid.
+
+    The marks of what is proven apart are taken back. A lane in which something overlaps is not compared further.
+
+    Returns:
+        Lanes in which something remains open, and lanes that are colliding.
+    """
+    total = mark(world, wanted)
+    marks = marks_of(scratch_of(world))
+    open_, colliding = 0, 0
+    for block in range((total + WIDTH - 1) // WIDTH):
+        marked = nonzero_ints(marks, block)
+        while marked != 0:
+            k = block * WIDTH + first_bit(marked)
+            marked &= marked - 1
+            lanes = int_at(marks, k) & ~colliding
+            if lanes == 0:
+                continue
+            left, hit = compare_pair(world, k, lanes)
+            set_int(marks, k, left | int_at(marks, k) & colliding)
+            open_ |= left
+            colliding |= hit
+    return open_ & ~colliding, colliding

@@ -1,0 +1,251 @@
+"""The reference implementation of the collision checks: the kernels' answers in plain numpy, ball by ball.
+
+For computers without numba, and to test the kernels; some thousand times slower.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels import layout
+from rrtik_ompl.kernels.tables import cloud_layout
+from rrtik_ompl.kernels.tables.memory import Table
+
+CHUNK = 64  # configurations at a time, to bound memory
+
+
+def frames(arm: Table, values: Matrix) -> NDArray[np.float64]:
+    """Joint frames as rotation and origin, world first, shape (m, joints + 1, 3, 4)."""
+    fixed = arm[layout.PLACEMENTS].astype(np.float64).reshape(-1, layout.POSE_NUMBERS)
+    turns, origins = fixed[:, layout.ROTATION : layout.ROTATION + 9], fixed[:, layout.ORIGIN : layout.ORIGIN + 3]
+    found = np.zeros((len(values), len(fixed) + 1, 3, 4))
+    found[:, 0, :, :3] = np.eye(3)
+    for joint, (parent, kind) in enumerate(zip(arm[layout.PARENTS], arm[layout.JOINT_KINDS], strict=True)):
+        above = found[:, parent]
+        rotation = above[:, :, :3] @ turns[joint].reshape(3, 3)
+        origin = above[:, :, 3] + above[:, :, :3] @ origins[joint]
+        value, sliding = values[:, joint, None] + arm[layout.PHASES][joint], kind == layout.SLIDE
+        x, y, z = rotation[:, :, 0], rotation[:, :, 1], rotation[:, :, 2]
+        sine, cosine = np.sin(value), np.cos(value)
+        turned = (x, y) if sliding else (x * cosine + y * sine, y * cosine - x * sine)
+        found[:, joint + 1] = np.stack([*turned, z, origin + (z * value if sliding else 0.0)], axis=2)
+    return found
+
+
+class PrimitiveView:
+    """One primitive of a table, as numpy reads it.
+
+    Attributes:
+        kind: Of the layout.
+        standing: Number of the standing body that it belongs to.
+    """
+
+    def __init__(self, primitives: Table, number: int) -> None:
+        shapes = primitives[layout.PRIMITIVES].reshape(-1, layout.SHAPE_FLOATS)
+        head = heads(primitives)[number]
+        self._shape: Vector = shapes[number].astype(np.float64)
+        self.kind, self.standing = int(head[layout.KIND]), int(head[layout.STANDING_BODY])
+        self._planes = primitives[layout.PLANES].reshape(-1, layout.PLANE_FLOATS)
+        self._span = slice(head[layout.FIRST_PLANE], head[layout.END_PLANE])
+        self._clouds, self._cloud = primitives.parts, int(head[layout.FIRST_PLANE])
+
+    def number(self, place: int) -> float:
+        """One of its numbers."""
+        return float(self._shape[place])
+
+    def vector(self, place: int) -> Vector:
+        """Three of its numbers."""
+        return self._shape[place : place + 3]
+
+    def heights(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Largest signed distance of points, shape (..., 3), from the planes of a convex one. Shape (...)."""
+        planes = self._planes[self._span].astype(np.float64)
+        normals = planes[:, layout.PLANE_NORMAL : layout.PLANE_NORMAL + 3]
+        return np.asarray((points @ normals.T - planes[:, layout.PLANE_OFFSET]).max(axis=-1))
+
+    def half_space_gap(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signed distance of points, shape (..., 3), from a half-space. Shape (...)."""
+        normal, offset = self.vector(layout.HALF_SPACE_NORMAL), self.number(layout.HALF_SPACE_OFFSET)
+        return np.asarray(points @ normal - offset)
+
+    def beyond_faces(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far points, shape (..., 3) and seen from its centre, lie beyond each pair of a box's faces."""
+        axes = self._shape[layout.BOX_AXES : layout.BOX_AXES + 9].reshape(3, 3)
+        return np.asarray(np.abs(away @ axes.T) - self.vector(layout.BOX_HALF_SIZES))
+
+    def to_capsule(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of points, shape (..., 3) and seen from a capsule's first end, from its axis. Shape (...)."""
+        axis = self.vector(layout.CAPSULE_AXIS)
+        share = np.clip((away @ axis) * self.number(layout.CAPSULE_INVERSE_SQUARE), 0.0, 1.0)
+        return np.asarray(np.linalg.norm(away - share[..., None] * axis, axis=-1))
+
+    def beyond_ends(self, away: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """How far points, seen from its centre, lie beyond a cylinder's ends and beyond its side."""
+        axis = self.vector(layout.CYLINDER_AXIS)
+        along = away @ axis
+        across = np.linalg.norm(away - along[..., None] * axis, axis=-1)
+        beyond = np.abs(along) - self.number(layout.CYLINDER_HALF_LENGTH)
+        return beyond, across - self.number(layout.CYLINDER_RADIUS)
+
+    def to_points(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of points, shape (..., 3) and seen from a cloud's origin, from its nearest point. Shape (...)."""
+        axes = self._shape[layout.CLOUD_AXES : layout.CLOUD_AXES + 9].reshape(3, 3)
+        return np.asarray(_search_tree(self._clouds[self._cloud]).query(away @ axes.T)[0])
+
+
+@lru_cache(maxsize=8)
+def _search_tree(cloud: Table) -> Any:
+    """SciPy's tree of a cloud's points."""
+    from scipy.spatial import cKDTree  # loads slower than most plans take, and few scenes have a cloud
+
+    blocks = cloud[cloud_layout.BLOCKS].reshape(-1, layout.AXES, cloud_layout.LEAF)
+    return cKDTree(blocks.transpose(0, 2, 1).reshape(-1, layout.AXES).astype(np.float64))
+
+
+def heads(primitives: Table) -> NDArray[np.int32]:
+    """Heads of all primitives, shape (k, ``HEAD_INTS``)."""
+    return primitives[layout.NUMBERS].reshape(-1, layout.HEAD_INTS)
+
+
+def refuse_kind(kind: int) -> NoReturn:
+    """Raise the error of a primitive of a kind that has no formula.
+
+    Raises:
+        InputError: Always.
+    """
+    raise InputError(f"collision check: a primitive is of unknown kind {kind}; have 0 to {layout.KINDS.stop - 1}")
+
+
+def meets_primitive(primitives: Table, number: int, points: NDArray[np.float64], radii: NDArray[np.float64]) -> Mask:
+    """Which balls, centres of shape (..., 3), meet a primitive. Shape (...).
+
+    Raises:
+        InputError: If it is of an unknown kind.
+    """
+    own = PrimitiveView(primitives, number)
+    if own.kind == layout.HALF_SPACE:
+        return np.asarray(own.half_space_gap(points) < radii)
+    if own.kind == layout.CONVEX:
+        return np.asarray(own.heights(points) < own.number(layout.CONVEX_SHARE) * radii)
+    away = points - own.vector(layout.SHAPE_CENTRE)
+    if own.kind == layout.BOX:
+        return np.asarray(np.linalg.norm(np.maximum(own.beyond_faces(away), 0.0), axis=-1) < radii)
+    if own.kind == layout.BALL:
+        return np.asarray(np.linalg.norm(away, axis=-1) < radii + own.number(layout.BALL_RADIUS))
+    if own.kind == layout.CAPSULE:
+        return np.asarray(own.to_capsule(away) < radii + own.number(layout.CAPSULE_RADIUS))
+    if own.kind == layout.CLOUD:
+        return np.asarray(own.to_points(away) < radii + own.number(layout.CLOUD_RADIUS))
+    if own.kind == layout.CYLINDER:
+        ends, side = own.beyond_ends(away)
+        return np.asarray(np.hypot(np.maximum(ends, 0.0), np.maximum(side, 0.0)) < radii)
+    refuse_kind(own.kind)
+
+
+def primitive_gap(primitives: Table, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed distance of points, shape (..., 3), from a primitive, negative inside. Shape (...).
+
+    Raises:
+        InputError: If it is of an unknown kind.
+    """
+    own = PrimitiveView(primitives, number)
+    if own.kind == layout.HALF_SPACE:
+        return own.half_space_gap(points)
+    if own.kind == layout.CONVEX:
+        height = own.heights(points)
+        return np.asarray(height if own.number(layout.CONVEX_SHARE) else np.where(height < 0.0, height, np.inf))
+    away = points - own.vector(layout.SHAPE_CENTRE)
+    if own.kind == layout.BALL:
+        return np.asarray(np.linalg.norm(away, axis=-1) - own.number(layout.BALL_RADIUS))
+    if own.kind == layout.BOX:
+        return _outside(own.beyond_faces(away))
+    if own.kind == layout.CAPSULE:
+        return np.asarray(own.to_capsule(away) - own.number(layout.CAPSULE_RADIUS))
+    if own.kind == layout.CLOUD:
+        return np.asarray(own.to_points(away) - own.number(layout.CLOUD_RADIUS))
+    if own.kind == layout.CYLINDER:
+        return _outside(np.stack(own.beyond_ends(away), axis=-1))
+    refuse_kind(own.kind)
+
+
+def _outside(beyond: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed distance from a set that is given by how far a point lies beyond each of its orthogonal faces."""
+    inside = np.minimum(beyond.max(axis=-1), 0.0)
+    return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + inside)
+
+
+class ReferenceChecks:
+    """The three-valued checks on the tables of a world."""
+
+    def __init__(self, arm: Table, balls: tuple[Table, Table], primitives: tuple[Table, Table]) -> None:
+        self._arm, self._balls, self._primitives = arm, balls, primitives
+
+    def classify(self, values: Matrix, *, resolve: bool) -> NDArray[np.int8]:
+        """See :meth:`rrtik_ompl.kernels.FastWorld.classify`."""
+        answers = np.zeros(len(values), dtype=np.int8)
+        for start in range(0, len(values), CHUNK):
+            part = slice(start, start + CHUNK)
+            poses = frames(self._arm, values[part])
+            answers[part] = self._in_collision(poses, 0).any(axis=1)
+            open_ = np.flatnonzero(answers[part])
+            if resolve and len(open_):
+                answers[start + open_] += self._in_collision(poses[open_], 1).any(axis=1)
+        return answers
+
+    def classify_edges(
+        self, starts: Matrix, ends: Matrix, steps: NDArray[np.int32], *, resolve: bool
+    ) -> NDArray[np.int8]:
+        """See :meth:`rrtik_ompl.kernels.FastWorld.classify_edges`."""
+        answers = np.zeros(len(starts), dtype=np.int8)
+        for edge, count in enumerate(steps):
+            share = (np.arange(count + 1) / count)[:, None]
+            answers[edge] = self.classify((1.0 - share) * starts[edge] + share * ends[edge], resolve=resolve).max()
+        return answers
+
+    def marks(self, values: Matrix) -> Mask:
+        """Flags of the pairs that the outer balls cannot prove free, shape (m, flags)."""
+        return np.asarray(self._in_collision(frames(self._arm, values), 0))
+
+    def _in_collision(self, poses: NDArray[np.float64], level: int) -> NDArray[np.bool_]:
+        """Which bodies meet, shape (m, moving * standing + pairs of moving bodies)."""
+        table, primitives = self._balls[level], self._primitives[level]
+        body_count, standing = int(table.header[layout.BODY_COUNT]), int(primitives.header[layout.STANDING_COUNT])
+        pairs = table[layout.PAIRS].reshape(-1, layout.PAIR_INTS)
+        found = np.zeros((len(poses), body_count * standing + len(pairs)), dtype=bool)
+        points, radii = placed_balls(poses, table)
+        checked = primitives[layout.CHECKED].reshape(body_count, standing)
+        for number, stands in enumerate(heads(primitives)[:, layout.STANDING_BODY]):
+            for body in np.flatnonzero(checked[:, stands]):
+                found[:, body * standing + stands] |= meets_primitive(
+                    primitives, number, points[body], radii[body]
+                ).any(axis=1)
+        for k, (i, j) in enumerate(zip(pairs[:, layout.PAIR_ONE], pairs[:, layout.PAIR_OTHER], strict=True)):
+            gaps = np.linalg.norm(points[i][:, :, None] - points[j][:, None], axis=3)
+            reaches = radii[i][:, None] + radii[j] + table[layout.SELF_MARGIN][0]
+            found[:, body_count * standing + k] = (gaps < reaches).any(axis=(1, 2))
+        return found
+
+
+def placed_balls(
+    poses: NDArray[np.float64], table: Table
+) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Centres in the world, shape (m, n, 3), and radii, shape (n,), of each body's balls."""
+    balls = table[layout.BALLS].astype(np.float64).reshape(-1, layout.BALL_FLOATS)
+    clusters = table[layout.CLUSTERS].reshape(-1, layout.CLUSTER_INTS)
+    centres = balls[:, layout.CENTRE : layout.CENTRE + 3]
+    points, radii = [], []
+    for body in table[layout.BODIES].reshape(-1, layout.BODY_INTS):
+        first, end = body[layout.BODY_FIRST], body[layout.BODY_END]
+        span = slice(0, 0)
+        if end > first:
+            span = slice(clusters[first, layout.CLUSTER_FIRST], clusters[end - 1, layout.CLUSTER_END])
+        pose = poses[:, body[layout.BODY_FRAME]]
+        points.append(np.einsum("mij,nj->mni", pose[:, :, :3], centres[span]) + pose[:, None, :, 3])
+        radii.append(balls[span, layout.RADIUS])
+    return points, radii

@@ -1,0 +1,61 @@
+"""Kernels of one ball against a cloud as a primitive: as those of :mod:`rrtik_ompl.kernels.checks.obstacle_kernels`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rrtik_ompl.kernels.clouds.accessors import cloud_at
+from rrtik_ompl.kernels.clouds.kernels import meets_points, to_points
+from rrtik_ompl.kernels.layout import PrimitiveHead, PrimitiveShape, PrimitiveTable
+from rrtik_ompl.kernels.simd.compiled import inlined, kernel
+from rrtik_ompl.kernels.simd.vectors import along
+from rrtik_ompl.kernels.tables.accessors import (
+    centre_of,
+    cloud_radius_of,
+    first_axis_of,
+    first_plane_of,
+    second_axis_of,
+    third_axis_of,
+)
+from rrtik_ompl.kernels.tables.cloud_layout import CloudTable
+
+
+@inlined
+def table_of(primitives: PrimitiveTable, head: PrimitiveHead) -> CloudTable:
+    """The table of the cloud that a primitive is."""
+    cloud: CloudTable = cloud_at(primitives, first_plane_of(head))
+    return cloud
+
+
+@inlined
+def in_cloud(shape: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
+    """Points of the world in a cloud's frame."""
+    centre = centre_of(shape)
+    x, y, z = x - centre[0], y - centre[1], z - centre[2]
+    a, b = along(first_axis_of(shape), x, y, z), along(second_axis_of(shape), x, y, z)
+    return a, b, along(third_axis_of(shape), x, y, z)
+
+
+@kernel
+def meets_cloud(
+    primitives: PrimitiveTable,
+    head: PrimitiveHead,
+    shape: PrimitiveShape,
+    x: Any,
+    y: Any,
+    z: Any,
+    radius: float,
+    bound: bool,
+    wanted: int,
+) -> int:
+    """Lanes among ``wanted`` in which a ball meets a point; ``bound``: the ball only stands for balls inside it."""
+    a, b, c = in_cloud(shape, x, y, z)
+    met: int = meets_points(table_of(primitives, head), a, b, c, radius + cloud_radius_of(shape), bound, wanted)
+    return met
+
+
+@kernel
+def cloud_gap(primitives: PrimitiveTable, head: PrimitiveHead, shape: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
+    """Signed distance of a point from the nearest of the cloud's balls."""
+    a, b, c = in_cloud(shape, x, y, z)
+    return to_points(table_of(primitives, head), a, b, c) - cloud_radius_of(shape)

@@ -1,0 +1,57 @@
+"""The tables of closed forms in kernels: what each field is, and the bounds that both forms of one arm go by.
+
+Kernels read by the named functions of :mod:`rrtik_ompl.kernels.ik.branch_accessors`.
+"""
+
+from __future__ import annotations
+
+from typing import NewType
+
+KERNELS = "ik.branch_kernels"  # their library
+BRANCHES, DOF = 8, 6
+
+# Addresses.
+ArmTable = NewType("ArmTable", int)
+CallTable = NewType("CallTable", int)
+Frame = NewType("Frame", int)  # 12 numbers: the rotation row by row, then the origin
+Matrices = NewType("Matrices", int)  # of 4 x 4 numbers, row by row
+Lanes = NewType("Lanes", int)  # wide lanes
+
+# Arm. FROM_WORLD: T_base_world, TO_FRAME: T_tip_frame, frames · NUMBERS: what its kernel takes, see below · LOWEST,
+# HIGHEST: limits with their tolerance · TURNING: int32, whether a joint's limits go beyond half a turn · LIMB: address
+# of the table of `ik_layout` that forward kinematics reads
+FROM_WORLD, TO_FRAME, NUMBERS, LOWEST, HIGHEST, TURNING, LIMB = range(7)
+# Numbers of an arm of parallel axes: of its DH table.
+A1, A2, A3, A4, D6 = range(5)
+# Numbers of an arm with a ball wrist: height of the shoulder, a2, d3 of the DH table, and the forearm from elbow to
+# wrist, its length and the angle that it is bent by.
+SHOULDER, UPPER_ARM, ASIDE, FOREARM, BEND = range(5)
+
+# Frame: places of its numbers.
+ROTATION, ORIGIN = 0, 9
+FRAME_NUMBERS = 12
+MATRIX_SIDE, MATRIX_NUMBERS = 4, 16
+
+# Call. ROWS: targets; BLOCKS: of WIDTH of them, the last one filled up · POSES: T_world_tip, matrices · NEAR:
+# configurations, 0: none · SLACK: one number, see `AnalyticSolver` · the answers, targets last, WIDTH times BLOCKS of
+# them: Q: joint values, joint by joint of each branch; REAL, FITS: of each branch, whether it reaches the target and
+# whether it is inside the limits; ODD: whether the answer is not to be used; RESIDUALS: of each branch its distance,
+# then of each its angle (0: not wanted) · SCRATCH: see below
+ROWS, BLOCKS, POSES, NEAR, SLACK, Q, REAL, FITS, ODD, RESIDUALS, SCRATCH = range(11)
+
+# Scratch memory, in wide lanes: TARGET as given and FRAME as the closed form wants it, the joint values of the HINT,
+# SINES and COSINES of the joints.
+TARGET, FRAME, HINT = 0, FRAME_NUMBERS, 2 * FRAME_NUMBERS
+SINES, COSINES, SCRATCH_LANES = HINT + DOF, HINT + 2 * DOF, HINT + 3 * DOF
+
+SINGULAR = 1e-10  # [m] or sine; nearer than this a pose counts as singular, and its answer is still good to 1e-9
+DOUBLE_ROOT = 4e-14  # of a squared sine: less is rounding, whose square root would spoil a stretched arm by 1e-8
+REACH_TOLERANCE = 1e-10  # in the cosine of an elbow: what rounding may add at a stretched arm
+
+# Of arms of parallel axes
+ROUNDING = 3e-16  # [m] of the wrist point: divided by its distance from the azimuth axis, of theta1 and so of h
+NORMAL = 4e-10  # sine; largest deviation of the gripper axis from the arm plane's normal that counts as none
+UNSURE = 1e-3  # sine; nearer to normal, rounding in psi can open a triangle that closes
+
+# Of arms with a ball wrist
+SHOULDER_ROOT = 1e-15  # [m^2] of a squared radius: less is rounding, which moves the wrist centre by less than 1e-14 m

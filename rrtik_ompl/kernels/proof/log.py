@@ -1,0 +1,67 @@
+"""What the kernels tell of a proof: by what each pair is proven apart on each interval."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.kernels.proof import layout
+from rrtik_ompl.kernels.proof.packing import ProofPairs
+from rrtik_ompl.kernels.tables.memory import Table, aligned
+
+FIRST_ROOM = 4096  # records
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProofLog:
+    """By what pairs are proven apart in a motion, a row for each pair and interval.
+
+    Attributes:
+        solids: Body above the plane, its part, body below, its part, shape (n, 4); part -1: a body as a whole.
+        intervals: Level and number of the interval from number / 2**level to (number + 1) / 2**level, shape (n, 2).
+        normals: Unit normal of the plane seen from the frame that carries both bodies, or zeros if a ball and a ball or
+            box settle it, shape (n, 3).
+    """
+
+    solids: NDArray[np.int64]
+    intervals: NDArray[np.int64]
+    normals: Matrix
+
+
+def logged(packed: ProofPairs, run: Callable[[], object], first_room: int = FIRST_ROOM) -> ProofLog:
+    """What kernels tell while they prove one motion.
+
+    Args:
+        packed: The table that they read.
+        run: Lets them prove the motion; called again where there was too little room.
+        first_room: For how many records there is room at first.
+    """
+    table, room = packed.table, first_room
+    try:
+        _give_room(table, room)
+        run()
+        while (count := int(table[layout.LOG_COUNT][0])) > room:
+            room = 2 * count  # another run need not come to the same planes
+            _give_room(table, room)
+            run()
+    finally:
+        table.header[layout.LOG_ROOM] = 0
+    records = table[layout.LOG].reshape(-1, layout.LOG_SIZE)[:count].astype(np.int64)
+    intervals = records[:, [layout.LOG_LEVEL, layout.LOG_NUMBER]]
+    normals = np.array(table[layout.LOG_WAYS].reshape(-1, 3)[:count])
+    return ProofLog(packed.sides[records[:, layout.LOG_PAIR]], intervals, normals)
+
+
+def _give_room(table: Table, room: int) -> None:
+    """Empty the log and give it room; the table's address stays."""
+    if len(table[layout.LOG_WAYS]) != 3 * room:
+        records = np.zeros(layout.LOG_SIZE * room, dtype=np.int32)
+        for place, array in ((layout.LOG, records), (layout.LOG_WAYS, np.zeros(3 * room))):
+            table.arrays[place] = roomy = aligned(array)
+            table.header[place] = roomy.ctypes.data
+    table.header[layout.LOG_ROOM] = room
+    table[layout.LOG_COUNT][0] = 0

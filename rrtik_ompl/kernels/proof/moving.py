@@ -1,0 +1,171 @@
+"""Obstacles of a proof's table that are moved in place: no body is packed again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.kernels.proof import layout
+from rrtik_ompl.kernels.proof.cloud_frames import cloud_bodies, cloud_poses
+from rrtik_ompl.kernels.proof.corners import corner_blocks, corners_in
+from rrtik_ompl.kernels.proof.groups import BLOCK
+from rrtik_ompl.kernels.proof.packing import NOTHING, ProofPairs, sizes_of, solid_kind
+from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
+from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, convex_solids, placed_bodies
+
+NO_LIMIT = 1 << 62
+_BALL = slice(layout.BALL_CENTRE, layout.BALL_CENTRE + 3)
+_AXES = slice(layout.BOX_AXES, layout.BOX_AXES + 9)
+_MIDDLE = slice(layout.BOX_MIDDLE, layout.BOX_MIDDLE + 3)
+_HALF = slice(layout.BOX_HALF, layout.BOX_HALF + 3)
+_DISC_AXIS = slice(layout.DISC_AXIS, layout.DISC_AXIS + 3)
+
+
+class MovedObstacles:
+    """The obstacles of a table, and where they were when it was packed.
+
+    Args:
+        packed: The table.
+        bodies: Those that it was packed for.
+    """
+
+    def __init__(self, packed: ProofPairs, bodies: Sequence[Body]) -> None:
+        self._packed = packed
+        self._numbers = [k for k, body in enumerate(bodies) if body.kind == "obstacle"]
+        self._back = [bodies[k].placement.inverse() for k in self._numbers]
+        place = {k: number for number, k in enumerate(self._numbers)}
+        below = packed.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_OTHER]
+        solids = dict(zip(below.tolist(), packed.sides[:, 2].tolist(), strict=True))  # what stands still is below
+        owners = {solid: place[body] for solid, body in sorted(solids.items()) if body in place}
+        self._solids, self._owners = (np.array(list(some), dtype=np.int64) for some in (owners, owners.values()))
+        records = packed.table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)[self._solids]
+        counts = records[:, layout.END_BLOCK] - records[:, layout.FIRST_BLOCK]
+        spans = [np.arange(*ends) for ends in records[:, [layout.FIRST_BLOCK, layout.END_BLOCK]].tolist()]
+        self._block_places = np.concatenate([np.zeros(0, dtype=np.int64), *spans])
+        self._block_owners = np.repeat(self._owners, counts)
+        self._half = records[:, layout.SOLID_KIND] == layout.HALF_SPACE
+        self._sizes: Matrix = packed.table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)[self._solids]
+        self._blocks: NDArray[np.float64] = packed.table[layout.CORNERS].reshape(-1, 3, WIDTH)[self._block_places]
+        sides = [(row, place[k]) for row, pair in enumerate(packed.bodies.tolist()) for k in pair if k in place]
+        self._pairs: NDArray[np.int64] = np.array(sides, dtype=np.int64).reshape(-1, 2)
+        obstacles = np.array([bodies[k].margin for k in self._numbers])
+        self._paddings = packed.margins[self._pairs[:, 0]] - obstacles[self._pairs[:, 1]]  # of what moves
+
+    def put(self, bodies: Sequence[Body], room: Sequence[float]) -> None:
+        """Put the obstacles where they are now.
+
+        Args:
+            bodies: As at the beginning, obstacles with other placements and margins.
+            room: For each body what is to be kept from it beside its margin [m]; read for obstacles.
+        """
+        packed, kept = self._packed, np.array([bodies[k].margin + room[k] for k in self._numbers])
+        packed.margins[self._pairs[:, 0]] = kept[self._pairs[:, 1]] + self._paddings
+        packed.kept = (float("nan"), packed.kept[1])  # so that margins are written anew
+        changes = [bodies[k].placement * back for k, back in zip(self._numbers, self._back, strict=True)]
+        turns = np.array([change.rotation for change in changes]).reshape(-1, 3, 3)
+        shifts = np.array([change.translation for change in changes]).reshape(-1, 3)
+        turn, shift, rows = turns[self._owners], shifts[self._owners], self._sizes.copy()
+        rows[:, _BALL] = _turned(turn, rows[:, _BALL]) + shift
+        axes = rows[:, _AXES].reshape(-1, 3, 3) @ turn.transpose(0, 2, 1)
+        rows[:, _AXES] = axes.reshape(-1, 9)
+        rows[:, _MIDDLE] += _turned(axes, shift)
+        rows[:, _DISC_AXIS] = _turned(turn, rows[:, _DISC_AXIS])
+        rows[:, layout.DISC] += self._half * (rows[:, _DISC_AXIS] * shift).sum(axis=1)
+        packed.table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)[self._solids] = rows
+        blocks = turns[self._block_owners] @ self._blocks + shifts[self._block_owners][:, :, None]
+        packed.table[layout.CORNERS].reshape(-1, 3, WIDTH)[self._block_places] = blocks
+        self._put_clouds(bodies)
+
+    def _put_clouds(self, bodies: Sequence[Body]) -> None:
+        """Put the clouds where they are now, and other points in their place where these have changed."""
+        table, numbers = self._packed.table, cloud_bodies(bodies)
+        if not numbers:
+            return
+        table[layout.CLOUD_POSES][:] = cloud_poses(bodies).ravel()
+        self._clouds = [cloud_table(bodies[k].geometry.cloud) for k in numbers]
+        table[layout.CLOUDS][:] = [cloud.address for cloud in self._clouds]
+        sizes = table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)
+        kinds = table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)[:, layout.SOLID_KIND]
+        places = [bodies[k].placement.homogeneous for k in numbers]
+        around = placed_bodies([convex_solids(bodies[k].geometry) for k in numbers], np.array(places))
+        turns = np.array([place[:3, :3] for place in places])
+        sizes[np.flatnonzero(kinds >= layout.CLOUD)] = sizes_of([solids.around for solids in around], turns)
+
+
+class MovedSolids:
+    """Standing bodies of a table, put elsewhere in place one after the other; no other body is packed again.
+
+    Args:
+        packed: The table.
+    """
+
+    def __init__(self, packed: ProofPairs) -> None:
+        self._packed, table = packed, packed.table
+        self._records = table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)
+        self._sizes = table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)
+        self._blocks = table[layout.CORNERS].reshape(-1, 3, WIDTH)
+        self._left = len(packed.firsts) if packed.groups else NO_LIMIT  # moves until neighbours are better found anew
+        self._groups: dict[int, list[int]] = {}
+        for group, members in enumerate(packed.groups):
+            for member in members:
+                self._groups.setdefault(member, []).append(group)
+
+    def put(self, number: int, body: Body) -> bool:
+        """Put a body elsewhere; whether it was done. If not, all has to be packed anew.
+
+        Args:
+            number: Of the body.
+            body: Where it is now.
+        """
+        pose = np.asarray(body.placement.homogeneous)[None]
+        own = placed_bodies([convex_solids(body.geometry)], pose)[0].around or (NOTHING,)
+        first, end = self._packed.firsts[number], self._packed.firsts[number + 1]
+        parts = self._parts(number)
+        kinds = [solid_kind(body, solid) for solid in own]
+        if self._left == 0 or kinds != self._records[parts, layout.SOLID_KIND].tolist() or layout.CLOUD in kinds:
+            return False
+        self._left -= 1
+        whole = [own] if end - first > len(own) else []
+        groups = [*whole, *((solid,) for solid in own)]
+        self._sizes[first:end] = sizes_of(groups, pose[:, :3, :3].repeat(len(groups), axis=0))
+        blocks = slice(self._records[parts[0], layout.FIRST_BLOCK], self._records[parts[-1], layout.END_BLOCK])
+        self._blocks[blocks] = corner_blocks([solid.corners for solid in own])
+        for group in self._groups.get(number, ()):
+            members, place = self._packed.groups[group], self._packed.firsts[-1] + group
+            if len(members) > BLOCK:  # what is around what was there and what is new is around all
+                solids = [_box(self._sizes[place]), *own]
+            else:
+                solids = [self._solid(k) for member in members for k in self._parts(member)]
+            self._sizes[place] = sizes_of([solids], np.eye(3)[None])
+        return True
+
+    def _parts(self, number: int) -> range:
+        """The solids of a body, without the one that stands for all of them."""
+        first, end = self._packed.firsts[number], self._packed.firsts[number + 1]
+        return range(first + (end - first > 1), end)
+
+    def _solid(self, number: int) -> ConvexSolid:
+        """A solid as it stands in the table."""
+        record, sizes = self._records[number], self._sizes[number]
+        return ConvexSolid(
+            corners_in(self._blocks[record[layout.FIRST_BLOCK] : record[layout.END_BLOCK]]),
+            disc=float(sizes[layout.DISC]),
+            axis=sizes[_DISC_AXIS],
+            radius=float(sizes[layout.ROUND]),
+        )
+
+
+def _box(sizes: Vector) -> ConvexSolid:
+    """The box around several bodies, whose axes are those of the world."""
+    ends = sizes[_MIDDLE] + np.array([[-1.0], [1.0]]) * sizes[_HALF]
+    return ConvexSolid(np.array(list(product(*ends.T))))
+
+
+def _turned(turns: NDArray[np.float64], a: Matrix) -> Matrix:
+    return np.asarray((turns @ a[:, :, None])[:, :, 0])

@@ -1,0 +1,303 @@
+"""What the kernels of proofs read, made from bodies and the pairs of them that must not touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.body_arrays import body_arrays
+from rrtik_ompl.geometry.collision.collector import collector_waits
+from rrtik_ompl.kernels.layout import CLOUD_SOLID, HALF_SPACE_SOLID
+from rrtik_ompl.kernels.layout import CONVEX_SOLID as IS_CONVEX
+from rrtik_ompl.kernels.proof import layout
+from rrtik_ompl.kernels.proof.cloud_frames import cloud_bodies, cloud_poses
+from rrtik_ompl.kernels.proof.corners import block_count, corner_blocks
+from rrtik_ompl.kernels.proof.groups import Members, compared_as_one, group_rows
+from rrtik_ompl.kernels.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
+from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
+from rrtik_ompl.kernels.tables.memory import Table, table, with_own
+from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, Solids, placed_bodies
+from rrtik_ompl.model.robot import Chain
+
+ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
+KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE, CLOUD_SOLID: CLOUD}
+SIZED = (IS_CONVEX, CLOUD_SOLID)  # have a ball and a box around them
+COMPUTED = (layout.MARGINS, *range(layout.FRAMES, layout.LAST_STAMP + 1), layout.LOG, layout.LOG_WAYS, layout.LOG_COUNT)
+
+
+@dataclass(slots=True, eq=False)
+class ProofPairs:
+    """The table of a proof, and what its pairs are.
+
+    Attributes:
+        table: For the kernels.
+        bodies: Numbers of the two bodies of each of the table's pairs, shape (n, 2).
+        sides: The same pairs as the kernels have them: body above the plane, its part, body below, its part, shape
+            (n, 4); part -1 is a body of several parts as a whole.
+        margins: How far each must stay apart [m], shape (n,).
+        beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
+        clear: Which of these are not in contact, and keep a clearance, shape (n,).
+        touching: Numbers of the pairs that are in contact.
+        firsts: The first solid of each body, and the end of them.
+        groups: Bodies that are one solid together; these solids come last.
+        kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, nan before the first
+            :meth:`keep`, and what they keep between all bodies for rounding and slack.
+    """
+
+    table: Table
+    bodies: NDArray[np.int64]
+    sides: NDArray[np.int64]
+    margins: Vector
+    beside_obstacle: NDArray[np.bool_]
+    clear: NDArray[np.bool_]
+    touching: Sequence[int]
+    firsts: Sequence[int]
+    groups: Sequence[Members]
+    kept: tuple[float, float] = (float("nan"), ROOM)
+
+    def keep(self, clearance: float, slack: float = 0.0) -> None:
+        """Let the kernels keep a clearance from obstacles beside the margins, and a slack between all bodies [m]."""
+        if (clearance, ROOM + slack) != self.kept:
+            self.kept = clearance, ROOM + slack
+            self.table[layout.MARGINS][:] = self.margins + self.kept[1] + clearance * self.clear
+
+    def for_thread(self) -> ProofPairs:
+        """The same pairs in a table with memory of its own to compute in."""
+        own = {place: np.zeros_like(self.table[place]) for place in COMPUTED}
+        if self.table.parts:  # of a cloud, points that are compared stand among the solids
+            own |= {place: self.table[place] for place in (layout.SOLIDS, layout.CORNERS)}
+        return replace(self, table=with_own(self.table, own), kept=(float("nan"), ROOM))
+
+
+@collector_waits
+def proof_pairs(
+    chain: Chain,
+    bodies: Sequence[Body],
+    pairs: Sequence[tuple[int, int]],
+    solids: Sequence[Solids],
+    strokes: ArrayLike,
+    *,
+    fixed: bool = True,
+) -> ProofPairs:
+    """Pack a proof.
+
+    Args:
+        chain: The tree of joints.
+        bodies: All bodies.
+        pairs: Numbers of those that must not touch; pairs that both stand still are left out.
+        solids: For each body convex solids around it, in its own frame.
+        strokes: Largest value of sliding joints [m], a number or shape (joints,).
+        fixed: Whether obstacles stay where they are; neighbours among many are compared as one then.
+    """
+    joints = len(chain.parent)
+    parts = [own.around or (NOTHING,) for own in placed_bodies(solids, body_arrays(bodies).placements)]
+    reached = [
+        _reaches(chain, body.joint, own, np.broadcast_to(strokes, joints))
+        for body, own in zip(bodies, parts, strict=True)
+    ]
+    sweeps: dict[tuple[Members, int], int] = {}
+    whole: list[tuple[int, ...]] = []
+    of_parts: list[tuple[int, ...]] = []
+    ends = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)]).tolist()
+    on = [body.joint for body in bodies]
+    common = cache(partial(_common, chain))
+    moving = [(i, j) for i, j in pairs if on[i] or on[j]]
+    groups = compared_as_one(bodies, parts, moving, common, fixed=fixed)
+    grouped = {(k, s): None for members, (blocks, *_) in groups for block in blocks for s in block for k in members}
+    for i, j in [*grouped, *(pair for pair in moving if pair not in grouped and pair[::-1] not in grouped)]:
+        base = common(on[i], on[j])
+        one, other = (i, j) if base == on[j] else (j, i)
+        own = [sweeps.setdefault(((k,), base), len(sweeps)) if on[k] != base else -1 for k in (one, other)]
+        first = len(of_parts)
+        split = len(parts[one]) > 1 or len(parts[other]) > 1
+        if split:
+            firsts = [ends[k] + (len(parts[k]) > 1) for k in (one, other)]
+            of_parts += [
+                (firsts[0] + a, firsts[1] + b, base, *own, 0, 0, one, a, other, b)
+                for a in range(len(parts[one]))
+                for b in range(len(parts[other]))
+            ]
+        numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
+        span = (first, len(of_parts))
+        whole.append((ends[one], ends[other], base, *own, *span, one, numbers[0], other, numbers[1]))
+    of_groups, together, top = group_rows(groups, on, ends, sweeps, len(whole) + len(of_parts))
+    rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 4)
+    rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
+    top += range(len(grouped), len(whole))
+    sides = rows[:, layout.PAIR_SIZE :]
+    named = np.sort(sides[:, ::2], axis=1)
+    packed = _solid_arrays(bodies, parts, list(together))
+    clouds = [cloud_table(bodies[k].geometry.cloud) for k in cloud_bodies(bodies)]
+    made = table(
+        {
+            layout.JOINT_COUNT: joints,
+            layout.PARENTS: (chain.parent + 1).astype(np.int32),
+            layout.SLIDING: chain.prismatic.astype(np.int32),
+            layout.JOINTS: _joint_records(chain),
+            **packed,
+            layout.SWEEP_COUNT: len(sweeps),
+            layout.SWEEPS: np.array([(bodies[k].joint, base) for (k, *_), base in sweeps], dtype=np.int32),
+            layout.REACHES: np.array([np.max([reached[k] for k in them], axis=0) for them, _ in sweeps]),
+            layout.BODY_PAIR_COUNT: len(whole),
+            layout.PAIR_COUNT: len(rows),
+            layout.PAIRS: rows[:, : layout.PAIR_SIZE].astype(np.int32),
+            layout.MARGINS: np.zeros(len(rows)),
+            layout.FRAMES: np.zeros(NODES * (joints + 1) * layout.FRAME_SIZE),
+            layout.STAMPS: np.zeros(NODES, dtype=np.int32),
+            layout.BENDS: np.zeros(len(sweeps)),
+            layout.WAYS: np.zeros(3 * len(rows)),
+            layout.LISTS: np.zeros((layout.DEEPEST + 2) * len(rows), dtype=np.int32),
+            layout.COUNTS: np.zeros(layout.DEEPEST + 2, dtype=np.int32),
+            layout.STACK: np.zeros(2 * (layout.DEEPEST + 3), dtype=np.int32),
+            layout.SEEN: np.zeros(4 * layout.FRAME_SIZE),
+            layout.LAST_STAMP: np.zeros(1, dtype=np.int32),
+            layout.TOP_COUNT: len(top),
+            layout.TOP_PAIRS: np.array(top, dtype=np.int32),
+            layout.LOG_ROOM: 0,
+            layout.LOG: np.zeros(0, dtype=np.int32),
+            layout.LOG_WAYS: np.zeros(0),
+            layout.LOG_COUNT: np.zeros(1, dtype=np.int32),
+            layout.CLOUDS: np.array([cloud.address for cloud in clouds], dtype=np.int64),
+            layout.CLOUD_POSES: cloud_poses(bodies),
+        },
+        clouds,
+    )
+    arrays = body_arrays(bodies)
+    beside = np.asarray(arrays.obstacles[named].any(axis=1))
+    touching = arrays.in_contact(named)
+    margins = arrays.kept_apart(named)
+    for number, row in enumerate(of_groups, len(whole) + len(of_parts)):
+        margins[number] = margins[row[layout.PARTS_FIRST] : row[layout.PARTS_END]].max()
+    return ProofPairs(
+        made, named, sides, margins, beside, beside & ~touching, np.flatnonzero(touching).tolist(), ends, list(together)
+    )
+
+
+NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)
+
+
+def solid_kind(body: Body, solid: ConvexSolid) -> int:
+    """What the kernels take a solid for; a half-space that moves is not known to them."""
+    kind = KINDS.get(solid.kind, UNKNOWN)
+    return UNKNOWN if kind == HALF_SPACE and body.joint > 0 else kind
+
+
+def _common(chain: Chain, first: int, second: int) -> int:
+    """The last frame that carries both of two frames."""
+    while first != second:  # parents have smaller numbers
+        first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1
+    return first
+
+
+def _joint_records(chain: Chain) -> Matrix:
+    """The joints as the kernels read them, shape (joints, JOINT_SIZE)."""
+    turns = chain.placement[:, :3, :3].reshape(-1, 9)
+    return np.concatenate([turns, chain.placement[:, :3, 3], chain.axis], axis=1)
+
+
+def _points(solid: ConvexSolid, axis: Vector) -> tuple[float, float]:
+    """Largest distance of a solid's points from the frame's origin, and from an axis through it."""
+    around = solid.disc + solid.radius
+    far = float(np.linalg.norm(solid.corners, axis=1).max()) + around
+    return far, float(np.linalg.norm(np.cross(solid.corners, axis), axis=1).max()) + around
+
+
+def _reaches(chain: Chain, joint: int, parts: Sequence[ConvexSolid], strokes: Vector) -> Vector:
+    """How far a body's points come from the axis of each joint that carries it, in any posture, shape (joints,)."""
+    reaches = np.zeros(len(chain.parent))
+    if joint == 0:
+        return reaches
+    if any(solid.kind != IS_CONVEX for solid in parts):
+        return np.full(len(chain.parent), np.inf)
+    measured = np.array([_points(solid, chain.axis[joint - 1]) for solid in parts]).max(axis=0)
+    far, reaches[joint - 1] = measured
+    while (parent := int(chain.parent[joint - 1])) >= 0:
+        origin = chain.placement[joint - 1][:3, 3]
+        slide = float(strokes[joint - 1]) if chain.prismatic[joint - 1] else 0.0
+        reaches[parent] = float(np.linalg.norm(np.cross(origin, chain.axis[parent]))) + slide + far
+        far += float(np.linalg.norm(origin)) + slide
+        joint = parent + 1
+    return reaches
+
+
+def sizes_of(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]) -> Matrix:
+    """Ball and box around groups of solids, and the measures of the first of each, shape (n, SIZE_COUNT).
+
+    Args:
+        groups: n groups of one solid or more.
+        turns: Columns are the axes of the boxes, shape (n, 3, 3).
+    """
+    made = np.zeros((len(groups), layout.SIZE_COUNT))
+    first = [group[0] for group in groups]
+    made[:, layout.DISC] = [solid.disc for solid in first]
+    made[:, layout.DISC_AXIS : layout.DISC_AXIS + 3] = np.reshape([solid.axis for solid in first], (-1, 3))
+    known = np.array([all(solid.kind in SIZED for solid in group) for group in groups], dtype=bool)
+    if not known.any():
+        return made
+    turns, kept = turns[known], [group for group, convex in zip(groups, known, strict=True) if convex]
+    solids = [solid for group in kept for solid in group]
+    counts = [len(solid.corners) for solid in solids]
+    group_of = np.repeat(np.arange(len(kept)), [len(group) for group in kept])
+    solid_of = np.repeat(np.arange(len(solids)), counts)
+    starts = np.searchsorted(group_of[solid_of], np.arange(len(kept)))
+    discs, rounds = np.array([(solid.disc, solid.radius) for solid in solids]).T
+    axes = np.einsum("nji,nj->ni", turns[group_of], np.array([solid.axis for solid in solids]))
+    across = discs[:, None] * np.sqrt(np.maximum(0.0, 1.0 - axes**2)) + rounds[:, None]
+    corners = np.concatenate([solid.corners for solid in solids])
+    along = np.einsum("nji,nj->ni", turns[group_of[solid_of]], corners)
+    low = np.minimum.reduceat(along - across[solid_of], starts)
+    high = np.maximum.reduceat(along + across[solid_of], starts)
+    centres = np.einsum("nij,nj->ni", turns, 0.5 * (low + high))
+    away = np.linalg.norm(corners - centres[group_of[solid_of]], axis=1) + (discs + rounds)[solid_of]
+    numbers = {
+        layout.BALL_CENTRE: centres,
+        layout.BALL_RADIUS: np.maximum.reduceat(away, starts)[:, None],
+        layout.BOX_AXES: turns.transpose(0, 2, 1).reshape(-1, 9),
+        layout.BOX_MIDDLE: 0.5 * (low + high),
+        layout.BOX_HALF: 0.5 * (high - low),
+        layout.ROUND: np.array([[group[0].radius] for group in kept]),
+    }
+    for place, run in numbers.items():
+        made[known, place : place + run.shape[1]] = run
+    return made
+
+
+def _solid_arrays(
+    bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], groups: Sequence[Members]
+) -> dict[int, int | NDArray[np.int32] | NDArray[np.float64]]:
+    """The arrays of all solids: a body of several parts comes before these, as a whole; groups of bodies come last."""
+    numbers: list[tuple[int, ...]] = []
+    solids: list[Sequence[ConvexSolid]] = []
+    corners: list[Matrix] = []
+    count = 0
+    owners: list[int] = []
+    for k, (body, own) in enumerate(zip(bodies, parts, strict=True)):
+        if len(own) > 1:
+            known = all(solid.kind == IS_CONVEX for solid in own)
+            numbers.append((body.joint, 0, 0, WHOLE_BODY if known else UNKNOWN))
+            solids.append(own)
+        for solid in own:
+            numbers.append((body.joint, count, count + block_count(solid.corners), solid_kind(body, solid)))
+            solids.append((solid,))
+            corners.append(solid.corners)
+            count += block_count(solid.corners)
+        owners += [k] * (len(numbers) - len(owners))
+    turns = body_arrays(bodies).placements[owners, :3, :3]
+    for members in groups:
+        numbers.append((bodies[members[0]].joint, 0, 0, WHOLE_BODY))
+        solids.append([solid for k in members for solid in parts[k]])
+    turns = np.concatenate([turns, np.tile(np.eye(3), (len(groups), 1, 1))])
+    records = np.array(numbers, dtype=np.int32).reshape(-1, layout.SOLID_SIZE)  # none where all is free
+    clouds = np.flatnonzero(records[:, layout.SOLID_KIND] == CLOUD)
+    records[clouds, layout.SOLID_KIND] += np.arange(len(clouds), dtype=np.int32)
+    return {
+        layout.SOLIDS: records,
+        layout.SIZES: sizes_of(solids, turns),
+        layout.CORNERS: corner_blocks(corners),
+    }

@@ -1,0 +1,212 @@
+"""Projection onto regions in kernels, and whether straight motions keep them.
+
+Sources: damped Gauss-Newton steps on all regions at once [22, 23]; the bound on motions is that of
+:meth:`rrtik_ompl.constraints.held_regions.HeldRegions.motions_held`, with fewer halvings.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rrtik_ompl.kernels.ik.ik_accessors import column_at, column_of, gain_of, joint_count_of, sliding_of
+from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, Pose
+from rrtik_ompl.kernels.search.constrained import layout
+from rrtik_ompl.kernels.search.constrained.layout import HeldTable, RegionTable
+from rrtik_ompl.kernels.search.constrained.region_kernels import (
+    columns_of,
+    dof_of,
+    error_of,
+    held_number,
+    limb_of,
+    origin_measure,
+    place_frame,
+    record_of,
+    region_at,
+    region_count_of,
+    set_columns,
+    set_origin_residual,
+    set_turn_residual,
+    turn_measure,
+)
+from rrtik_ompl.kernels.search.motions.row_kernels import Configuration
+from rrtik_ompl.kernels.simd.compiled import inlined, kernel
+from rrtik_ompl.kernels.simd.lanes import double_at, field, int_at, set_double
+
+HALVINGS = 3  # of a motion, at most
+PATIENCE, STALLED = 8, 0.5  # steps after which the squared residual must be down to this share
+SHARE = 0.5  # of the squared residual, that is added to the damping
+
+
+@inlined
+def square_at(held: HeldTable, row: int, column: int) -> Any:
+    """An entry of the square matrix."""
+    return double_at(field(held, layout.SQUARE), row * dof_of(held) + column)
+
+
+@inlined
+def set_square(held: HeldTable, row: int, column: int, value: float) -> None:
+    """Set an entry of the square matrix."""
+    set_double(field(held, layout.SQUARE), row * dof_of(held) + column, value)
+
+
+@kernel
+def clear_sums(held: HeldTable) -> None:
+    """Begin a step: no rows yet."""
+    dof = dof_of(held)
+    for a in range(dof):
+        set_double(field(held, layout.CHANGE), a, 0.0)
+        for b in range(a + 1):
+            set_square(held, a, b, 0.0)
+
+
+@kernel
+def add_rows(held: HeldTable, region: RegionTable, tip: Pose) -> Any:
+    """Add a region's rows to the sums J^T J and J^T e; returns |e|^2."""
+    set_columns(held, region, tip)
+    columns, error, change = columns_of(held), error_of(held), field(held, layout.CHANGE)
+    total = 0.0
+    for k in range(TWIST_NUMBERS):
+        total += double_at(error, k) * double_at(error, k)
+    for a in range(dof_of(held)):
+        column, pull = column_at(columns, a), double_at(change, a)
+        for k in range(TWIST_NUMBERS):
+            pull += double_at(column, k) * double_at(error, k)
+        set_double(change, a, pull)
+        for b in range(a + 1):
+            other, product = column_at(columns, b), square_at(held, a, b)
+            for k in range(TWIST_NUMBERS):
+                product += double_at(column, k) * double_at(other, k)
+            set_square(held, a, b, product)
+    return total
+
+
+@kernel
+def solve_sums(held: HeldTable, damping: float) -> None:
+    """Replace J^T e by (J^T J + damping)^-1 J^T e: Cholesky's decomposition, the inverse of its diagonal kept."""
+    dof, change = dof_of(held), field(held, layout.CHANGE)
+    for a in range(dof):
+        for b in range(a + 1):
+            rest = square_at(held, a, b) + (damping if a == b else 0.0)
+            for k in range(b):
+                rest -= square_at(held, a, k) * square_at(held, b, k)
+            set_square(held, a, b, 1.0 / math.sqrt(max(rest, damping)) if a == b else rest * square_at(held, b, b))
+    for a in range(dof):
+        rest = double_at(change, a)
+        for k in range(a):
+            rest -= square_at(held, a, k) * double_at(change, k)
+        set_double(change, a, rest * square_at(held, a, a))
+    for a in range(dof - 1, -1, -1):
+        rest = double_at(change, a)
+        for k in range(a + 1, dof):
+            rest -= square_at(held, k, a) * double_at(change, k)
+        set_double(change, a, rest * square_at(held, a, a))
+
+
+@kernel
+def step_on(held: HeldTable, q: Configuration) -> None:
+    """Move q by the change, no coordinate too far, none beyond a limit."""
+    change, largest = field(held, layout.CHANGE), held_number(held, layout.LARGEST_STEP)
+    lower, upper = field(held, layout.HELD_LOWER), field(held, layout.HELD_UPPER)
+    most = largest
+    for k in range(dof_of(held)):
+        most = max(most, abs(double_at(change, k)))
+    for k in range(dof_of(held)):
+        value = double_at(q, k) + double_at(change, k) * (largest / most)
+        set_double(q, k, min(max(value, double_at(lower, k)), double_at(upper, k)))
+
+
+@kernel
+def project(held: HeldTable, q: Configuration, steps: int) -> bool:
+    """Move q into all regions, in so many steps at most; whether it is there."""
+    mark = 1e300
+    for number in range(steps + 1):
+        clear_sums(held)
+        total = 0.0
+        for k in range(region_count_of(held)):
+            region = region_at(held, k)
+            tip = place_frame(region, q)
+            set_origin_residual(held, region, tip)
+            set_turn_residual(held, region, tip)
+            total += add_rows(held, region, tip)
+        if total == 0.0:
+            return True
+        if number == steps:
+            return False
+        if number % PATIENCE == 0:
+            if total > STALLED * mark:
+                return False
+            mark = total
+        solve_sums(held, held_number(held, layout.DAMPING) + SHARE * total)
+        step_on(held, q)
+    return False
+
+
+@kernel
+def measures(held: HeldTable, number: int, q: Configuration) -> Any:
+    """The measures of a configuration: of the origin and of the turn."""
+    region = region_at(held, number)
+    tip = place_frame(region, q)
+    return origin_measure(region, tip), turn_measure(region, tip)
+
+
+@inlined
+def highest(first: float, last: float, bend: float) -> Any:
+    """The largest that a measure can be on a motion, from those of its ends and the deviation in between."""
+    way = abs(last - first)
+    if way >= 4.0 * bend:
+        return max(first, last)
+    return 0.5 * (first + last) + bend + way * way / (16.0 * bend)
+
+
+@kernel
+def deviation(region: RegionTable, start: Configuration, end: Configuration) -> Any:
+    """How far the measures of a straight motion exceed those of its ends, at most: of the origin and of the turn."""
+    limb, record = limb_of(region), record_of(region)
+    origin, before = 0.0, 0.0
+    for joint in range(joint_count_of(limb)):
+        k = int_at(column_of(limb), joint)
+        way = abs(double_at(gain_of(limb), joint) * (double_at(end, k) - double_at(start, k)))
+        turned = way if int_at(sliding_of(limb), joint) == 0 else 0.0
+        origin += way * double_at(record, layout.LEVERS + joint) * (turned + 2.0 * before)
+        before += turned
+    return origin * 0.125, double_at(record, layout.CURVATURE) * before * before * 0.125
+
+
+@kernel
+def keeps_region(held: HeldTable, number: int, start: Configuration, end: Configuration) -> bool:
+    """Whether a straight motion between configurations in a region keeps it: parts of it, ever smaller, are bounded."""
+    region = region_at(held, number)
+    node, (origin, turn) = field(held, layout.NODE), deviation(region, start, end)
+    most_origin = double_at(record_of(region), layout.MOST)
+    most_turn = double_at(record_of(region), layout.MOST + 1)
+    first, last = measures(held, number, start), measures(held, number, end)
+    parts = 1
+    for _ in range(HALVINGS + 1):
+        kept, before = True, first
+        for part in range(1, parts + 1):
+            here = last
+            if part < parts:
+                share = float(part) / float(parts)
+                for k in range(dof_of(held)):
+                    set_double(node, k, (1.0 - share) * double_at(start, k) + share * double_at(end, k))
+                here = measures(held, number, node)
+            if here[0] > most_origin or here[1] > most_turn:
+                return False
+            kept = highest(before[0], here[0], origin) <= most_origin and highest(before[1], here[1], turn) <= most_turn
+            if not kept:
+                break
+            before = here
+        if kept:
+            return True
+        parts, origin, turn = 2 * parts, 0.25 * origin, 0.25 * turn
+    return False
+
+
+@kernel
+def keeps(held: HeldTable, start: Configuration, end: Configuration) -> bool:
+    """Whether a straight motion between configurations in all regions keeps them all."""
+    kept = True
+    for number in range(region_count_of(held)):
+        kept = kept and keeps_region(held, number, start, end)
+    return kept

@@ -1,0 +1,204 @@
+"""Roadmaps on arrays: the object that keeps the memory of the kernels and answers their questions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import Matrix, finite_array
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, MotionsFree
+from rrtik_ompl.kernels.search.roadmap import layout
+from rrtik_ompl.kernels.search.roadmap.memory import make_room, roadmap_table
+from rrtik_ompl.kernels.search.tree_layout import ROWS, SIZE
+from rrtik_ompl.kernels.search.tree_memory import tree_table
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables.memory import aligned
+
+FIRST_VERTICES = 64 * WIDTH
+SAMPLES_IN_CALL = 64  # samples drawn, about a millisecond
+EDGES_IN_CALL = 128
+HALVES_IN_CALL = 256  # of edges that a query follows
+
+
+class KernelGraph:
+    """A roadmap whose searches run in kernels; for one thread at a time.
+
+    Args:
+        motions: How motions are checked in a world.
+        lower, upper: The box of configurations, shape (n,), finite.
+        near: With how many of the vertices near it a new one is joined, at least 1.
+        seed: Of the samples.
+        ask: Decides motions (A, B), shapes (m, n), that the kernels leave undecided, shape (m,); None: they count as
+            colliding.
+
+    Raises:
+        InputError: If there are no kernels or shapes do not fit.
+    """
+
+    def __init__(
+        self,
+        motions: FastMotions,
+        lower: ArrayLike,
+        upper: ArrayLike,
+        *,
+        near: int,
+        seed: int,
+        ask: MotionsFree | None,
+    ) -> None:
+        kernels = library(layout.KERNELS)
+        if kernels is None:
+            raise InputError("roadmap in kernels: there are none; install numba")
+        self._kernels, self._motions, self._ask, self._near = kernels, motions, ask, near
+        self._dof, motions.fast.pinned = motions.dof, True
+        box = finite_array(lower, (self._dof,), "lower bounds"), finite_array(upper, (self._dof,), "upper bounds")
+        motions.require_covered(*box)
+        joints = 0 if motions.identity else motions.joints
+        self._vertices = tree_table(self._dof, joints, FIRST_VERTICES)
+        halves = 2 * near * FIRST_VERTICES
+        self._table = roadmap_table(motions, self._vertices, box, near, halves, resolve=ask is not None)
+        header: Any = self._table.header
+        self._fields = memoryview(header)  # numpy takes ten times as long for one number
+        self._kernels.seed_samples(self._table.address, int(seed) & (2**63 - 1))
+        self._ends = aligned(np.zeros(self._dof)).reshape(1, self._dof)
+
+    @property
+    def size(self) -> int:
+        """Number of vertices."""
+        return self._fields[layout.MAPPED]
+
+    @property
+    def rows(self) -> Matrix:
+        """The vertices, shape (size, n); a copy."""
+        return self._rows()[: self.size].copy()
+
+    @property
+    def edges(self) -> NDArray[np.int32]:
+        """Pairs of vertices, shape (m, 2)."""
+        self._kernels.forget_query(self._table.address)
+        return self._table[layout.TO][: self._fields[layout.HALVES]].reshape(-1, 2)[:, ::-1].copy()
+
+    @property
+    def states(self) -> NDArray[np.int32]:
+        """What is known of the edges, shape (m,): UNKNOWN, SURE, DOUBTFUL or BLOCKED."""
+        self._kernels.forget_query(self._table.address)
+        return self._table[layout.STATES][: self._fields[layout.HALVES] // 2].copy()
+
+    def restore(self, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32]) -> None:
+        """Fill an empty roadmap with what another one gave; for states None nothing is known of the edges.
+
+        Raises:
+            InputError: If it is not empty, or numbers of vertices do not fit.
+        """
+        if self.size or len(edges) != len(states) or (len(edges) and not 0 <= edges.min() <= edges.max() < len(rows)):
+            raise InputError("roadmap: its edges do not fit its vertices")
+        make_room(self._table, self._vertices, len(rows), 2 * len(edges))
+        self._kernels.insert(self._table.address, self._place_of(rows), len(rows))
+        pairs = aligned(np.ascontiguousarray(edges, dtype=np.int32))
+        self._kernels.connect(self._table.address, pairs.ctypes.data, len(edges))
+        self._table[layout.STATES][: len(edges)] = states
+
+    def grow(self, wanted: int, stop: Callable[[], object]) -> int:
+        """Add free samples until there are ``wanted`` more, or it is time to stop; how many were added."""
+        self._kernels.forget_query(self._table.address)
+        added = 0
+        while added < wanted and not stop():
+            more = min(wanted - added, SAMPLES_IN_CALL)
+            make_room(self._table, self._vertices, *self._enough(more))
+            added += self._kernels.grow(self._table.address, more, SAMPLES_IN_CALL)
+        return added
+
+    def learn(self, path: Matrix) -> int:
+        """Make the rows of a free path, shape (k, n), vertices; how many, up to the first one outside the box."""
+        self._kernels.forget_query(self._table.address)
+        halves = self._fields[layout.HALVES] + 2 * (self._near + 1) * len(path)
+        make_room(self._table, self._vertices, self.size + len(path), halves)
+        return self._kernels.learn(self._table.address, self._place_of(path), len(path))
+
+    def check(self, stop: Callable[[], object]) -> None:
+        """Check all edges that nobody has looked at, until it is time to stop."""
+        self._kernels.forget_query(self._table.address)
+        edges = self._fields[layout.HALVES] // 2
+        for first in range(0, edges, EDGES_IN_CALL):
+            if stop():
+                return
+            self._kernels.check_edges(self._table.address, first, min(EDGES_IN_CALL, edges - first))
+
+    def doubt(self) -> None:
+        """Forget what is known of the edges, since an obstacle has moved."""
+        self._kernels.doubt(self._table.address)
+
+    def route(self, starts: Matrix, goals: Matrix, stop: Callable[[], object]) -> Matrix | None:
+        """The shortest path on the roadmap from a start to a goal, shape (k, n); None if there is none in time.
+
+        Args:
+            starts: Free configurations, shape (s, n).
+            goals: Free configurations, shape (g, n).
+            stop: True to give up.
+
+        Raises:
+            InputError: If a start or goal is not in the box.
+        """
+        counts = len(starts), len(goals)
+        halves = 2 * (self._near + counts[0]) * sum(counts)
+        make_room(self._table, self._vertices, self.size + sum(counts), self._fields[layout.HALVES] + halves)
+        address, place = self._table.address, self._place_of(np.concatenate([starts, goals]))
+        outside = self._kernels.pose(address, place, *counts)
+        if outside >= 0:
+            what = f"start {outside}" if outside < counts[0] else f"goal {outside - counts[0]}"
+            raise InputError(f"roadmap: {what} is not in the box of configurations")
+        status = self._kernels.begin(address)
+        while status != layout.SOLVED:
+            if status == layout.EXHAUSTED or stop():
+                return None
+            status = self._answered() if status == layout.ASKING else self._kernels.search_on(address, HALVES_IN_CALL)
+        return self._path()
+
+    def statistics(self) -> dict[str, int | float]:
+        """Counts since the roadmap was made."""
+        self._kernels.forget_query(self._table.address)
+        edges, checked = self._fields[layout.HALVES] // 2, self._fields[layout.CHECKED]
+        return {"vertices": self.size, "edges": edges, "motions": checked, "iterations": self._fields[layout.SAMPLES]}
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond the memory of the roadmap or what it works on."""
+        return self._motions.intact() and self._table.intact() and self._vertices.intact()
+
+    def _answered(self) -> int:
+        """Decide what the kernels ask; the next status."""
+        count = self._fields[layout.ASKED]
+        halves = self._table[layout.QUESTIONS][:count]
+        to, rows = self._table[layout.TO], self._rows()
+        free = np.zeros(count, dtype=bool) if self._ask is None else self._ask(rows[to[halves ^ 1]], rows[to[halves]])
+        mask = sum(1 << k for k in np.flatnonzero(free).tolist())
+        return self._kernels.answer(self._table.address, mask - (1 << 64 if mask >> 63 else 0))
+
+    def _path(self) -> Matrix:
+        vertex, to, came = self._fields[layout.MEETING], self._table[layout.TO], self._table[layout.CAME]
+        found = [vertex]
+        while (half := int(came[vertex])) >= 0:
+            vertex = int(to[half ^ 1])
+            found.append(vertex)
+        return self._rows()[found[::-1]]
+
+    def _rows(self) -> Matrix:
+        count = int(self._vertices.header[SIZE])
+        return self._vertices[ROWS][: count * self._dof].reshape(count, self._dof)
+
+    def _enough(self, more: int) -> tuple[int, int]:
+        """Vertices and halves that there have to be room for, to add some vertices; room is doubled."""
+        halves, room = self._fields[layout.HALVES] + 2 * self._near * more, len(self._table[layout.TO])
+        return self.size + more, halves if halves <= room else 2 * room
+
+    def _place_of(self, rows: Matrix) -> int:
+        """Where rows are in memory that kernels may read."""
+        if rows.ndim != 2 or rows.shape[1] != self._dof:
+            raise InputError(f"roadmap: expected configurations of shape (k, {self._dof}), got {rows.shape}")
+        if len(rows) > len(self._ends):
+            self._ends = aligned(np.zeros(2 * rows.size)).reshape(-1, self._dof)
+        self._ends[: len(rows)] = rows
+        return int(self._ends.ctypes.data)

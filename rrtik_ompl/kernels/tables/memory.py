@@ -1,0 +1,197 @@
+"""Memory that Python makes and kernels work on: tables of fields, and the arrays whose addresses the fields hold.
+
+There are two functions for whoever needs a table. :func:`table` makes one that lives long, array by array; an array can
+be replaced by a larger one that :func:`aligned` makes. :class:`TablePlan` is for a table that every call makes anew:
+all its arrays lie in a single piece, for numpy takes as long to give the address of an array as a small kernel runs.
+
+Kernels check no bounds. Therefore every array lies between guard words, at least ``ALIGNMENT`` bytes of a pattern
+before and behind it (in a single piece behind it and behind the fields), and ``intact()`` says whether they are as they
+were. Tests check it after each kernel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.kernels.layout import ALIGNMENT
+from rrtik_ompl.kernels.simd.processor import WIDTH
+
+Header: TypeAlias = NDArray[np.int64]
+
+GUARD = 0xA5  # each byte of the guard words
+WORD = 8  # bytes
+GUARD_WORDS = ALIGNMENT // WORD
+GUARD_WORD = float(np.full(WORD, GUARD, dtype=np.uint8).view(np.float64)[0])
+COPIED_WORDS = 4096  # up to so many it is quicker to copy a whole piece than to set its guard words
+
+
+def aligned(array: NDArray[Any]) -> NDArray[Any]:
+    """A flat copy that starts on a multiple of ``ALIGNMENT`` bytes, between guard words; even an empty one does."""
+    return _placed(array)[0]
+
+
+def _placed(array: NDArray[Any]) -> tuple[NDArray[Any], int]:
+    """What :func:`aligned` makes, and its address, which numpy takes long to give."""
+    memory = np.empty(array.nbytes + 3 * ALIGNMENT, dtype=np.uint8)
+    begin = int(memory.ctypes.data)
+    start = ALIGNMENT + -begin % ALIGNMENT
+    memory[:start] = memory[start + array.nbytes :] = GUARD
+    copy: NDArray[Any] = np.ndarray(array.size, array.dtype, memory, start)
+    copy[:] = array.ravel()
+    return copy, begin + start
+
+
+def is_intact(array: NDArray[Any]) -> bool:
+    """Whether the guard words around an array that :func:`aligned` has made are as they were."""
+    memory: Any = array.base
+    start = int(array.ctypes.data) - int(memory.ctypes.data)
+    return bool((memory[:start] == GUARD).all() and (memory[start + array.nbytes :] == GUARD).all())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Fields for the kernels, where they are, and the arrays whose addresses they hold, all by their places.
+
+    ``parts`` are other tables, whose addresses an array holds.
+    """
+
+    header: Header
+    arrays: dict[int, NDArray[Any]]
+    parts: tuple[Table, ...] = ()
+    address: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "address", int(self.header.ctypes.data))
+
+    def __getitem__(self, place: int) -> NDArray[Any]:
+        return self.arrays[place]
+
+    def intact(self) -> bool:
+        """Whether nothing has been written beyond an array or the fields."""
+        own = all(is_intact(array) for array in (self.header, *self.arrays.values()))
+        return own and all(part.intact() for part in self.parts)
+
+
+def table(fields: Mapping[int, int | NDArray[Any]], parts: Sequence[Table] = ()) -> Table:
+    """A table that lives long, from its fields; every place from 0 up has one: a number, or an array to copy.
+
+    Arrays are flat, begin on a multiple of ``ALIGNMENT`` bytes and stay where they are as long as the table lives, and
+    so do ``parts``, other tables whose addresses it holds.
+    """
+    placed = {place: _placed(value) for place, value in fields.items() if isinstance(value, np.ndarray)}
+    header = [placed[place][1] if place in placed else fields[place] for place in range(len(fields))]
+    arrays = {place: array for place, (array, _) in placed.items()}
+    return Table(aligned(np.array(header, dtype=np.int64)), arrays, tuple(parts))
+
+
+def with_own(shared: Table, own: Mapping[int, NDArray[Any]]) -> Table:
+    """A table of the same fields whose arrays are shared but for some, which are copied: for another thread."""
+    placed = {place: _placed(array) for place, array in own.items()}
+    header = aligned(shared.header)
+    for place, (_, address) in placed.items():
+        header[place] = address
+    return Table(header, shared.arrays | {place: array for place, (array, _) in placed.items()}, shared.parts)
+
+
+def record(size: int, numbers: Mapping[int, float | NDArray[Any]]) -> NDArray[np.float64]:
+    """A record of ``size`` numbers, each number or run of numbers by its place; the others are 0."""
+    made = np.zeros(size)
+    for place, value in numbers.items():
+        if isinstance(value, np.ndarray):
+            made[place : place + len(value)] = value
+        else:
+            made[place] = value
+    return made
+
+
+def whole_records(size: int, rows: Sequence[Mapping[int, int]]) -> NDArray[np.int32]:
+    """Records of ``size`` whole numbers by their places, shape (len(rows), size)."""
+    return np.array([[row[place] for place in range(size)] for row in rows], dtype=np.int32).reshape(-1, size)
+
+
+class TablePlan:
+    """Where the arrays of a table lie in a single piece of memory, for all tables of the same sizes.
+
+    Args:
+        arrays: How many words of 8 bytes each has, by the place of its address among the fields. They lie one after
+            the other, the first on a multiple of ``ALIGNMENT`` bytes; guard words of as many bytes lie between them.
+            One of no words has the address 0.
+        numbers: The other fields.
+
+    Attributes:
+        spans: The words of each array.
+        words: Of all, the fields and their guard words at the end.
+        start, stop: The first word of the fields, and the one after the last.
+        fields: Numbers, and how far arrays are from the first one in bytes.
+        pointing: 1 for each field that is the address of an array, else 0.
+        guards: Numbers of the guard words.
+        blank: The whole piece with its guards and fields if it is short, else None.
+    """
+
+    def __init__(self, arrays: Mapping[int, int], numbers: Mapping[int, int]) -> None:
+        self.spans: dict[int, slice] = {}
+        self.fields, self.pointing = np.zeros((2, len(arrays) + len(numbers)), dtype=np.int64)
+        guards, end = [], 0
+        for place, size in arrays.items():
+            self.spans[place] = slice(end, end + size)
+            if size:
+                self.fields[place], self.pointing[place] = WORD * end, 1
+                end += size + GUARD_WORDS
+                guards.append(np.arange(end - GUARD_WORDS, end))
+        for place, number in numbers.items():
+            self.fields[place] = number
+        self.start, self.stop = end, end + len(self.fields)
+        self.words = self.stop + GUARD_WORDS
+        self.guards = np.concatenate([*guards, np.arange(self.stop, self.words)])
+        self.blank: NDArray[np.float64] | None = None
+        if self.words <= COPIED_WORDS:
+            self.blank = np.zeros(self.words)
+            self.blank[self.guards] = GUARD_WORD
+            self.blank[self.start : self.stop].view(np.int64)[:] = self.fields
+
+
+class PlannedTable:
+    """The fields of a table and its arrays. Each call of a kernel has its own, so that threads do not meet.
+
+    Attributes:
+        header: The fields as the kernel reads them.
+        address: Where they are.
+    """
+
+    def __init__(self, plan: TablePlan) -> None:
+        whole = np.empty(GUARD_WORDS + plan.words)
+        begin = int(whole.ctypes.data)
+        unaligned = -begin % ALIGNMENT
+        first = unaligned // WORD
+        self._plan, self._words = plan, whole[first : first + plan.words]
+        self.header: Header = self._words[plan.start : plan.stop].view(np.int64)
+        if plan.blank is not None:
+            self._words[:] = plan.blank
+        else:
+            self._words[plan.guards] = GUARD_WORD
+            self.header[:] = plan.fields
+        self.header += plan.pointing * (begin + unaligned)
+        self.address = begin + unaligned + WORD * plan.start
+
+    def __getitem__(self, place: int) -> NDArray[Any]:
+        """One of the arrays, its words as float64; not set."""
+        return self._words[self._plan.spans[place]]
+
+    @property
+    def arrays(self) -> dict[int, NDArray[Any]]:
+        """The arrays that have words, by the places of their addresses."""
+        return {place: self[place] for place in self._plan.spans if self._plan.pointing[place]}
+
+    def intact(self) -> bool:
+        """Whether nothing has been written beyond an array or the fields."""
+        return bool((self._words[self._plan.guards] == GUARD_WORD).all())
+
+
+def whole_lanes(row: NDArray[Any]) -> NDArray[Any]:
+    """A row with zeros behind it, so that kernels can read it ``WIDTH`` numbers at a time."""
+    return np.append(row, np.zeros(-len(row) % WIDTH, dtype=row.dtype))

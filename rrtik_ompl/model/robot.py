@@ -1,0 +1,333 @@
+"""The arm: a Pinocchio [56] model with its geometry, limits, named postures and tip frame. A robot never changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
+from threading import get_ident
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, finite_number, in_blocks, number_rows, room
+from rrtik_ompl.base.copies import as_value, itself
+from rrtik_ompl.base.errors import InputError, UnknownNameError, require
+from rrtik_ompl.base.poses import MOST_MOVING, cross_products, joint_motions
+from rrtik_ompl.base.units import shown_unit
+
+FEW = 16  # configurations up to which Pinocchio's calls cost less than numpy's
+LIMIT_TOLERANCE = 1e-5  # [rad] or [m]; a value this far outside counts as inside: URDF files write pi in six digits
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """The kinematic tree as plain arrays, one row per Pinocchio joint 1..n, parents first.
+
+    Attributes:
+        parent: Row of the parent joint, -1 for the world, shape (n,).
+        placement: Fixed transform from the parent joint's frame to this joint's frame at zero, shape (n, 4, 4).
+        axis: Unit axis in the joint's own frame, shape (n, 3).
+        prismatic: True for sliding joints, shape (n,).
+        gain: Joint value of the model = gain @ q + offset (mimic joints have a gain other than 1), shape (n, dof).
+        offset: See ``gain``, shape (n,).
+    """
+
+    parent: NDArray[np.int64]
+    placement: NDArray[np.float64]
+    axis: Matrix
+    prismatic: Mask
+    gain: Matrix
+    offset: Vector
+
+    __reduce__ = as_value
+
+    def whole_turns(self) -> Mask:
+        """Which actuated joints, shape (dof,), leave every link where it was if they turn by a whole turn."""
+        turning = ~self.prismatic[:, None] & (self.gain == np.rint(self.gain))
+        return np.asarray((turning | (self.gain == 0.0)).all(axis=0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Robot:
+    """A read-only arm. Configurations ``q`` have one number per actuated joint: radians, or metres if prismatic.
+
+    Continuous joints have infinite limits and any real number as a value: q and q + 2 pi are the same posture (all that
+    follows such a joint makes whole turns too), and a straight motion between two values turns by their difference.
+
+    Attributes:
+        name, joint_names: Name used in messages and files; the actuated joints, in the order of q.
+        movable: All joints of the description that are not fixed: actuated ones, those that follow and those held.
+        lower, upper: Position limits, shape (dof,), -inf and +inf for continuous joints.
+        velocity, acceleration, jerk: Limits [rad/s, rad/s^2, rad/s^3 or m], shape (dof,), inf where unknown.
+        prismatic, continuous: Masks, shape (dof,). tip, postures: Frame that goals refer to; named configurations.
+        allowed_collisions: Pairs of link names that are never checked against each other.
+        checked_collisions: Pairs of link names that are checked although a joint joins them.
+        unchecked_solids: Pairs of names of solids of ``collision`` that are never checked against each other.
+        model, collision: Pinocchio's model and geometry; do not change them. looks: Gives ``visual``.
+        closed_form: The robot's own inverse kinematics, if it brings one.
+        gripper: The joints that open and close its gripper, `rrtik_ompl.description.gripper.GripperJoints`, or None.
+        padding, joint_weights: By name; see :func:`rrtik_ompl.padded` and :func:`rrtik_ompl.weighted`.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    movable: frozenset[str]
+    lower: Vector
+    upper: Vector
+    velocity: Vector
+    acceleration: Vector
+    jerk: Vector
+    prismatic: Mask
+    continuous: Mask
+    tip: str
+    postures: Mapping[str, Vector]
+    allowed_collisions: frozenset[frozenset[str]]
+    model: Any
+    collision: Any
+    looks: Callable[[], pin.GeometryModel]
+    chain: Chain
+    self_collision: bool = True
+    checked_collisions: frozenset[frozenset[str]] = frozenset()
+    unchecked_solids: frozenset[frozenset[str]] = frozenset()
+    closed_form: Callable[..., Any] | None = None
+    gripper: Any = None
+    planar: bool = False
+    padding: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    joint_weights: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    source: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+    __deepcopy__ = itself
+
+    def __repr__(self) -> str:
+        return f"Robot('{self.name}', {self.dof} joints: {', '.join(self.joint_names)}; tip '{self.tip}')"
+
+    @property
+    def dof(self) -> int:
+        """Number of actuated joints."""
+        return len(self.joint_names)
+
+    @property
+    def visual(self) -> pin.GeometryModel:
+        """Pinocchio's geometry of what is drawn; a mesh that cannot be read is an `InputError` here, at the first."""
+        return self.looks()
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of all links (bodies), base first."""
+        return _link_names(self)
+
+    def link_of(self, geometry: Any) -> str:
+        """Name of the link of a geometry object of Pinocchio, such as one of ``collision.geometryObjects``."""
+        require(geometry, pin.GeometryObject, "geometry of a link", "take it from robot.collision.geometryObjects")
+        return str(self.model.frames[geometry.parentFrame].name)
+
+    def configuration(self, values: ArrayLike, what: str = "configuration") -> Vector:
+        """Check a configuration given by a user: right length, finite. Shape (dof,).
+
+        Raises:
+            InputError: If the number of values is not ``dof`` or one of them is not finite.
+        """
+        array = np.asarray(values, dtype=object) if isinstance(values, (list, tuple)) else values
+        if isinstance(array, np.ndarray) and array.ndim == 1 and len(array) != self.dof:
+            joints = f"robot '{self.name}' has {self.dof} joints ({', '.join(self.joint_names)})"
+            hint = "; a position of the tip: PositionGoal([x, y, z])" if str(what) == "goal" and len(array) == 3 else ""
+            raise InputError(f"{what}: {joints}, but {len(array)} values were given{hint}")
+        return finite_array(values, (self.dof,), what).copy()
+
+    def configuration_deg(self, values: ArrayLike, what: str = "configuration") -> Vector:
+        """As :meth:`configuration`, of joints that turn in degrees and joints that slide in metres. In rad or m."""
+        q = self.configuration(values, what)
+        return np.where(self.prismatic, q, np.radians(q))
+
+    def posture(self, name: str) -> Vector:
+        """Named configuration, shape (dof,).
+
+        Raises:
+            UnknownNameError: If there is no posture of that name.
+        """
+        require(name, str, f"posture of robot '{self.name}'")
+        if name not in self.postures:
+            raise UnknownNameError(f"posture of robot '{self.name}'", name, self.postures)
+        return self.postures[name]
+
+    def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
+        """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
+        rows, (lower, upper) = self._rows(Q), _widened_limits(self, finite_number(tolerance, "tolerance of limits"))
+        return np.asarray(np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1))
+
+    def finite_range(self) -> tuple[Vector, Vector]:
+        """Bounds to draw configurations in, shapes (dof,): the limits, half a turn (or 3.14 m) where there is none."""
+        lower = np.where(np.isfinite(self.lower), self.lower, np.minimum(self.upper, 0.0) - np.pi)
+        upper = np.where(np.isfinite(self.upper), self.upper, np.maximum(self.lower, 0.0) + np.pi)
+        return lower, upper
+
+    def limit_fault(self, q: Vector) -> str:
+        """A line that names the first joint of q outside its limits, in degrees (m if it slides); "" if none is."""
+        if not (outside := np.flatnonzero(self.onto_limits(q) != self.clamp(q))).size:
+            return ""
+        if np.shape(q) != (self.dof,):
+            raise InputError(f"configuration of robot '{self.name}': expected shape ({self.dof},), got {np.shape(q)}")
+        joint = int(outside[0])
+        factor, unit = shown_unit(self.prismatic[joint])
+        value, near, *ends = (factor * float(x[joint]) for x in (q, self.clamp(q), self.lower, self.upper))
+        shown = (n for n in range(6, 18) if f"{value:.{n}g}" != f"{near:.{n}g}")
+        digits = next(shown, 6)  # enough to see the difference; NaN has none
+        limits = " .. ".join(f"{end:.{digits}g}" for end in ends)
+        return f"joint '{self.joint_names[joint]}' is at {value:.{digits}g} {unit}, outside its limits {limits} {unit}"
+
+    def onto_limits(self, Q: Matrix) -> Matrix:
+        """Values up to ``LIMIT_TOLERANCE`` outside a limit moved onto it, all others as they are. Shape as given."""
+        clamped, (lower, upper) = self.clamp(Q), _widened_limits(self, LIMIT_TOLERANCE)
+        return np.where((lower <= Q) & (upper >= Q), clamped, Q)
+
+    def clamp(self, q: Vector) -> Vector:
+        """Move values any distance outside onto the limits. Shape as given. InputError if they are no such numbers."""
+        try:
+            return np.asarray(np.minimum(np.maximum(q, self.lower), self.upper))
+        except (TypeError, ValueError, OverflowError, MemoryError):
+            raise InputError(f"values of robot '{self.name}': expected {self.dof} numbers, or rows of them") from None
+
+    def joint_values(self, Q: ArrayLike) -> Matrix:
+        """Values of every joint of the chain, mimic joints resolved. Q: shape (m, dof) or (dof,); (m, joints)."""
+        return np.asarray(self._rows(Q) @ self.chain.gain.T + self.chain.offset)
+
+    def pinocchio_configuration(self, Q: ArrayLike) -> Matrix:
+        """Pinocchio's vectors for Q, (m, dof) or (dof,): with mimic joints and (cos, sin) of endless ones; (m, nq)."""
+        rows = self._rows(Q)
+        values = self.joint_values(rows)
+        if self.model.nq == len(self.chain.parent):
+            return values
+        full = np.empty((len(rows), self.model.nq))
+        joints, places, turning, cosines = _places_of(self)
+        angles = values[:, turning]
+        full[:, places], full[:, cosines], full[:, cosines + 1] = values[:, joints], np.cos(angles), np.sin(angles)
+        return full
+
+    def joint_frames(self, Q: ArrayLike) -> NDArray[np.float64]:
+        """Pose in the world of every Pinocchio joint frame, world first. Shape (m, joints + 1, 4, 4)."""
+        rows = self._rows(Q)
+        values = self.joint_values(rows)
+        frames = room((len(rows), len(self.chain.parent) + 1, 4, 4))
+        frames[:, 0] = np.eye(4)
+        motions = joint_motions(self.chain.axis, self.chain.prismatic, values)
+        for k, parent in enumerate(self.chain.parent):
+            frames[:, k + 1] = frames[:, parent + 1] @ self.chain.placement[k] @ motions[:, k]
+        return frames
+
+    def fk_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+        """Forward kinematics of Q, shape (m, dof): T_world_tip, or of another frame or link. Shape (m, 4, 4)."""
+        return in_blocks(partial(self._poses, frame=self._frame_id(frame)), self._rows(Q))
+
+    def _poses(self, rows: Matrix, frame: int, joint_frames: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Poses of a frame for configurations, shape (m, dof): of few by Pinocchio. Shape (m, 4, 4)."""
+        if self.model.nv > MOST_MOVING or not 0 < len(rows) <= FEW:
+            target = self.model.frames[frame]
+            frames = self.joint_frames(rows) if joint_frames is None else joint_frames
+            return np.asarray(frames[:, target.parentJoint] @ target.placement.homogeneous)
+        data, poses = _data_of(self, get_ident()), np.empty((len(rows), 4, 4))
+        for k, full in enumerate(self.pinocchio_configuration(rows)):
+            pin.forwardKinematics(self.model, data, full)
+            poses[k] = pin.updateFramePlacement(self.model, data, frame).homogeneous
+        return poses
+
+    def fk(self, q: ArrayLike, frame: str | None = None) -> pin.SE3:
+        """Forward kinematics: T_world_tip (or another frame) as ``pinocchio.SE3`` for q, shape (dof,)."""
+        return pin.SE3(self._poses(self.configuration(q)[None], self._frame_id(frame))[0])
+
+    def jacobian(self, q: ArrayLike, frame: str | None = None) -> Matrix:
+        """Geometric Jacobian at the tip in world axes, rows (linear; angular), shape (6, dof)."""
+        if self.model.nv > MOST_MOVING:
+            return np.asarray(self.jacobian_batch(self.configuration(q)[None], frame)[0])
+        full, axes = self.pinocchio_configuration(self.configuration(q))[0], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian = pin.computeFrameJacobian(self.model, self.model.createData(), full, self._frame_id(frame), axes)
+        return np.asarray(np.reshape(jacobian, (6, -1)) @ self.chain.gain)  # for one joint it comes as a vector
+
+    def jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
+        """Geometric Jacobians of a batch, as :meth:`jacobian`, for Q of shape (m, dof). Shape (m, 6, dof)."""
+        return in_blocks(lambda rows: self.fk_jacobian_batch(rows, frame)[1], self._rows(Q))
+
+    def fk_jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> tuple[Matrix, Matrix]:
+        """:meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""
+        rows, number = self._rows(Q), self._frame_id(frame)
+        poses = self._poses(rows, number, frames := self.joint_frames(rows))
+        columns = np.zeros((len(frames), 6, len(self.chain.parent)))
+        joint = self.model.frames[number].parentJoint - 1
+        while joint >= 0:  # only the joints between the base and the frame move it
+            axis = frames[:, joint + 1, :3, :3] @ self.chain.axis[joint]
+            if self.chain.prismatic[joint]:
+                columns[:, :3, joint] = axis
+            else:
+                columns[:, :3, joint] = cross_products(axis, poses[:, :3, 3] - frames[:, joint + 1, :3, 3])
+                columns[:, 3:, joint] = axis
+            joint = int(self.chain.parent[joint])
+        return poses, np.asarray(columns @ self.chain.gain)
+
+    def _rows(self, Q: ArrayLike) -> Matrix:
+        """One configuration or several as rows, shape (m, dof)."""
+        rows = number_rows(Q, f"configurations of robot '{self.name}'")
+        if rows.ndim != 2 or rows.shape[1] != self.dof:
+            raise InputError(f"configurations of robot '{self.name}': expected shape (m, {self.dof}), got {rows.shape}")
+        return rows
+
+    def _frame_id(self, frame: str | None) -> int:
+        require(frame, str | None, f"frame of robot '{self.name}'")
+        return _frame_number(self, self.tip if frame is None else frame)
+
+
+def unnamed_joints(count: int) -> tuple[str, ...]:
+    """What so many joints are called where nobody has named them: ``joint1, joint2, ...``."""
+    return tuple(f"joint{k + 1}" for k in range(count))
+
+
+def require_joints(robot: Robot, names: Sequence[str], what: str) -> None:
+    """Refuse what moves other joints than a robot, or the same ones in another order.
+
+    Args:
+        robot: The robot.
+        names: Of the joints that it moves; those of :func:`unnamed_joints` stand for none.
+        what: What it is, such as "path".
+
+    Raises:
+        InputError: If the names, or their number, are not those of the robot's actuated joints.
+    """
+    if len(names) == robot.dof and tuple(names) in (robot.joint_names, unnamed_joints(robot.dof)):
+        return
+    remedy = "put its columns in that order" if set(names) == set(robot.joint_names) else "it is another robot's"
+    own = ", ".join(names)
+    wanted = ", ".join(robot.joint_names)
+    raise InputError(f"the {what} moves {own}, but robot '{robot.name}' has the joints {wanted}; {remedy}")
+
+
+@lru_cache(maxsize=64)
+def _widened_limits(robot: Robot, tolerance: float) -> tuple[Vector, Vector]:
+    return robot.lower - tolerance, robot.upper + tolerance
+
+
+@lru_cache(maxsize=64)
+def _link_names(robot: Robot) -> tuple[str, ...]:
+    return tuple(f.name for f in robot.model.frames if f.type == pin.FrameType.BODY)
+
+
+@lru_cache(maxsize=256)
+def _frame_number(robot: Robot, name: str) -> int:
+    if not name.isprintable() or not robot.model.existFrame(name):
+        raise UnknownNameError(f"frame of robot '{robot.name}'", name, (f.name for f in robot.model.frames))
+    return int(robot.model.getFrameId(name))
+
+
+@lru_cache(maxsize=64)
+def _places_of(robot: Robot) -> tuple[NDArray[np.int64], ...]:
+    """Joints with one number in Pinocchio's vectors and where it is; those with two and where their cosines are."""
+    starts, sizes = np.array(robot.model.idx_qs.tolist()[1:]), np.array(robot.model.nqs.tolist()[1:])
+    single, double = np.flatnonzero(sizes == 1), np.flatnonzero(sizes != 1)
+    return single, starts[single], double, starts[double]
+
+
+@lru_cache(maxsize=64)
+def _data_of(robot: Robot, _thread: int) -> Any:
+    """Pinocchio's working memory for a robot, of one thread's own."""
+    return robot.model.createData()

@@ -1,0 +1,215 @@
+"""What obstacles and attached bodies are: frozen solids in their own frame, in metres (not how they collide).
+
+Here are those whose distance to a point has a short formula, and ``SHAPES``, which has every kind by its key in files.
+Whoever adds a kind to it and to ``rrtik_ompl.geometry.collision.shape_table``, before files are read, uses it like the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, bounded_array, frozen, length, not_negative, whole_number
+from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.base.errors import InputError, at_most
+from rrtik_ompl.model.shapes.half_space import HalfSpace
+from rrtik_ompl.model.shapes.height_field import HeightField
+from rrtik_ompl.model.shapes.mesh import Mesh
+from rrtik_ompl.model.shapes.octree import Octree
+from rrtik_ompl.model.shapes.point_cloud import PointCloud
+from rrtik_ompl.model.shapes.prism import Prism
+from rrtik_ompl.model.shapes.shape import Measure, Shape, same_shape
+from rrtik_ompl.model.shapes.surfaces import Triangles, extruded, round_ended, rounded
+
+__all__ = [
+    "SHAPES",
+    "Box",
+    "Capsule",
+    "Cylinder",
+    "HalfSpace",
+    "HeightField",
+    "Measure",
+    "Mesh",
+    "Octree",
+    "PointCloud",
+    "Prism",
+    "Shape",
+    "Sphere",
+    "same_shape",
+]
+
+SIDES = 32  # of a drawn cylinder
+SEGMENTS = 24  # of a drawn ball or capsule
+MOST_SEGMENTS = 2_000  # half a million vertices
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box(Shape):
+    """A box centred on its frame. ``size``: full side lengths, shape (3,), metres.
+
+    Example:
+        >>> rrtik.Box([0.1, 0.2, 0.3]).size
+        array([0.1, 0.2, 0.3])
+    """
+
+    key = "box"
+    measures = (Measure("size", "three lengths", "full side lengths [m]"),)
+    grouped = False
+    in_urdf = True
+    moveit = ("size",)
+
+    size: Vector
+
+    __reduce__ = as_value
+
+    def __init__(self, size: ArrayLike) -> None:
+        sides = bounded_array(size, (3,), "box size")
+        if (sides <= 0.0).any():
+            raise InputError(f"box size must be three numbers greater than 0, got {sides.tolist()}")
+        object.__setattr__(self, "size", frozen(sides))
+
+    @property
+    def bounding_radius(self) -> float:
+        """Half its diagonal [m]."""
+        return float(np.linalg.norm(0.5 * self.size))
+
+    def surface(self) -> Triangles:
+        """Its six sides."""
+        x, y, z = self.size
+        return extruded(0.5 * np.array([[-x, -y], [x, -y], [x, y], [-x, y]]), z)
+
+    def grown(self, margin: float) -> Triangles:
+        """The box with rounded edges that is larger by the margin [m] on all sides."""
+        turn = np.concatenate([np.linspace(0.0, 0.5 * np.pi, 7) + 0.5 * np.pi * k for k in range(4)])
+        corners = np.repeat(0.5 * self.size[:2] * [[1, 1], [-1, 1], [-1, -1], [1, -1]], 7, axis=0)
+        return rounded(corners, turn, float(self.size[2]), not_negative(margin, "margin"))
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere(Shape):
+    """A ball centred on its frame. ``radius`` in metres.
+
+    Example:
+        >>> rrtik.Sphere(0.1).radius
+        0.1
+    """
+
+    key = "sphere"
+    measures = (Measure("radius", text="radius [m]"),)
+    grouped = False
+    in_urdf = True
+    moveit = ("radius",)
+    smooth = True
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", length(self.radius, "sphere radius"))
+
+    @property
+    def bounding_radius(self) -> float:
+        """Its radius [m]."""
+        return self.radius
+
+    def surface(self, segments: int = SEGMENTS) -> Triangles:
+        """Rings of so many segments from pole to pole."""
+        return round_ended(self.radius, 0.0, _segments(segments))
+
+    def grown(self, margin: float) -> Sphere:
+        """The ball of a larger radius."""
+        return Sphere(self.radius + not_negative(margin, "margin"))
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder(Shape):
+    """A cylinder along z, centred on its frame. ``radius`` and full ``length`` in metres.
+
+    Example:
+        >>> rrtik.Cylinder(0.05, 0.2).length
+        0.2
+    """
+
+    key = "cylinder"
+    measures = (Measure("radius"), Measure("length"))
+    in_urdf = True
+    moveit = ("length", "radius")
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", length(self.radius, "cylinder radius"))
+        object.__setattr__(self, "length", length(self.length, "cylinder length"))
+
+    @property
+    def bounding_radius(self) -> float:
+        """Distance of its edges from its centre [m]."""
+        return float(np.hypot(self.radius, 0.5 * self.length))
+
+    def surface(self) -> Triangles:
+        """The prism over a polygon inscribed in its base."""
+        return extruded(self.radius * _circle(SIDES)[1], self.length)
+
+    def grown(self, margin: float) -> Triangles:
+        """The cylinder with rounded edges that is larger by the margin [m] on all sides."""
+        turn, circle = _circle(48)
+        return rounded(self.radius * circle, turn, self.length, not_negative(margin, "margin"))
+
+    def capped(self) -> Capsule:
+        """The cylinder with half a ball on either end."""
+        return Capsule(self.radius, self.length)
+
+
+@dataclass(frozen=True, slots=True)
+class Capsule(Shape):
+    """A capsule along z, centred on its frame. ``length`` is the distance between the two cap centres, in metres.
+
+    Example:
+        >>> rrtik.Capsule(0.05, 0.2).radius
+        0.05
+    """
+
+    key = "capsule"
+    measures = (Measure("radius"), Measure("length"))
+    in_urdf = True
+    smooth = True
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", length(self.radius, "capsule radius"))
+        object.__setattr__(self, "length", length(self.length, "capsule length"))
+
+    @property
+    def bounding_radius(self) -> float:
+        """Distance of its poles from its centre [m]."""
+        return self.radius + 0.5 * self.length
+
+    def surface(self, segments: int = SEGMENTS) -> Triangles:
+        """Rings of so many segments from pole to pole."""
+        return round_ended(self.radius, self.length, _segments(segments))
+
+    def grown(self, margin: float) -> Capsule:
+        """The capsule of a larger radius."""
+        return Capsule(self.radius + not_negative(margin, "margin"), self.length)
+
+
+def _segments(given: int) -> int:
+    """The number of segments of a drawn ball, if a quarter of it is a ring or more."""
+    segments = whole_number(given, "segments", least=4)
+    at_most(segments, MOST_SEGMENTS, "segments")
+    return segments
+
+
+def _circle(sides: int) -> tuple[Vector, Matrix]:
+    """Angles [rad] evenly round a circle of radius 1, shape (sides,), and the points there, shape (sides, 2)."""
+    turn = np.linspace(0.0, TAU, sides, endpoint=False)
+    return turn, np.stack([np.cos(turn), np.sin(turn)], 1)
+
+
+_SIMPLE: tuple[type[Shape], ...] = (Box, Sphere, Cylinder, Capsule, HalfSpace, Prism)
+_OF_FILES: tuple[type[Shape], ...] = (Mesh, PointCloud, HeightField, Octree)
+SHAPES: dict[str, type[Shape]] = {kind.key: kind for kind in (*_SIMPLE, *_OF_FILES)}

@@ -1,0 +1,122 @@
+"""Triangle meshes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import (
+    Matrix,
+    bounded_array,
+    dimensions,
+    distinct,
+    finite_array,
+    frozen,
+    number_rows,
+    positive,
+)
+from rrtik_ompl.base.copies import as_value, in_one_line
+from rrtik_ompl.base.errors import InputError, at_most, require
+from rrtik_ompl.model.shapes.shape import Shape
+from rrtik_ompl.model.shapes.surfaces import Triangles
+
+MOST_TRIANGLES = 5_000_000
+SAME_DIGITS = 12  # of metres; vertices that differ less differ by rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh(Shape):
+    """A triangle mesh. A closed mesh counts as a solid, an open one as a surface.
+
+    Attributes:
+        vertices: Shape (n, 3), metres.
+        triangles: Vertex numbers, shape (m, 3).
+        source: Path of the file it was read from, or "".
+        scale: The factor that was applied to the file's numbers, kept for writing the scene back.
+
+    Example:
+        >>> corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        >>> solid = rrtik.Mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+        >>> rrtik.Obstacle("tetrahedron", solid, [0.5, 0.0, 0.0]).shape.triangles.shape
+        (4, 3)
+    """
+
+    key = "mesh"
+
+    vertices: Matrix
+    triangles: NDArray[np.int64]
+    source: str = ""
+    scale: float = 1.0
+    open_edges: int = field(default=0)
+
+    __reduce__, __repr__ = as_value, in_one_line
+
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike, source: str = "", scale: float = 1.0) -> None:
+        require(source, str, "source of a mesh")
+        what = f"mesh {source}" if source else "mesh"
+        points = bounded_array(vertices, (None, 3), f"{what}: vertices")
+        rows = number_rows(triangles, f"{what}: triangles")
+        if dimensions(triangles) != 2 or rows.shape[1] != 3 or len(rows) == 0:
+            raise InputError(f"{what}: needs at least one triangle (three vertex numbers each); export it triangulated")
+        at_most(len(rows), MOST_TRIANGLES, f"{what}: triangles", "simplify it")
+        numbers = finite_array(rows, (None, 3), f"{what}: triangles")
+        if (odd := numbers[numbers != np.floor(numbers)]).size:
+            raise InputError(f"{what}: vertex numbers of triangles must be whole, got {odd[0]:g}")
+        faces = numbers.astype(np.int64)
+        if faces.min() < 0 or faces.max() >= len(points):
+            raise InputError(f"{what}: a triangle names vertex {int(faces.max())}, but there are only {len(points)}")
+        points, faces = _welded(points, faces)
+        if len(faces) == 0:
+            raise InputError(f"{what}: every triangle has zero area; check its scale and export it again")
+        object.__setattr__(self, "vertices", frozen(points))
+        object.__setattr__(self, "triangles", frozen(faces, np.int64))
+        object.__setattr__(self, "source", source)
+        object.__setattr__(self, "scale", positive(scale, f"{what}: scale"))
+        object.__setattr__(self, "open_edges", _open_edges(faces))
+
+    @property
+    def closed(self) -> bool:
+        """Whether every edge is shared by exactly two triangles of opposite sense, so that inside and outside exist."""
+        return self.open_edges == 0
+
+    @property
+    def bounding_radius(self) -> float:
+        """Distance of its farthest vertex from its origin [m]."""
+        return float(np.linalg.norm(self.vertices[distinct(self.triangles)], axis=1).max())
+
+    def surface(self) -> Triangles:
+        """Its triangles."""
+        return Triangles(self.vertices, self.triangles)
+
+
+def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
+    """Merge equal vertices (STL repeats them per triangle) and drop triangles that collapse to a line or a point.
+
+    Where vertices differ by rounding alone, those are merged too: coal takes a ball for one that touches the sliver
+    between them, wherever it is, and a solid whose seam is open by that would count as a surface.
+    """
+    unique, merged = _merged(points, points, faces)
+    sides = unique[merged] - unique[np.roll(merged, 1, axis=1)]
+    if (np.abs(sides).max(axis=2) < 10.0**-SAME_DIGITS).any() or _open_edges(merged) > 0:
+        for shift in (0.0, 0.37 * 10.0**-SAME_DIGITS):  # what one rounding parts, the other one joins
+            unique, merged = _merged(np.round(unique + shift, SAME_DIGITS) + 0.0, unique, merged)
+    a, b, c = (unique[merged[:, k]] for k in range(3))
+    return unique, merged[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.0]
+
+
+def _merged(keys: Matrix, points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
+    """One point for all of the same key, and the faces of those."""
+    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return points[first], np.asarray(index).reshape(-1)[faces]
+
+
+def _open_edges(faces: NDArray[np.int64]) -> int:
+    """Count directed edges without exactly one opposite partner: 0 for a closed, consistently oriented surface."""
+    edges: NDArray[Any] = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    size = int(faces.max()) + 1
+    forward, count = np.unique(edges[:, 0] * size + edges[:, 1], return_counts=True)
+    backward = distinct(edges[:, 1] * size + edges[:, 0])  # numpy hashes such numbers, in ten times the time
+    return int((count > 1).sum() + np.setxor1d(forward, backward, assume_unique=True).size)

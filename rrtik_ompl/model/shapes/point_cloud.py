@@ -1,0 +1,223 @@
+"""Clouds of points, as depth cameras, laser scanners and sonars see their surroundings."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import (
+    LARGEST,
+    Mask,
+    Vector,
+    bounded_array,
+    frozen,
+    length,
+    not_negative,
+    number_rows,
+    positive,
+    truths,
+)
+from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.base.errors import CloudWarning, InputError, at_most, require
+from rrtik_ompl.model.shapes.point_tree import PointTree, extremes, point_tree
+from rrtik_ompl.model.shapes.shape import Shape
+from rrtik_ompl.model.shapes.surfaces import Triangles
+
+MOST_POINTS = 20_000_000
+WIDEST = 200.0  # [m] a cloud of a larger extent is rather one in millimetres
+MOST_DRAWN = 20_000  # points of a surface
+RADIUS = 0.01  # [m] of a point whose radius nobody states
+
+Invalid: TypeAlias = Literal["refuse", "drop"]
+Points: TypeAlias = NDArray[np.float32]
+
+
+class _Kept:
+    """What is made of a cloud once, when somebody asks for it first."""
+
+    __slots__ = ("_tree", "solid", "table")
+
+    _tree: PointTree
+    solid: Callable[[], Any]  # a weak reference to what collision checks take it for
+    table: object  # what the kernels make of its tree
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointCloud(_Kept, Shape):
+    """A cloud of points: every point is a ball of this radius, exactly.
+
+    Points are kept in single precision, as sensors and files give them, which moves them by at most 6e-8 of their
+    coordinates.
+
+    Attributes:
+        points: Shape (n, 3), metres, float32.
+        radius: Of the ball that each of them is [m]; choose it so that balls of neighbouring points overlap, and add
+            what the sensor's noise may move a point by.
+        source: Path of the file it was read from, or "" if it is not as that file has it.
+        scale: The factor that was applied to the file's numbers, kept for writing the scene back.
+        dropped: How many points were left out because they were not finite.
+
+    Args:
+        points: Shape (n, 3) [m].
+        radius: See above.
+        invalid: Whether points that are not finite are refused or dropped.
+        source: See above.
+        scale: See above.
+
+    Raises:
+        InputError: If there is no point, points are not numbers or not finite, or the radius is no length.
+
+    Warns:
+        CloudWarning: If the cloud is wider than 200 m: it is rather in millimetres.
+
+    Example:
+        >>> import numpy as np
+        >>> from rrtik_ompl import PointCloud
+        >>> PointCloud(np.zeros((3, 3)), radius=0.005).bounding_radius
+        0.005
+    """
+
+    key = "cloud"
+    movable = False
+    smooth = True
+
+    points: Points
+    radius: float
+    source: str
+    scale: float
+    dropped: int
+
+    __reduce__ = as_value
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        radius: float = RADIUS,
+        *,
+        invalid: Invalid = "refuse",
+        source: str = "",
+        scale: float = 1.0,
+    ) -> None:
+        require(source, str, "source of a cloud")
+        what = f"cloud {source}" if source else "cloud"
+        known_choice(invalid, what)
+        rows, dropped = _usable(points, invalid, what)
+        object.__setattr__(self, "points", rows)
+        object.__setattr__(self, "radius", length(radius, f"{what}: radius"))
+        object.__setattr__(self, "source", source)
+        object.__setattr__(self, "scale", positive(scale, f"{what}: scale"))
+        object.__setattr__(self, "dropped", dropped)
+        low, high = extremes(rows)
+        if (extent := high - low).max() > WIDEST:
+            sides = " x ".join(f"{side:.4g}" for side in extent)
+            warnings.warn(f"{what}: it is {sides} m wide; if that is millimetres, scale it by 0.001", CloudWarning, 2)
+
+    def __repr__(self) -> str:
+        return f"PointCloud({len(self.points)} points, radius={self.radius:g} m)"
+
+    @property
+    def bounding_radius(self) -> float:
+        """Distance of its farthest point from its origin, and the radius of a point [m]."""
+        squares = np.einsum("ni,ni->n", self.points, self.points, dtype=np.float64)
+        return float(np.sqrt(squares.max())) + self.radius
+
+    @property
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Lowest and highest coordinates of its balls [m], shape (3,) each."""
+        low, high = (end.astype(np.float64) for end in self.tree.bounds)
+        return low - self.radius, high + self.radius
+
+    @property
+    def tree(self) -> PointTree:
+        """Its points in a tree; made when it is first asked for: 10 ms for 100,000 points."""
+        if not hasattr(self, "_tree"):
+            object.__setattr__(self, "_tree", point_tree(self.points))
+        return self._tree
+
+    def surface(self) -> Triangles:
+        """An octahedron around each point, or around each of some of them where there are many."""
+        some = self.points[:: -(-len(self.points) // MOST_DRAWN)].astype(np.float64)
+        tips = self.radius * np.concatenate([np.eye(3), -np.eye(3)])
+        faces = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+        numbers = faces + len(tips) * np.arange(len(some))[:, None, None]
+        return Triangles((some[:, None] + tips).reshape(-1, 3), numbers.reshape(-1, 3))
+
+    def grown(self, margin: float) -> PointCloud:
+        """The cloud of the same points with a larger radius [m]."""
+        return PointCloud(self.points, self.radius + not_negative(margin, "margin"))
+
+    def voxel(self, size: float) -> PointCloud:
+        """One point for all those in each cube of a grid; its radius is so large that it covers all of their balls.
+
+        Args:
+            size: Side of a cube [m].
+
+        Raises:
+            InputError: If the size is no length, or so small that the grid has no numbers for its cubes.
+        """
+        size = length(size, "voxel size")
+        low, high = (end.astype(np.float64) for end in extremes(self.points))
+        extent = float((high - low).max())
+        if extent / size >= 1 << 20:
+            raise InputError(f"voxel size {size:g} m is too small for a cloud {extent:.4g} m wide")
+        cells = ((self.points - low) / size).astype(np.int64)
+        keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
+        order = np.argsort(keys, kind="stable")
+        starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
+        ordered = self.points[order].astype(np.float64)
+        counts = np.diff(np.append(starts, len(order)))
+        middles = (np.add.reduceat(ordered, starts) / counts[:, None]).astype(np.float32)
+        moved = float(np.linalg.norm(ordered - np.repeat(middles, counts, axis=0), axis=1).max())
+        return PointCloud(middles, self.radius + moved)
+
+    def cropped(self, low: ArrayLike, high: ArrayLike) -> PointCloud:
+        """The points in a box about whose lowest and highest coordinates, shape (3,) each [m], in the cloud's frame.
+
+        Raises:
+            InputError: If no point is left.
+        """
+        ends = bounded_array(low, (3,), "cropped: low"), bounded_array(high, (3,), "cropped: high")
+        inside: Mask = np.all((self.points >= ends[0]) & (self.points <= ends[1]), axis=1)
+        return self.only(inside, "cropped")
+
+    def only(self, chosen: Mask, what: str = "cloud") -> PointCloud:
+        """Some of its points, by a mask, shape (n,).
+
+        Raises:
+            InputError: If none is left.
+        """
+        chosen = truths(chosen, f"{what}: points to keep")
+        if len(chosen) != len(self.points):
+            raise InputError(f"{what}: there are {len(self.points)} points, but the mask has {len(chosen)}")
+        if not chosen.any():
+            raise InputError(f"{what}: none of the {len(self.points)} points is left; leave the obstacle out")
+        return self if chosen.all() else PointCloud(self.points[chosen], self.radius)
+
+
+def known_choice(invalid: Invalid, what: str) -> None:
+    """Refuse what does not say whether numbers that are not finite are refused or dropped."""
+    if not isinstance(invalid, str) or invalid not in ("refuse", "drop"):
+        raise InputError(f"{what}: invalid must be 'refuse' or 'drop', got {invalid!r}")
+
+
+def _usable(points: ArrayLike, invalid: Invalid, what: str) -> tuple[Points, int]:
+    """Points as read-only float32, and how many were dropped."""
+    given = points if isinstance(points, np.ndarray) and points.dtype == np.float32 else number_rows(points, what)
+    if given.ndim != 2 or given.shape[1] != 3:
+        raise InputError(f"{what}: expected points of shape (any, 3), got shape {given.shape}")
+    at_most(len(given), MOST_POINTS, f"{what}: points", "thin it out before, or crop it")
+    finite = np.isfinite(given[:, 0]) & np.isfinite(given[:, 1]) & np.isfinite(given[:, 2])
+    bad = len(given) - int(np.count_nonzero(finite))
+    if bad and invalid == "refuse":
+        raise InputError(f"{what}: {bad} of {len(given)} points are not finite; invalid='drop' leaves them out")
+    rows = given[finite] if bad else given
+    if len(rows) == 0:
+        raise InputError(f"{what}: it has no {'finite ' if bad else ''}point; leave the obstacle out")
+    if (largest := max(float(rows.max()), -float(rows.min()))) > LARGEST:
+        raise InputError(f"{what}: found {largest:g}, more than {LARGEST:g}; check units: metres")
+    return frozen(rows, np.float32), bad

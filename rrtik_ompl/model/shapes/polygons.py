@@ -1,0 +1,118 @@
+"""Simple polygons in the plane: whether they are any, and cut into convex ones. Vertices have shape (k, 2) [m]."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError
+
+
+def without_repeats(polygon: Matrix) -> Matrix:
+    """The polygon without vertices that the next one repeats, as the first one of a closed ring repeats the last."""
+    kept: Matrix = polygon[(polygon != np.roll(polygon, -1, axis=0)).any(axis=1)]
+    return kept
+
+
+def check_simple(polygon: Matrix) -> None:
+    """Refuse what is no simple polygon.
+
+    Raises:
+        InputError: If two sides of the polygon cross or touch, or if it has no area.
+    """
+    a, b = polygon, np.roll(polygon, -1, axis=0)
+    area = 0.5 * float(np.sum(a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]))
+    extent = float(np.ptp(polygon, axis=0).max())
+    if abs(area) <= 1e-12 * max(extent * extent, 1e-12):
+        raise InputError("polygon has no area: its vertices lie on one line")
+    for i in range(len(a)):
+        if _side(a[i - 1], a[i], b[i]) == 0.0 and (a[i] - a[i - 1]) @ (b[i] - a[i]) < 0.0:
+            raise InputError(f"polygon folds back on itself at vertex {i}; delete it")
+        for j in range(i + 2, len(a)):
+            if (i, j) != (0, len(a) - 1) and _meet(a[i], b[i], a[j], b[j]):
+                raise InputError(f"polygon crosses itself: side {i} meets side {j}; list its vertices in order")
+
+
+def _meet(p: Vector, q: Vector, r: Vector, s: Vector) -> bool:
+    """Whether the segments p q and r s have a point in common."""
+    if (np.maximum(p, q) < np.minimum(r, s)).any() or (np.maximum(r, s) < np.minimum(p, q)).any():
+        return False
+    return _side(p, q, r) * _side(p, q, s) <= 0.0 and _side(r, s, p) * _side(r, s, q) <= 0.0
+
+
+def _side(u: Vector, v: Vector, w: Vector) -> float:
+    """On which side of the line u v the point w lies: positive on the left."""
+    return float((v[0] - u[0]) * (w[1] - u[1]) - (v[1] - u[1]) * (w[0] - u[0]))
+
+
+def convex_parts(polygon: Matrix) -> tuple[Matrix, ...]:
+    """Cut a simple polygon, shape (k, 2), into convex polygons: ear clipping, then greedy merging of neighbours."""
+    area = np.sum(polygon[:, 0] * np.roll(polygon[:, 1], -1) - np.roll(polygon[:, 0], -1) * polygon[:, 1])
+    ring = list(range(len(polygon))) if area > 0 else list(range(len(polygon)))[::-1]
+    parts = [ring] if _is_convex(polygon, ring) else _merged(polygon, _ears(polygon, ring))
+    return tuple(frozen(polygon[part]) for part in parts)
+
+
+def _turn(p: Vector, q: Vector, r: Vector) -> float:
+    """Twice the signed area of a triangle: positive for a left turn."""
+    return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
+
+
+def _is_convex(polygon: Matrix, ring: list[int]) -> bool:
+    size = len(ring)
+    corners = ((polygon[ring[k]], polygon[ring[(k + 1) % size]], polygon[ring[(k + 2) % size]]) for k in range(size))
+    return all(_turn(*corner) >= 0.0 for corner in corners)
+
+
+def _ears(polygon: Matrix, ring: list[int]) -> list[list[int]]:
+    """Triangulate by cutting ears [39]; ``ring`` runs counter-clockwise."""
+    rest, triangles = list(ring), []
+    while len(rest) > 3:
+        for k in range(len(rest)):
+            before, tip, after = rest[k - 1], rest[k], rest[(k + 1) % len(rest)]
+            p, q, r = polygon[before], polygon[tip], polygon[after]
+            others = (polygon[i] for i in rest if i not in (before, tip, after))
+            if _turn(p, q, r) > 0.0 and not any(_in_triangle(o, p, q, r) for o in others):
+                triangles.append([before, tip, after])
+                del rest[k]
+                break
+        else:  # only straight corners are left: drop one, it adds no area
+            flat = min(
+                range(len(rest)), key=lambda k: abs(_turn(*(polygon[rest[(k + d) % len(rest)]] for d in (-1, 0, 1))))
+            )
+            del rest[flat]
+    return [*triangles, rest]
+
+
+def _in_triangle(point: Vector, p: Vector, q: Vector, r: Vector) -> bool:
+    return _turn(p, q, point) >= 0.0 and _turn(q, r, point) >= 0.0 and _turn(r, p, point) >= 0.0
+
+
+def _merged(polygon: Matrix, parts: list[list[int]]) -> list[list[int]]:
+    """Join neighbouring parts while the union stays convex [40]."""
+    parts = [list(part) for part in parts]
+    joined = True
+    while joined:
+        joined = False
+        for i in range(len(parts)):
+            for j in range(i + 1, len(parts)):
+                union = _joined(parts[i], parts[j])
+                if union is not None and _is_convex(polygon, union):
+                    parts[i] = union
+                    del parts[j]
+                    joined = True
+                    break
+            if joined:
+                break
+    return parts
+
+
+def _joined(first: list[int], second: list[int]) -> list[int] | None:
+    """Union of two counter-clockwise rings that share one edge, or None."""
+    for k in range(len(first)):
+        a, b = first[k], first[(k + 1) % len(first)]
+        for m in range(len(second)):
+            if second[m] == b and second[(m + 1) % len(second)] == a:
+                around = [second[(m + 1 + s) % len(second)] for s in range(len(second))]  # from a all round to b
+                return first[: k + 1] + around[1:-1] + first[k + 1 :]
+    return None

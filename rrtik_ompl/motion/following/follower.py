@@ -1,0 +1,265 @@
+"""An arm that follows a trajectory: set points at a control rate, pause and resume, a pace, a stop within limits."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Lock
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Vector, finite_array, finite_number, positive
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.motion.following.links import RobotLink
+from rrtik_ompl.motion.following.pace import Pace
+from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
+
+AGAIN_SECONDS = 0.02  # after which a change of pace is tried again that has kept no limits
+NEAR = 0.05  # [rad] or [m] by which an arm may be elsewhere than it was told, unless said otherwise
+MOST_PERIODS = 3.0  # of a step of run(), however late it is
+SLACK = 1e-6  # of a limit, by which a trajectory may exceed it
+AT_REST = 1e-6  # of a joint's largest velocity
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """How following ended.
+
+    Attributes:
+        arrived: Whether at the end of the trajectory.
+        reason: Why not; "" if it arrived. Where a stop came too late for a rest before the end, it says so.
+        place: How far it came, of the trajectory's own time [s].
+        seconds: How long it took [s].
+        late: By how much the motion was put off for set points that came late, on top of that [s].
+
+    Example:
+        >>> path = rrtik.JointPath([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]])
+        >>> motion = rrtik.time_parameterize(path, rrtik.RateLimits(2.0, 20.0))
+        >>> arm = rrtik.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
+        >>> rrtik.Follower(motion, arm).run().arrived
+        True
+    """
+
+    arrived: bool
+    reason: str
+    place: float
+    seconds: float
+    late: float = 0.0
+
+
+class Follower:
+    """Follows a trajectory by set points.
+
+    The arm stays on the path of the trajectory, whatever its pace, so what was proven of it holds. ``pause``,
+    ``resume``, ``stop`` and ``pace`` may be called from other threads; each takes effect within the limits, on the
+    trajectory: where it brakes at its limit already, a little later; at the latest the arm rests where the motion ends.
+
+    Args:
+        trajectory: The motion, from rest to rest.
+        link: The arm.
+        limits: That changes of pace keep, and the trajectory itself; None for its peaks.
+        rate: Set points a second.
+        tolerance: By how much the arm may be elsewhere than it was told; then it is stopped [rad or m].
+
+    Raises:
+        InputError: If the trajectory exceeds the limits or is not at rest at its ends, if the arm is not where it
+            begins or has another number of joints, or if an option is none.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> robot = rrtik.load_robot("planar3")
+        >>> path = rrtik.JointPath.of(robot, [[0, 0, 0], [1, 0, 0]])
+        >>> motion = rrtik.time_parameterize(path, robot)
+        >>> follower = rrtik.Follower(motion, rrtik.SimulatedLink(robot, path.start))
+        >>> while not follower.ended:
+        ...     follower.step(0.01)
+        >>> follower.result.arrived
+        True
+    """
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        link: RobotLink,
+        *,
+        limits: RateLimits | None = None,
+        rate: float = 125.0,
+        tolerance: float = NEAR,
+    ) -> None:
+        require(trajectory, Trajectory, "trajectory to follow", "use time_parameterize(path, limits)")
+        require(limits, RateLimits | None, "limits of a follower", "use RateLimits.of(robot)")
+        if isinstance(link, type) or not isinstance(link, RobotLink):
+            raise InputError(
+                "arm of a follower: it needs positions() and command(q, t), as SimulatedLink(robot, start) has them, "
+                f"got {repr(link)[:40]}"
+            )
+        self._motion, self._link = trajectory, link
+        self._step, self._tolerance = 1.0 / positive(rate, "rate of a follower"), positive(tolerance, "tolerance")
+        _check_rest(trajectory)
+        self._pace = Pace(trajectory, _kept_limits(trajectory, limits))
+        self._lock = Lock()
+        self._wanted, self._paused, self._stopping, self._reason = 1.0, False, False, ""
+        self._again, self._late, self._ended = 0.0, 0.0, False
+        self._check_begin(trajectory.positions[0])
+
+    @property
+    def ended(self) -> bool:
+        """Whether the arm has come to its end, or to its stop."""
+        return self._ended
+
+    @property
+    def place(self) -> float:
+        """Where on the trajectory the arm is told to be, in the trajectory's own time [s]."""
+        return self._pace.place
+
+    @property
+    def result(self) -> Followed:
+        """How far it is, and how it ended."""
+        pace, reason = self._pace, self._reason
+        arrived = pace.place >= self._motion.duration
+        if not arrived:
+            reason = reason or "on its way"
+        elif reason:
+            reason = f"{reason}: too late for a rest before the end"
+        return Followed(arrived, reason, pace.place, pace.now, self._late)
+
+    def pause(self) -> None:
+        """Come to rest on the trajectory, until ``resume``."""
+        self._paused = True
+
+    def resume(self) -> None:
+        """Go on."""
+        self._paused = False
+
+    def stop(self, reason: str = "stopped") -> None:
+        """Come to rest on the trajectory, for good."""
+        with self._lock:
+            self._stopping, self._reason = True, self._reason or reason
+
+    def pace(self, pace: float) -> None:
+        """Play the motion at a share of its speed, from above 0 to 1.
+
+        Raises:
+            InputError: If the share is another one.
+        """
+        share = finite_number(pace, "pace")
+        if not 0.0 < share <= 1.0:
+            raise InputError(f"pace must be greater than 0 and at most 1, got {share:g}")
+        self._wanted = share
+
+    def step(self, seconds: float) -> None:
+        """Advance by a time [s] and command the set point then.
+
+        Raises:
+            InputError: If the time is not greater than 0.
+        """
+        if self._ended:
+            return
+        self._advance(positive(seconds, "seconds of a step"))
+        q = self._motion(self._pace.place).positions
+        self._link.command(q, self._pace.now)
+        if self._pace.place >= self._motion.duration or (self._stopping and self._pace.steady == 0.0):
+            self._ended = True
+
+    def run(
+        self, *, clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], object] = time.sleep
+    ) -> Followed:
+        """Follow to the end, or to a stop; Ctrl-C stops within limits.
+
+        After a tick that came late the motion goes on where it was, a few periods at most further: it falls behind the
+        clock, and the arm is not told to jump. An arm that is not where it was told to be, or whose link cannot say
+        where it is, is stopped within limits; what ``command`` raises ends following at once.
+
+        Args:
+            clock: Tells the time [s].
+            sleep: Waits for a time [s].
+        """
+        before = clock()
+        while not self._ended:
+            try:
+                sleep(max(0.0, before + self._step - clock()))
+                told = self._motion(self._pace.place).positions
+                now = clock()
+                if fault := self._fault(told):
+                    self.stop(fault)
+                passed, before = max(now - before, 1e-6), now
+                due = min(passed, MOST_PERIODS * self._step)
+                self._late += passed - due
+                self.step(due)
+            except KeyboardInterrupt:
+                self.stop("interrupted")
+        return self.result
+
+    def _advance(self, seconds: float) -> None:
+        """Go on at the pace of the moment; decide on another pace if one is wanted."""
+        target = 0.0 if self._paused or self._stopping else self._wanted
+        pace = self._pace
+        if target != pace.end and pace.now >= self._again:
+            pace.turn_to(target)
+            self._again = pace.now + AGAIN_SECONDS
+        pace.advance(seconds)
+        pace.place = min(pace.place, self._motion.duration)
+
+    def _check_begin(self, told: Vector) -> None:
+        here = finite_array(self._link.positions(), (None,), "positions of the arm")
+        if here.shape != told.shape:
+            raise InputError(f"the arm has {here.size} joints, the trajectory moves {told.size}: it is another robot's")
+        if away := self._away(here, told):
+            raise InputError(f"the trajectory begins elsewhere: {away} rad or m away; move the arm there first")
+
+    def _fault(self, told: Vector) -> str:
+        """Why an arm that was told to be at ``told`` has to stop; "" if it need not.
+
+        Whatever a link raises here, the arm is brought to rest by the set points that it may still take.
+        """
+        try:
+            here = finite_array(self._link.positions(), told.shape, "positions of the arm")
+        except Exception as error:
+            return f"where the arm is cannot be read: {' '.join(str(error).split()) or type(error).__name__}"
+        away = self._away(here, told)
+        return away and f"{away} away from where it was told to be"
+
+    def _away(self, here: Vector, told: Vector) -> str:
+        """Which joint is farthest from where it was told to be, and how far; "" if all are near enough."""
+        apart = np.abs(here - told)
+        if (apart <= self._tolerance).all():
+            return ""
+        name = self._motion.joint_names[int(np.nan_to_num(apart, nan=np.inf).argmax())]
+        return f"joint '{name}' is {apart.max():.3g}"
+
+
+def _check_rest(motion: Trajectory) -> None:
+    """Refuse a motion that begins or ends at speed: an arm at rest cannot follow it, and no change of pace ends it."""
+    ends = np.abs(motion.velocities[[0, -1]])
+    if (ends > AT_REST * motion.peaks().velocity).any():
+        end, joint = np.unravel_index(int(ends.argmax()), ends.shape)
+        place = ("start", "end")[int(end)]
+        raise InputError(
+            f"trajectory to follow: at its {place} joint '{motion.joint_names[int(joint)]}' moves at "
+            f"{ends[end, joint]:.3g} rad/s or m/s; it must begin and end at rest, as time_parameterize() has it"
+        )
+
+
+def _kept_limits(motion: Trajectory, limits: RateLimits | None) -> RateLimits:
+    """What changes of pace keep: the limits, or the peaks of the motion where there are none.
+
+    Raises:
+        InputError: If the motion exceeds them: no change of pace would keep them, and so none would ever be made.
+    """
+    peaks = motion.peaks()
+    if limits is None:  # joints that stand still have the peaks of the others
+        return RateLimits(*(np.maximum(np.where(row > 0.0, row, row.max()), 1e-9) for row in peaks))
+    bounds = limits.for_joints(len(motion.joint_names))
+    for name, unit in (("velocity", ""), ("acceleration", "^2"), ("jerk", "^3")):
+        peak, bound = getattr(peaks, name), getattr(bounds, name)
+        over = peak > bound * (1.0 + SLACK)
+        if over.any():
+            joint = int(np.argmax(np.where(over, peak / bound, 0.0)))
+            raise InputError(
+                f"limits of a follower: joint '{motion.joint_names[joint]}' has a {name} of {peak[joint]:.4g} in the "
+                f"trajectory, its limit is {bound[joint]:.4g} rad/s{unit} or m/s{unit}; time the path anew with these "
+                "limits, or slow the trajectory down by slowed()"
+            )
+    rows = zip((bounds.velocity, bounds.acceleration, bounds.jerk), peaks, strict=True)
+    return RateLimits(*(np.maximum(bound, peak) for bound, peak in rows))

@@ -1,0 +1,181 @@
+"""How fast a motion is played: its pace, 1 as it was timed, 0 at rest, and changes of pace that keep all limits.
+
+With s the motion's own time and p the pace, velocities are q' p, accelerations q'' p^2 + q' dp/dt, jerks
+q''' p^3 + 3 q'' p dp/dt + q' d^2p/dt^2. A change of pace is a quintic over time; whether it keeps the limits is looked
+up along it. Of many, some of which begin a little later, the one that ends first is taken. The arm stays on the path.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial.polynomial import polyder, polyint, polyval
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
+
+LOOKS = 80  # along a change of pace
+FIRST_LOOKS = 12  # along each of those that are tried; most that keep no limits are found by them
+SHORTEST = 0.03  # [s] of a change of pace
+LENGTHS_PER_DECADE = 12
+DELAYS = np.concatenate([[0.0], np.geomspace(0.03, 1.0, 12)])  # [s] until it begins
+BESIDE = 1e-5  # [s] from a knot
+SLACK = 1.0 + 1e-9
+LOWER = (1.0, 0.7, 0.4)  # shares of a higher pace that are tried in turn: less of it leaves room for the change
+
+
+class Change(NamedTuple):
+    """A change of pace, or k of them side by side.
+
+    Attributes:
+        moment: When it begins [s]; a number, or shape (k,).
+        length: How long it lasts [s].
+        coefficients: Of the pace over the time since the beginning, shape (6,) or (6, k).
+        end: The pace after it, of all of them.
+    """
+
+    moment: Vector
+    length: Vector
+    coefficients: Matrix
+    end: float
+
+    def at(self, clock: Vector) -> tuple[Vector, Vector, Vector, Vector]:
+        """After times since the beginning, shape (..., k): how far it came, its pace and two derivatives of that."""
+        c = self.coefficients
+        rows = (polyint(c), c, polyder(c), polyder(c, 2))
+        gained, pace, rise, bend = (np.asarray(polyval(clock, row, tensor=False), dtype=np.float64) for row in rows)
+        return gained, pace, rise, bend
+
+    def some(self, numbers: int | NDArray[np.int64]) -> Change:
+        """Some of several, or one."""
+        return Change(self.moment[numbers], self.length[numbers], self.coefficients[:, numbers], self.end)
+
+
+def changes_to(end: float, starts: Matrix, moments: Vector, lengths: Vector) -> Change:
+    """The quintics from paces with two derivatives, rows of ``starts``, shape (3, k), to a steady one."""
+    p, v, a = starts[0], starts[1] * lengths, starts[2] * lengths**2
+    rest = np.stack([end - p - v - 0.5 * a, -v - a, -a])
+    ends = np.array([[1.0, 1.0, 1.0], [3.0, 4.0, 5.0], [6.0, 12.0, 20.0]])
+    coefficients = np.concatenate([np.stack([p, v, 0.5 * a]), np.linalg.solve(ends, rest)])
+    return Change(moments, lengths, coefficients / lengths ** np.arange(6)[:, None], end)
+
+
+class Pace:
+    """The pace over time, and how far the motion has come by it.
+
+    Attributes:
+        place: In the motion's own time [s].
+        now: Time since the beginning [s].
+        end: The pace that it is at, or comes to by what has been decided.
+    """
+
+    def __init__(self, motion: Trajectory, limits: RateLimits) -> None:
+        """Full pace, at the beginning of a motion that keeps the limits."""
+        self.place, self.now, self.end = 0.0, 0.0, 1.0
+        self._motion, self._limits, self._jerks = motion, limits, motion.jerks
+        self._changes: list[Change] = []  # at most two, one after the other
+        self._steady = 1.0  # before the first of them
+        # a change to rest takes as much of the motion's time as half its length: no longer one ends before the motion
+        longest = max(2.0 * motion.duration, 2.0 * SHORTEST)
+        count = 2 + int(LENGTHS_PER_DECADE * np.log10(longest / SHORTEST))
+        waits, lengths = np.meshgrid(DELAYS, np.geomspace(SHORTEST, longest, count), indexing="ij")
+        order = np.argsort((waits + lengths).ravel(), kind="stable")
+        self._waits, self._lengths = np.unravel_index(order, waits.shape)[0], lengths.ravel()[order]
+
+    @property
+    def steady(self) -> float | None:
+        """The pace, if it does not change."""
+        return None if self._changes else self._steady
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        self.place = self._after(seconds)[0]
+        self.now += seconds
+        while self._changes and self._ends(0) <= self.now:
+            self._steady = self._changes.pop(0).end
+
+    def turn_to(self, end: float) -> None:
+        """Decide on a change to another pace, now or soon, or to one nearer to it; on none if none keeps the limits."""
+        starts = np.array([self._after(delay) for delay in DELAYS]).T[:, self._waits]
+        for share in LOWER if end > self.end else LOWER[:1]:
+            if share * end <= self.end < end:
+                return
+            tried = changes_to(share * end, starts[1:], self.now + DELAYS[self._waits], self._lengths)
+            for k in np.flatnonzero(self._promising(tried, starts[0])):
+                change = tried.some(int(k))
+                if self._keeps_limits(change, starts[0, k]):
+                    self._changes = [c for c in self._changes if c.moment < change.moment] + [change]
+                    self.end = change.end
+                    return
+
+    def _promising(self, tried: Change, places: Vector) -> Mask:
+        """Which of k changes keep the limits at a first look and never go back, from places, shape (k,)."""
+        clock = np.linspace(0.0, 1.0, FIRST_LOOKS)[:, None] * tried.length
+        gained, pace, *_ = tried.at(clock)
+        found: Mask = np.all((pace >= -1e-9) & (pace <= SLACK), axis=0)
+        if tried.end == 0.0:  # the motion rests at its own end too
+            ahead = self._motion.duration - self.place
+            found &= places + gained[-1] < self._motion.duration
+            found &= (tried.moment + tried.length - self.now) * self._after(0.0)[1] < ahead
+        numbers = np.flatnonzero(found)
+        found[numbers] = self._kept_at(clock[:, numbers], tried.some(numbers), places[numbers]).all(axis=0)
+        return found
+
+    def _keeps_limits(self, change: Change, place: float) -> bool:
+        """Whether the motion keeps the limits all along a change of pace from a place, and never goes back."""
+        clock = np.linspace(0.0, change.length, LOOKS)
+        gained, pace, *_ = change.at(clock)
+        if pace.min() < -1e-9 or pace.max() > SLACK:
+            return False
+        # the motion's jerk jumps at its knots: just before and after each that is passed
+        places = place + gained
+        knots = self._motion.times[(self._motion.times > places[0]) & (self._motion.times < places[-1])]
+        at = np.interp(knots, places, clock)
+        looks = np.clip(np.concatenate([clock, at - BESIDE, at + BESIDE]), 0.0, change.length)
+        return bool(self._kept_at(looks, change, place).all())
+
+    def _kept_at(self, clock: Vector, change: Change, place: float | Vector) -> Mask:
+        """Whether the limits are kept after times since the beginning of changes; of the shape of ``clock``."""
+        gained, *paces = change.at(clock)
+        places = np.ravel(place + gained)
+        state = self._motion(places)
+        p, rise, bend = (row.reshape(-1, 1) for row in paces)
+        v, a, j = state.velocities, state.accelerations, self._jerks_at(places)
+        rates = (v * p, a * p**2 + v * rise, j * p**3 + 3.0 * a * p * rise + v * bend)
+        bounds = (self._limits.velocity, self._limits.acceleration, self._limits.jerk)
+        kept = [(np.abs(rate) <= SLACK * bound + 1e-12).all(axis=1) for rate, bound in zip(rates, bounds, strict=True)]
+        found: Mask = np.logical_and.reduce(kept).reshape(np.shape(clock))
+        return found
+
+    def _jerks_at(self, places: Vector) -> Matrix:
+        """The motion's jerk, shape (k, n); just after a jump, and none before its beginning and from its end on."""
+        motion = self._motion
+        pieces = np.clip(np.searchsorted(motion.times, places, side="right") - 1, 0, len(motion.times) - 2)
+        moving = (places >= 0.0) & (places < motion.duration)
+        found: Matrix = np.where(moving[:, None], self._jerks[pieces], 0.0)
+        return found
+
+    def _ends(self, number: int) -> float:
+        """When a change ends, or gives way to the next."""
+        change = self._changes[number]
+        later = [self._changes[number + 1].moment] if number + 1 < len(self._changes) else []
+        return float(min([change.moment + change.length, *later]))
+
+    def _after(self, seconds: float) -> tuple[float, float, float, float]:
+        """Place, pace and its two derivatives after a time from now, as has been decided."""
+        until, at, place, steady = self.now + seconds, self.now, self.place, self._steady
+        for number, change in enumerate(self._changes):
+            if change.moment >= until:
+                break
+            moment = float(change.moment)
+            if moment > at:
+                place, at = place + steady * (moment - at), moment
+            stop = min(self._ends(number), until)
+            gained, pace, rise, bend = (row.tolist() for row in change.at(np.array([at - moment, stop - moment])))
+            place += gained[1] - gained[0]
+            at, steady = stop, change.end
+            if stop == until and until < moment + change.length:
+                return place, pace[1], rise[1], bend[1]
+        return place + steady * (until - at), steady, 0.0, 0.0

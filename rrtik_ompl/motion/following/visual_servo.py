@@ -1,0 +1,192 @@
+"""Visual servoing: the last centimetres to a target by what the camera sees of it, until the tip is there.
+
+"position": the tip goes straight to the pose that the target's markers give. "image": points of the gripper go straight
+to where they are wanted in the picture, by the interaction matrix; errors of calibration that shift both the same way
+cancel. The camera is fixed to the arm's base. The arm stops where the target is not seen any more, or jumps.
+Source: [1, ch. 2.2].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, positive
+from rrtik_ompl.base.choices import one_of
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.poses import apart, rigid
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.motion.following.servo import Servo
+
+ServoMethod: TypeAlias = Literal["position", "image"]
+ServoState: TypeAlias = Literal["moving", "done", "lost", "jumped", "blocked"]
+HALF_SIDE = 0.05  # [m]; of the square of points at the tip that "image" leads
+MIN_DEPTH = 0.05  # [m]; nearer to the camera nothing is seen
+STILL = 1e-4  # [rad/s or m/s]; slower than that the arm is taken to stand
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ServoStep:
+    """What is to be done in a time step.
+
+    Attributes:
+        rates: Of the joints, shape (dof,) [rad/s or m/s].
+        state: "moving", "done", or why the arm stands: "lost", "jumped", "blocked".
+        away: Distance of the tip from where it shall be, by the last sighting [m].
+        turned: The angle to it [rad].
+    """
+
+    rates: Vector
+    state: ServoState
+    away: float
+    turned: float
+
+
+def interaction_matrix(points: ArrayLike, depths: ArrayLike) -> Matrix:
+    """How points in a picture move with the camera: ``d points = L @ twist``, L of shape (2 n, 6).
+
+    Args:
+        points: x / z and y / z in the frame of the camera, shape (n, 2).
+        depths: z of each, above 0, shape (n,) [m].
+
+    Returns:
+        For a twist of the camera in its own frame: linear [m/s], then angular [rad/s].
+
+    Raises:
+        InputError: If shapes do not fit, or a depth is not above 0.
+
+    Example:
+        >>> interaction_matrix([[0.0, 0.0]], [2.0])[0].tolist()
+        [-0.5, 0.0, 0.0, 0.0, -1.0, 0.0]
+    """
+    seen = finite_array(points, (None, 2), "points")
+    z = finite_array(depths, (len(seen),), "depths")
+    if (z <= 0.0).any():
+        raise InputError(f"depths must be above 0, got {z.min():g}")
+    (x, y), none = seen.T, np.zeros(len(seen))
+    across = np.stack([-1.0 / z, none, x / z, x * y, -(1.0 + x * x), y], axis=1)
+    down = np.stack([none, -1.0 / z, y / z, 1.0 + y * y, -x * y, -x], axis=1)
+    return np.stack([across, down], axis=1).reshape(-1, 6)
+
+
+class VisualServo:
+    """Leads the tip to a target that is seen.
+
+    Args:
+        servo: Turns velocities of the tip into rates: within limits, away from obstacles, proven free.
+        robot: The arm.
+        method: See the head of this module.
+        T_base_camera: Pose of the camera; for "image".
+        gain: Share of the error that is taken away in a second [1/s].
+        speed: Of the tip at most [m/s].
+        turn: Of the tip at most [rad/s].
+        patience: So long the arm goes on to where the target was seen last [s].
+
+    Raises:
+        InputError: If an option is none, or "image" has no camera.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> robot = rrtik.load_robot("panda")
+        >>> q, leading = robot.posture("default"), VisualServo(rrtik.Servo(rrtik.World(robot)), robot)
+        >>> seen = robot.fk(q) * rrtik.pose([0.0, 0.0, 0.02])
+        >>> for _ in range(200):
+        ...     q = q + 0.02 * leading.step(q, seen, 0.02).rates
+        >>> leading.step(q, seen, 0.02).state
+        'done'
+    """
+
+    def __init__(
+        self,
+        servo: Servo,
+        robot: Robot,
+        method: str = "position",
+        *,
+        T_base_camera: ArrayLike | pin.SE3 | None = None,
+        gain: float = 2.0,
+        speed: float = 0.05,
+        turn: float = 0.5,
+        patience: float = 0.15,
+    ) -> None:
+        require(servo, Servo, "servo")
+        self._servo, self._robot = servo, robot
+        self._method = one_of(get_args(ServoMethod), method, "method of visual servoing")
+        if self._method == "image" and T_base_camera is None:
+            raise InputError("visual servoing by 'image' needs T_base_camera, the pose of the camera")
+        self._camera = None if T_base_camera is None else rigid(T_base_camera, "pose of the camera")
+        self._gain, self._speed, self._turn = positive(gain, "gain"), positive(speed, "speed"), positive(turn, "turn")
+        self._patience = positive(patience, "patience")
+        self.near, self.aligned, self.jump = 5e-4, np.deg2rad(0.1), 0.03  # [m], [rad], [m]: done; of a sighting
+        self._goal: pin.SE3 | None = None
+        self._unseen = 0.0
+
+    def go_on_with(self, servo: Servo) -> None:
+        """Take another servo for the same target, where the world has changed; what was seen is not forgotten."""
+        require(servo, Servo, "servo")
+        self._servo = servo
+
+    def step(self, q: ArrayLike, seen: ArrayLike | pin.SE3 | None, dt: float) -> ServoStep:
+        """Rates for a time step.
+
+        Args:
+            q: The configuration now, shape (dof,).
+            seen: Where the tip shall be by the picture of now, ``T_base_tip``; None if the target is not in it.
+            dt: The time step [s].
+
+        Raises:
+            InputError: If one of them is none.
+        """
+        here, seconds = self._robot.configuration(q, "configuration"), positive(dt, "time step")
+        state = self._look(None if seen is None else rigid(seen, "where the tip shall be"), seconds)
+        tip, goal, still = self._robot.fk(here), self._goal, np.zeros(self._robot.dof)
+        if goal is None:
+            return ServoStep(still, "lost", np.inf, np.inf)
+        away, turned = apart(tip, goal)
+        if state != "moving":
+            return ServoStep(still, state, away, turned)
+        if away <= self.near and turned <= self.aligned:
+            return ServoStep(still, "done", away, turned)
+        rates = self._servo.step(here, self._slowed(self._twist(tip, goal)), seconds)
+        return ServoStep(rates, "moving" if np.abs(rates).max() > STILL else "blocked", away, turned)
+
+    def _look(self, seen: pin.SE3 | None, seconds: float) -> ServoState:
+        """Take a sighting; whether the target is still known."""
+        if seen is None:
+            self._unseen += seconds
+            return "moving" if self._unseen <= self._patience else "lost"
+        before, self._unseen = self._goal, 0.0
+        if before is not None and np.linalg.norm(seen.translation - before.translation) > self.jump:
+            return "jumped"
+        self._goal = seen
+        return "moving"
+
+    def _twist(self, tip: pin.SE3, goal: pin.SE3) -> Vector:
+        """Of the tip, in the axes of the base, shape (6,)."""
+        if self._method == "position" or self._camera is None:
+            turning = tip.rotation @ pin.log3(tip.rotation.T @ goal.rotation)
+            return self._gain * np.concatenate([goal.translation - tip.translation, turning])
+        camera = self._camera
+        now, wanted = (_square(camera.actInv(T)) for T in (tip, goal))
+        if min(now[:, 2].min(), wanted[:, 2].min()) < MIN_DEPTH:
+            return np.zeros(6)
+        error = (now[:, :2] / now[:, 2:] - wanted[:, :2] / wanted[:, 2:]).ravel()
+        here, there = (interaction_matrix(each[:, :2] / each[:, 2:], each[:, 2]) for each in (now, wanted))
+        moved = self._gain * np.linalg.lstsq(0.5 * (here + there), error, rcond=None)[0]  # of the gripper: - L moves it
+        spin = moved[3:]
+        velocity = moved[:3] + np.cross(spin, camera.actInv(tip).translation)
+        return np.concatenate([camera.rotation @ velocity, camera.rotation @ spin])
+
+    def _slowed(self, twist: Vector) -> Vector:
+        """The same direction, within the speeds of the tip."""
+        fast = float(np.linalg.norm(twist[:3])) / self._speed, float(np.linalg.norm(twist[3:])) / self._turn
+        return twist / max(*fast, 1.0)
+
+
+def _square(T: pin.SE3) -> Matrix:
+    """Four points at the tip in the frame of the camera, shape (4, 3)."""
+    corners = HALF_SIDE * np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
+    return np.asarray(corners @ T.rotation.T + T.translation)

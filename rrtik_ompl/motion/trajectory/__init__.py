@@ -1,0 +1,131 @@
+"""Time parameterisation: a path and limits in, a trajectory out that keeps the limits everywhere."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import Matrix, bounded_array, not_negative
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.robot import Robot, require_joints
+from rrtik_ompl.motion.trajectory.blending import blended, fault_finder, stopped
+from rrtik_ompl.motion.trajectory.corners import vertices
+from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
+from rrtik_ompl.motion.trajectory.limits import RateLimits
+from rrtik_ompl.motion.trajectory.load import load_trajectory
+from rrtik_ompl.motion.trajectory.motion import Peaks, State, Trajectory
+from rrtik_ompl.motion.trajectory.report import MotionReport, motion_report
+from rrtik_ompl.world.kept_clearance import check_route_clearance
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
+
+__all__ = [
+    "MotionReport",
+    "Peaks",
+    "RateLimits",
+    "State",
+    "Trajectory",
+    "load_trajectory",
+    "motion_report",
+    "time_parameterize",
+]
+
+
+def time_parameterize(
+    path: JointPath,
+    limits: RateLimits | Robot,
+    *,
+    blend: float = 0.0,
+    world: World | None = None,
+    clearance: float | None = None,
+    tip_speed: float | None = None,
+    tip_acceleration: float | None = None,
+    torque: ArrayLike | bool | None = None,
+    payload: float = 0.0,
+) -> Trajectory:
+    """Give a path its times: as fast as the limits allow, beginning and ending at rest.
+
+    Without ``blend`` the motion stays on the path to 1e-9 and stops at every corner; between two corners it has the
+    shortest time under velocity, acceleration and jerk limits [21]. So the single-joint moves of a path are made one
+    after the other, and what was checked of the path holds for the motion.
+
+    With ``blend`` corners are rounded and passed without a stop, as fast as the limits allow [19]. The motion then
+    leaves the path by at most 0.22 of ``blend``. Its acceleration never jumps, not even without jerk limits; it is
+    proven free where it leaves the path, if the path is proven, or else checked in steps; :meth:`Trajectory.prove`
+    proves the whole motion anew. Waypoints
+    nearer to each other than 0.02 of ``blend`` are merged, so that many of them are one smooth curve, and no piece of
+    such a curve is shorter than 1 ms. A corner that cannot be rounded is a stop; where rounding makes nothing faster
+    none is rounded.
+
+    Args:
+        path: A valid path. Waypoints that coincide or lie on a line are no corners.
+        limits: Or a robot, whose limits are taken (see :meth:`RateLimits.of` for those that it does not have).
+        blend: Largest distance of a corner from the beginning of its rounding [rad or m]; 0 keeps to the path.
+        world: For a blend: what the rounded corners must not touch.
+        clearance: What a blended motion keeps from every obstacle on top of its margin [m], if the path keeps it. None:
+            1 mm, or what the ends of the path have.
+        tip_speed: Largest speed of the tip's origin [m/s]. Limits of the tip and of torques need a robot: pass it as
+            ``limits``, or a world.
+        tip_acceleration: Largest acceleration of the tip's origin [m/s^2].
+        torque: Largest torques, one number or one per joint [N m; N if it slides], by rigid-body dynamics; True for the
+            efforts of the robot's description.
+        payload: Mass at the tip's origin that the torques carry too [kg].
+
+    Returns:
+        A motion whose largest velocity, acceleration and jerk are within the limits everywhere (to 1e-9 of them), not
+        at samples: see :meth:`Trajectory.peaks`. Limits of the tip and of torques are kept at the knots, and to 0.1 %
+        between them.
+
+    Raises:
+        InputError: If the path has one waypoint, does not move, has another number of joints than the limits, or moves
+            other joints than the robot (of the limits or the world), or these in another order; if the blend is
+            negative or comes without a world, the clearance is negative or more than an end of the path can keep, or
+            the arm cannot be held still within the torques.
+
+    Example:
+        >>> problem = rrtik.load_problem("planar3_boxes")
+        >>> path = rrtik.plan(problem, seed=1).path
+        >>> stops = rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 2.0, 20.0))
+        >>> smooth = rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 2.0, 20.0), blend=0.05, world=problem.world)
+        >>> smooth.duration < stops.duration
+        True
+    """
+    require(path, JointPath, "path to time", "a plan has one if plan.found")
+    require(world, World | None, "world", "use World(robot, scene)")
+    bounds = RateLimits.of(limits) if isinstance(limits, Robot) else limits
+    require(bounds, RateLimits, "limits of a path to time", "use RateLimits.of(robot)")
+    bounds = bounds.for_joints(path.waypoints.shape[1])
+    for robot in (limits if isinstance(limits, Robot) else None, None if world is None else world.robot):
+        if robot is not None:
+            require_joints(robot, path.joint_names, "path")
+    corners = _corners(path)
+    reach = float(bounded_array(blend, (), "blend"))
+    if reach < 0.0:
+        raise InputError(f"blend must be 0 or greater, got {reach:g}")
+    if clearance is not None:
+        not_negative(clearance, "clearance")
+    arm = limits if isinstance(limits, Robot) else None if world is None else world.robot
+    wanted = (tip_speed, tip_acceleration, torque, not_negative(payload, "payload") or None)
+    more = None
+    if any(option is not None for option in wanted):
+        more = DynamicLimits.of(
+            arm, tip_speed=tip_speed, tip_acceleration=tip_acceleration, torque=torque, payload=payload
+        )
+    stopping = stopped(path, corners, bounds, more)
+    if reach == 0.0:
+        return stopping
+    if world is None:
+        raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
+    require(world, World, "world of a path with rounded corners")
+    check_route_clearance(world, clearance, path.waypoints)
+    faults = fault_finder(path, world, clearance)
+    return blended(path, corners, bounds, reach, stopping.duration, faults, more) or stopping
+
+
+def _corners(path: JointPath) -> Matrix:
+    """The vertices of a path that can be timed, shape (k, n), k at least 2."""
+    if len(path.waypoints) < 2:
+        raise InputError("path to time: it has one waypoint; a motion needs two or more")
+    corners = vertices(path.waypoints)
+    if len(corners) < 2:
+        raise InputError("path to time: all its waypoints are the same; there is no motion to time")
+    return corners

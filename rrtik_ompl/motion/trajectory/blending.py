@@ -1,0 +1,122 @@
+"""A path with its corners rounded: near the path, proven free, and no slower than with a stop at each corner."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.motion.trajectory.corners import MERGED_SHARE, first_radii, spaced, vertices
+from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
+from rrtik_ompl.motion.trajectory.limits import RateLimits
+from rrtik_ompl.motion.trajectory.motion import Trajectory, bad_moments, proof_of_pieces
+from rrtik_ompl.motion.trajectory.pieces import joined
+from rrtik_ompl.motion.trajectory.runs import runs
+from rrtik_ompl.world.kept_clearance import provable_clearances
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.world import World
+
+DEVIATION_SHARE = 0.22  # of the blend: how far a motion may be from its path
+MAX_ROUNDS = 12  # attempts with smaller and smaller rounded corners
+LEAST_RADIUS = 1.0 / 32.0  # of the blend; a corner that has to be rounded less is a stop
+
+Faults = Callable[[Trajectory, Mask], NDArray[np.int64]]  # pieces that are not known to be free, of those off the path
+
+
+def blended(
+    path: JointPath,
+    corners: Matrix,
+    limits: RateLimits,
+    blend: float,
+    slowest: float,
+    faults: Faults,
+    more: DynamicLimits | None = None,
+) -> Trajectory | None:
+    """The motion along a path with these vertices, shape (k, n), that rounds them.
+
+    None where no such motion is faster than ``slowest`` [s], or none is free.
+    """
+    kept = spaced(corners, MERGED_SHARE * blend)
+    merged = len(kept) < len(corners)
+    rows = vertices(corners[kept]) if merged else corners
+    if len(rows) < 2:  # the whole path is shorter than what is merged
+        return None
+    along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
+    radii, room = first_radii(rows, blend), (DEVIATION_SHARE - MERGED_SHARE) * blend
+    for _ in range(MAX_ROUNDS):
+        parts = runs(rows, radii, limits, room=room, more=more)
+        motion = within(joined([run.pieces for run in parts], path), limits)
+        if motion.duration >= slowest:
+            return None
+        columns = zip(*((run.places, run.apart, run.on_path) for run in parts), strict=True)
+        places, apart, on_path = (np.concatenate(column) for column in columns)
+        bad = places[apart > room]
+        if len(bad) == 0:
+            off_path = np.ones_like(on_path) if merged else ~on_path  # what was proven is the path with all corners
+            bad = places[faults(motion, off_path)]
+        if len(bad) == 0:
+            return motion
+        radii = _narrower(radii, along[1:-1], bad, LEAST_RADIUS * blend)
+    return None
+
+
+def stopped(path: JointPath, corners: Matrix, limits: RateLimits, more: DynamicLimits | None) -> Trajectory:
+    """The motion along a path with these vertices that stops at each of them."""
+    parts = runs(corners, np.zeros(len(corners) - 2), limits, more=more)
+    return within(joined([run.pieces for run in parts], path), limits)
+
+
+def within(motion: Trajectory, limits: RateLimits, rounds: int = 10) -> Trajectory:
+    """The motion, slowed where rounding errors let it exceed a limit."""
+    for _ in range(rounds):
+        peaks = motion.peaks()
+        factor = limits.slowing(peaks.velocity, peaks.acceleration, peaks.jerk)
+        if factor == 1.0:
+            break
+        motion = motion.slowed(factor)
+    return motion
+
+
+def fault_finder(path: JointPath, world: World, clearance: float | None) -> Faults:
+    """What a motion has to pass: a proof of as much as the path itself is proven to keep, or a check in steps.
+
+    What lies on the path is proven with it.
+    """
+    kept = next(provable_clearances(world, path.waypoints, clearance), None)
+    if kept is None:
+        return lambda motion, _: np.searchsorted(motion.times, bad_moments(motion, world), side="right") - 1
+
+    def unproven(motion: Trajectory, off_path: Mask) -> NDArray[np.int64]:
+        steps = np.diff(np.concatenate([[False], off_path, [False]]).astype(np.int8))
+        stretches = zip(np.flatnonzero(steps == 1).tolist(), np.flatnonzero(steps == -1).tolist(), strict=True)
+        return np.array(
+            [
+                first + gap.motion
+                for first, end in stretches
+                for gap in proof_of_pieces(motion, world, kept, first, end).unproven
+            ],
+            dtype=np.int64,
+        )
+
+    return unproven
+
+
+def _narrower(radii: Vector, along: Vector, bad: Vector, least: float) -> Vector:
+    """Half the radius of the corners near bad places; 0 where that is less than the least."""
+    bad = np.unique(bad)
+    blamed = (np.abs(along - bad[_nearest(bad, along)]) <= radii) & (radii > 0.0)
+    rounded = np.flatnonzero(radii > 0.0)
+    if not blamed.any() and len(rounded):
+        blamed[rounded[_nearest(along[rounded], bad)]] = True
+    halved: Vector = np.where(blamed, 0.5 * radii, radii)
+    halved[halved < least] = 0.0
+    return halved
+
+
+def _nearest(rows: Vector, places: Vector) -> NDArray[np.int64]:
+    """Numbers of the rows, ascending, that are nearest to places: of two the first."""
+    after = np.minimum(np.searchsorted(rows, places), len(rows) - 1)
+    before = np.maximum(after - 1, 0)
+    return np.where(np.abs(places - rows[before]) <= np.abs(places - rows[after]), before, after)

@@ -1,0 +1,160 @@
+"""Curves through rounded corners: their curvature is continuous, and they leave the path no farther than is said.
+
+A path is the sum of a line and one bend a corner. Each bend is replaced by its mean over a stretch of the path, with
+the weights of a triangle whose half width is the corner's radius: a cubic in three pieces whose second derivative is
+continuous. Roundings may overlap, so that many near corners become one smooth curve; the sum stays what it is. The idea
+of rounding corners is that of [20].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan
+from rrtik_ompl.kernels.timing import layout, reference
+from rrtik_ompl.motion.trajectory.cubics import even_parts
+
+LEAST_STEPS = 150  # of the grid along a whole curve
+STEPS_PER_RADIUS = 12  # of the grid within a rounded corner
+STEPS_PER_LINE = 8  # of the grid between two of them
+SAME_PLACE = 1e-9  # of the length of a curve; nearer points of a grid are one
+
+
+class Samples(NamedTuple):
+    """A curve at m places: position, and first and second derivative by the place.
+
+    Attributes:
+        values: Side by side, shape (m, 3 n).
+    """
+
+    values: Matrix
+
+    @property
+    def positions(self) -> Matrix:
+        """Shape (m, n)."""
+        return self.values[:, : self.values.shape[1] // 3]
+
+    @property
+    def slopes(self) -> Matrix:
+        """First derivative, shape (m, n)."""
+        n = self.values.shape[1] // 3
+        return self.values[:, n : 2 * n]
+
+    @property
+    def bends(self) -> Matrix:
+        """Second derivative, shape (m, n)."""
+        return self.values[:, 2 * (self.values.shape[1] // 3) :]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A run through rounded corners, from rest to rest. Places on it are distances along the path.
+
+    Attributes:
+        vertices: Of the path, shape (k, n).
+        along: Place of each, shape (k,), from 0.
+        directions: Of the edges, of length 1, shape (k - 1, n).
+        radii: Of the corners, shape (k,); 0 at both ends.
+    """
+
+    vertices: Matrix
+    along: Vector
+    directions: Matrix
+    radii: Vector
+
+    @classmethod
+    def of(cls, vertices: Matrix, radii: Vector) -> Curve:
+        """The curve through vertices, shape (k, n), whose inner ones are rounded, shape (k - 2,)."""
+        edges = vertices[1:] - vertices[:-1]
+        lengths = np.linalg.norm(edges, axis=1)
+        along = np.concatenate([np.zeros(1), np.cumsum(lengths)])
+        widths = np.zeros(len(along))
+        widths[1:-1] = np.minimum(radii, np.minimum(along[1:-1], along[-1] - along[1:-1]))
+        return cls(vertices, along, edges / lengths[:, None], widths)
+
+    @property
+    def length(self) -> float:
+        """Of the path [rad or m]."""
+        return float(self.along[-1])
+
+    def at(self, places: Vector) -> Samples:
+        """Position and derivatives at places that do not decrease, shape (m,)."""
+        kernels, n = library(layout.KERNELS), self.vertices.shape[1]
+        if kernels is None:
+            values = reference.sample_curve(self.vertices, self.along, self.directions, self.radii, places)
+        else:
+            task = PlannedTable(_plan(len(self.along), n, len(places)))
+            given = {
+                layout.VERTICES: self.vertices.ravel(),
+                layout.ALONG: self.along,
+                layout.DIRECTIONS: self.directions.ravel(),
+                layout.RADII: self.radii,
+                layout.AT: places,
+                layout.WIDEST: self.radii.max(),
+            }
+            for place, numbers in given.items():
+                task[place][:] = numbers
+            kernels.sample_curve(task.address)
+            values = task[layout.VALUES].reshape(-1, 3 * n)
+        return Samples(values)
+
+    def edges(self, places: Vector) -> NDArray[np.int64]:
+        """Numbers of the edges on which places lie, shape (m,)."""
+        return np.clip(np.searchsorted(self.along, places, side="right") - 1, 0, len(self.along) - 2)
+
+    def path_at(self, places: Vector) -> Matrix:
+        """The path itself, not rounded, at places, shape (m, n)."""
+        edge = self.edges(places)
+        ahead: Vector = (places - self.along[edge])[:, None]
+        return self.vertices[edge] + ahead * self.directions[edge]
+
+    def tightest(self, places: Vector) -> Vector:
+        """The smallest radius, a sixth less at most, of the corners within which places lie; inf for none."""
+        at, radii = self.along[1:-1], self.radii[1:-1]
+        steps, found = np.floor(4.0 * np.log2(np.maximum(radii, 1e-300))), np.full(len(places), np.inf)
+        for step in np.unique(steps)[::-1]:
+            alike, radius = steps == step, np.exp2(0.25 * step)
+            starts, ends = np.sort(at[alike] - radii[alike]), np.sort(at[alike] + radii[alike])
+            found[np.searchsorted(starts, places) > np.searchsorted(ends, places)] = radius
+        return found
+
+    def grid(self) -> tuple[Vector, Vector]:
+        """Places from the beginning to the end, close where the curve bends: wherever its third derivative jumps.
+
+        Also the smallest radius, about, of the corners within which each lies; see :meth:`tightest`.
+        """
+        at, radii = self.along[1:-1], self.radii[1:-1]
+        knots = np.unique(np.concatenate([at - radii, at, at + radii, self.along[[0, -1]]]))
+        knots = knots[np.concatenate([[True], knots[1:] - knots[:-1] > SAME_PLACE * self.length])]
+        knots[-1] = self.length
+        middles = 0.5 * (knots[1:] + knots[:-1])
+        widths = knots[1:] - knots[:-1]
+        tightest = self.tightest(middles)
+        steps = np.where(np.isinf(tightest), widths / STEPS_PER_LINE, tightest / STEPS_PER_RADIUS)
+        steps = np.minimum(steps, self.length / LEAST_STEPS)
+        counts = np.maximum(np.ceil(widths / steps), 1.0).astype(np.int64)
+        pieces, shares = even_parts(counts)
+        places = np.append(knots[pieces] + shares * widths[pieces], self.length)
+        return places, np.append(tightest[pieces], np.inf)
+
+
+@lru_cache(maxsize=64)
+def _plan(vertices: int, n: int, places: int) -> TablePlan:
+    """Where a curve of n coordinates and places on it lie in memory."""
+    arrays = {
+        layout.VERTICES: vertices * n,
+        layout.ALONG: vertices,
+        layout.DIRECTIONS: (vertices - 1) * n,
+        layout.RADII: vertices,
+        layout.AT: places,
+        layout.VALUES: 3 * n * places,
+        layout.WIDEST: 1,
+    }
+    return TablePlan(arrays, {layout.DOF: n, layout.COUNT: vertices, layout.PLACES: places})

@@ -1,0 +1,224 @@
+"""Limits of the tip and of torques along a motion: rows for the search along a curve, and what a motion has of them.
+
+Both are linear in path acceleration u and path speed squared x, as [19] has it: torques by rigid-body dynamics
+(Pinocchio [56]), the acceleration of the tip by its components in the plane in which it can lie.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import Matrix, Vector, dimensions, finite_array, not_negative, positive
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import working_memory
+from rrtik_ompl.kernels.timing.reference import Rows
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.motion.trajectory.curve import Samples
+from rrtik_ompl.motion.trajectory.fastest import MOST, Bounds
+
+DIRECTIONS = 12  # of the tip's acceleration that are bounded; the polygon loses 0.9 % of the circle
+ANGLES = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+INSIDE = float(np.cos(0.5 * np.pi / DIRECTIONS))
+LEAST_SPEED = 1e-12
+FASTEST_TIP, HARDEST_TIP = 20.0, 200.0  # [m/s], [m/s^2]: a larger limit is a slip of the pen, or in millimetres
+
+
+class Measured(NamedTuple):
+    """What the arm has at k moments.
+
+    Attributes:
+        tip_velocities, tip_accelerations: Of the tip's origin, shape (k, 3) [m/s, m/s^2].
+        torques: Of the actuated joints, shape (k, n) [N m or N], by inverse dynamics.
+        holding: Those that hold the arm still there, shape (k, n).
+    """
+
+    tip_velocities: Matrix
+    tip_accelerations: Matrix
+    torques: Matrix
+    holding: Matrix
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DynamicLimits:
+    """Limits that depend on where the arm is.
+
+    Attributes:
+        robot: The arm.
+        tip_speed, tip_acceleration: Of the tip's origin [m/s, m/s^2]; inf for none.
+        torque: Of the actuated joints, shape (n,) [N m or N]; inf for none.
+        model: Pinocchio's, with the payload.
+    """
+
+    robot: Robot
+    tip_speed: float
+    tip_acceleration: float
+    torque: Vector
+    model: Any
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot | None,
+        *,
+        tip_speed: float | None = None,
+        tip_acceleration: float | None = None,
+        torque: ArrayLike | bool | None = None,
+        payload: float = 0.0,
+    ) -> DynamicLimits | None:
+        """Limits of an arm; None if nothing is limited.
+
+        Args:
+            robot: The arm.
+            tip_speed: Of the tip's origin [m/s].
+            tip_acceleration: Of the tip's origin [m/s^2].
+            torque: One number, or one per joint [N m or N]; True for the efforts of the robot's description.
+            payload: Mass at the tip's origin that torques have to carry too [kg].
+
+        Raises:
+            InputError: If a limit is no number greater than 0, the robot has no inertias or no efforts, or a payload
+                comes without torques.
+        """
+        if not isinstance(robot, Robot):
+            raise InputError("limits of the tip and of torques need a robot: pass it as limits, or pass world=...")
+        mass = not_negative(payload, "payload")
+        limits = np.full(robot.dof, np.inf) if torque is None or torque is False else _torques(robot, torque)
+        wanted = bool(np.isfinite(limits).any())
+        if mass > 0.0 and not wanted:
+            raise InputError("payload: it counts only for torques; give torque=True, or their limits")
+        if not wanted and tip_speed is None and tip_acceleration is None:
+            return None
+        speed = _of_tip(tip_speed, "tip speed", "m/s", FASTEST_TIP)
+        push = _of_tip(tip_acceleration, "tip acceleration", "m/s^2", HARDEST_TIP)
+        return cls(robot, speed, push, limits, _loaded(robot, mass))
+
+    @property
+    def moves_torques(self) -> bool:
+        """Whether torques are limited."""
+        return bool(np.isfinite(self.torque).any())
+
+    def bounds(self, samples: Samples) -> Bounds:
+        """The limits at places of a curve.
+
+        Raises:
+            InputError: If the arm cannot even be held still somewhere.
+        """
+        unit = self.measured(samples.positions, samples.slopes, samples.bends)
+        speeds = np.linalg.norm(unit.tip_velocities, axis=1)
+        found = Bounds.capped((self.tip_speed / np.maximum(speeds, LEAST_SPEED)) ** 2)
+        if np.isfinite(self.tip_acceleration):
+            found = found.and_also(self._tip_rows(unit))
+        if self.moves_torques:
+            along = self.measured(samples.positions, np.zeros_like(samples.slopes), samples.slopes).torques
+            found = found.and_also(self._torque_rows(unit, along - unit.holding))
+        return found
+
+    def slowing(self, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> float:
+        """Factor by which a motion with these states, shape (k, n) each, has to be slowed; 1 or more."""
+        found = self.measured(positions, velocities, accelerations)
+        shares = [
+            np.linalg.norm(found.tip_velocities, axis=1).max() / self.tip_speed,
+            np.sqrt(np.linalg.norm(found.tip_accelerations, axis=1).max() / self.tip_acceleration),
+        ]
+        if self.moves_torques:
+            moving = found.torques - found.holding
+            room = np.where(moving > 0.0, self.torque - found.holding, self.torque + found.holding)
+            shares.append(np.sqrt(max((np.abs(moving) / np.maximum(room, 1e-300)).max(), 0.0)))
+        most = float(max(shares))
+        return most * (1.0 + 1e-12) if most > 1.0 else 1.0
+
+    def measured(self, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> Measured:
+        """What the arm has at states, shape (k, n) each; torques only where they are limited."""
+        rows = list(self._states(positions, velocities, accelerations))
+        return Measured(*(np.array(column) for column in zip(*rows, strict=True)))
+
+    def _states(self, *states: Matrix) -> Iterator[tuple[Vector, Vector, Vector, Vector]]:
+        model, gain = self.model, self.robot.chain.gain
+        data, tip = working_memory(model), model.getFrameId(self.robot.tip)
+        here, none = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, np.zeros(self.robot.dof)
+        still = np.zeros(model.nv)
+        full = self.robot.pinocchio_configuration(states[0])
+        for q, v, a in zip(full, states[1] @ gain.T, states[2] @ gain.T, strict=True):
+            torques = holding = none
+            if self.moves_torques:
+                holding = gain.T @ pin.rnea(model, data, q, still, still)
+                torques = gain.T @ pin.rnea(model, data, q, v, a)
+            pin.forwardKinematics(model, data, q, v, a)
+            pin.updateFramePlacement(model, data, tip)
+            speed = pin.getFrameVelocity(model, data, tip, here).linear.copy()
+            push = pin.getFrameClassicalAcceleration(model, data, tip, here).linear.copy()
+            yield speed, push, torques, holding
+
+    def _tip_rows(self, unit: Measured) -> Bounds:
+        """The acceleration p' u + p'' x of the tip lies in the plane of p' and p'': its component in each direction."""
+        ahead, bow = unit.tip_velocities, unit.tip_accelerations
+        size = np.linalg.norm(ahead, axis=1)
+        along = ahead / np.maximum(size, LEAST_SPEED)[:, None]
+        straight = (bow * along).sum(axis=1)
+        aside = np.linalg.norm(bow - straight[:, None] * along, axis=1)
+        first = np.outer(size, np.cos(ANGLES))
+        second = np.outer(straight, np.cos(ANGLES)) + np.outer(aside, np.sin(ANGLES))
+        most = np.full_like(first, INSIDE * self.tip_acceleration)
+        cap = self.tip_acceleration / np.maximum(np.where(size < LEAST_SPEED, aside, 0.0), 1e-200)
+        return Bounds(Rows(first, second, -most, most), np.minimum(cap, MOST))
+
+    def _torque_rows(self, unit: Measured, along: Matrix) -> Bounds:
+        high, low = self.torque - unit.holding, -self.torque - unit.holding
+        if (high <= 0.0).any() or (low >= 0.0).any():
+            joint = int(((high <= 0.0) | (low >= 0.0)).any(axis=0).argmax())
+            name, need = self.robot.joint_names[joint], np.abs(unit.holding[:, joint]).max()
+            newtons = "N" if self.robot.prismatic[joint] else "N m"
+            raise InputError(
+                f"torque limits: joint '{name}' needs {need:.3g} {newtons} to hold the arm still on this path, its "
+                f"limit is {self.torque[joint]:.3g} {newtons}; carry less, or choose another path"
+            )
+        used = np.isfinite(self.torque)
+        rows = Rows(*(part[:, used] for part in (along, unit.torques - unit.holding, low, high)))
+        return Bounds(rows, np.full(len(along), MOST))
+
+
+def _of_tip(given: float | None, what: str, unit: str, most: float) -> float:
+    """A limit of the tip; inf if there is none."""
+    if given is None:
+        return np.inf
+    number = positive(given, what)
+    if number > most:
+        raise InputError(
+            f"{what}: {number:g} {unit} is beyond the {most:g} {unit} that an arm can reach; "
+            f"for {number:g} mm{unit[1:]} give {number / 1e3:g}"
+        )
+    return number
+
+
+def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
+    if sum(inertia.mass for inertia in robot.model.inertias) <= 0.0:
+        raise InputError(f"torque limits: robot '{robot.name}' has no inertias; its description must give them")
+    if torque is True:
+        places = [robot.model.joints[robot.model.getJointId(name)].idx_v for name in robot.joint_names]
+        own: Vector = np.array(robot.model.upperEffortLimit, dtype=np.float64)[places]
+        if not np.isfinite(own).any():
+            raise InputError(
+                f"torque limits: robot '{robot.name}' states no efforts; its URDF needs them, or give torque=[...]"
+            )
+        return own
+    given: Any = torque
+    row = finite_array(given, () if dimensions(given) == 0 else (robot.dof,), f"torque limits of robot '{robot.name}'")
+    if (row <= 0.0).any():
+        raise InputError(f"torque limits: expected numbers greater than 0, got {np.min(row):g}")
+    return np.broadcast_to(row, (robot.dof,)).astype(np.float64)
+
+
+def _loaded(robot: Robot, mass: float) -> Any:
+    """Pinocchio's model with a mass at the tip's origin."""
+    if mass == 0.0:
+        return robot.model
+    model = robot.model.copy()
+    tip = model.frames[model.getFrameId(robot.tip)]
+    load = pin.Inertia(mass, tip.placement.translation, np.zeros((3, 3)))
+    model.inertias[tip.parentJoint] = model.inertias[tip.parentJoint] + load
+    return model

@@ -1,0 +1,131 @@
+"""The shortest time along a curve under limits of velocity and acceleration, by reachability along the path [19]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan
+from rrtik_ompl.kernels.timing import layout, reference
+from rrtik_ompl.kernels.timing.reference import Rows
+from rrtik_ompl.motion.trajectory.curve import Samples
+from rrtik_ompl.motion.trajectory.limits import RateLimits
+
+CRUISE_PARTS, MOST_PARTS = 12.0, 2000  # of the least time of a cruise, and of a motion
+MOST = 1e200  # path speed squared where nothing bounds it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bounds:
+    """What else a motion must keep at the points of a grid, in path acceleration u and path speed squared x.
+
+    Attributes:
+        rows: Shape (m, r) each; low at most 0, high at least 0, so that standing still is allowed.
+        cap: Largest x, shape (m,).
+    """
+
+    rows: Rows
+    cap: Vector
+
+    @classmethod
+    def capped(cls, cap: Vector) -> Bounds:
+        """Only the speed is bounded."""
+        none = np.empty((len(cap), 0))
+        return cls(Rows(none, none, none, none), np.minimum(cap, MOST))
+
+    def and_also(self, other: Bounds) -> Bounds:
+        """Both."""
+        rows = Rows(*(np.hstack(pair) for pair in zip(self.rows, other.rows, strict=True)))
+        return Bounds(rows, np.minimum(self.cap, other.cap))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathTiming:
+    """When a motion along a curve is where.
+
+    Attributes:
+        grid: Places, shape (m,).
+        squares: Path speed squared there, shape (m,).
+        times: From the beginning [s], shape (m,).
+    """
+
+    grid: Vector
+    squares: Vector
+    times: Vector
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.times[-1])
+
+    def places(self, clock: Vector) -> Vector:
+        """Where the motion is at times, shape (k,); at its ends before and after."""
+        t = np.clip(clock, 0.0, self.duration)
+        k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
+        ahead = t - self.times[k]
+        speeds = np.sqrt(self.squares)
+        push = (self.squares[k + 1] - self.squares[k]) / (2.0 * (self.grid[k + 1] - self.grid[k]))
+        found = self.grid[k] + ahead * (speeds[k] + 0.5 * ahead * push)
+        return np.maximum.accumulate(np.clip(found, self.grid[0], self.grid[-1]))
+
+    def cruising(self, seconds: float) -> Vector:
+        """Path speeds at the grid, shape (m,), cut where they are higher for less than a time, or a third of it all."""
+        seconds = min(seconds, self.duration / 3.0)
+        count = int(np.clip(np.ceil(CRUISE_PARTS * self.duration / seconds), 1, MOST_PARTS))
+        places = self.places(np.linspace(0.0, self.duration, count + 1))
+        speeds = np.diff(places) * (count / self.duration)
+        width = 1 + int(seconds * count / self.duration)
+        rest = np.zeros(width)
+        least = sliding_window_view(np.concatenate([rest, speeds, rest]), width).min(axis=1)
+        cut = sliding_window_view(least, width).max(axis=1)[1 : count + 1]
+        found: Vector = np.interp(self.grid, 0.5 * (places[1:] + places[:-1]), cut)
+        return found
+
+
+def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) -> PathTiming:
+    """The motion from rest to rest in the shortest time, along a curve that has these samples at the grid."""
+    kernels = library(layout.KERNELS)
+    if kernels is None:
+        rows, cap = reference.all_rows(samples.values, limits.velocity, limits.acceleration, bounds.rows, bounds.cap)
+        squares = reference.find_squares(rows, cap, grid)
+    else:
+        task = PlannedTable(_plan(len(grid), len(limits.velocity), bounds.rows.first.shape[1]))
+        given = {
+            layout.SHAPE: samples.values.ravel(),
+            layout.VELOCITY: limits.velocity,
+            layout.ACCELERATION: limits.acceleration,
+            layout.CAP: bounds.cap,
+            layout.GRID: grid,
+        }
+        for place, values in given.items():
+            task[place][:] = values
+        for place, further in zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), bounds.rows, strict=True):
+            task[place][:] = further.ravel()
+        kernels.find_squares(task.address)
+        squares = task[layout.SQUARES].copy()
+    speeds = np.sqrt(squares)
+    with np.errstate(divide="ignore"):
+        steps = 2.0 * (grid[1:] - grid[:-1]) / (speeds[1:] + speeds[:-1])
+    return PathTiming(grid, squares, np.concatenate([np.zeros(1), np.cumsum(steps)]))
+
+
+@lru_cache(maxsize=64)
+def _plan(points: int, joints: int, rows: int) -> TablePlan:
+    """Where the search for a grid of so many points lies in memory."""
+    arrays = {
+        layout.SHAPE: 3 * joints * points,
+        layout.VELOCITY: joints,
+        layout.ACCELERATION: joints,
+        layout.CAP: points,
+        layout.GRID: points,
+        layout.SQUARES: points,
+        layout.REACHED: points,
+        layout.LINES: layout.LINE * layout.line_count(joints, rows),
+    }
+    arrays |= dict.fromkeys((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), rows * points)
+    return TablePlan(arrays, {layout.JOINTS: joints, layout.ROWS: rows, layout.POINTS: points})

@@ -1,0 +1,176 @@
+"""How fast joints may move: velocity, acceleration and jerk limits, from the robot or given."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import Matrix, Vector, dimensions, finite_array, frozen, number_rows, whole_number
+from rrtik_ompl.base.copies import as_value, in_one_line
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.robot import Robot
+
+DEFAULT_TURN_RATE, DEFAULT_SLIDE_RATE = (
+    0.5,
+    0.1,
+)  # [rad/s], [m/s]: of a joint without a velocity limit; slow enough to watch
+RAMP_SECONDS = 0.5  # in which a joint without an acceleration limit reaches its full velocity
+ONSET_SECONDS = 0.1  # in which a joint without a jerk limit reaches its full acceleration
+
+ROUNDING_MARGIN = 1.0 + 1e-12  # so that a motion slowed to a limit does not exceed it by rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RateLimits:
+    """Largest velocity, acceleration and jerk of each joint, shape (n,) each.
+
+    Attributes:
+        velocity: [rad/s or m/s], finite.
+        acceleration: [rad/s^2 or m/s^2], finite.
+        jerk: [rad/s^3 or m/s^3]; inf for none.
+
+    Example:
+        >>> limits = rrtik.RateLimits.of(rrtik.load_robot("panda"), share=0.5)
+        >>> limits.velocity.shape
+        (7,)
+    """
+
+    velocity: Vector
+    acceleration: Vector
+    jerk: Vector
+
+    __reduce__, __repr__ = as_value, in_one_line
+
+    def __init__(self, velocity: ArrayLike, acceleration: ArrayLike, jerk: ArrayLike = np.inf) -> None:
+        """Take limits, one number per joint; one number alone is for all joints.
+
+        Raises:
+            InputError: If a limit is no number greater than 0, or their counts differ.
+        """
+        rows = [_row(v, name) for v, name in ((velocity, "velocity"), (acceleration, "acceleration"), (jerk, "jerk"))]
+        count = max(len(row) for row in rows)
+        for row, name in zip(rows, ("velocity", "acceleration", "jerk"), strict=True):
+            if len(row) not in (1, count):
+                raise InputError(f"{name} limits: expected {count} numbers, one per joint, got {len(row)}")
+            if name != "jerk" and np.isinf(row).any():
+                raise InputError(f"{name} limits: must be finite")
+            object.__setattr__(self, name, frozen(np.broadcast_to(row, (count,))))
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        *,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        jerk: ArrayLike | None = None,
+        share: float = 1.0,
+    ) -> RateLimits:
+        """The limits of a robot, or those given instead.
+
+        Limits that neither the robot nor the caller gives have defaults: 0.5 rad/s or 0.1 m/s; the acceleration that
+        reaches the velocity in 0.5 s; the jerk that reaches the acceleration in 0.1 s.
+
+        Args:
+            robot: Whose limits hold.
+            velocity: Instead of the robot's, one number or one per joint [rad/s or m/s].
+            acceleration: Likewise [rad/s^2 or m/s^2].
+            jerk: Likewise [rad/s^3 or m/s^3]; inf for no limit.
+            share: Of all limits, greater than 0 and at most 1: 0.5 moves at half the speed.
+
+        Raises:
+            InputError: If a limit is no number greater than 0, or there is not one per joint.
+        """
+        require(robot, Robot, "robot of rate limits", "use load_robot(name)")
+        part = float(finite_array(share, (), "share of the limits"))
+        if not 0.0 < part <= 1.0:
+            raise InputError(f"share of the limits must be greater than 0 and at most 1, got {part:g}")
+        plain = np.where(robot.prismatic, DEFAULT_SLIDE_RATE, DEFAULT_TURN_RATE)
+        v = _of_robot(robot, velocity, "velocity", robot.velocity, plain)
+        a = _of_robot(robot, acceleration, "acceleration", robot.acceleration, v / RAMP_SECONDS)
+        j = _of_robot(robot, jerk, "jerk", robot.jerk, a / ONSET_SECONDS)
+        return cls(part * v, part * a, part * j)
+
+    def along(self, directions: Matrix) -> tuple[Vector, Vector, Vector]:
+        """Limits of the speed along straight lines, its acceleration and jerk, for directions of shape (m, n).
+
+        Raises:
+            InputError: If these are no such rows, or of another number of joints.
+        """
+        directions = finite_array(directions, (None, None), "directions")
+        self._fits(directions.shape[1])
+        with np.errstate(divide="ignore", over="ignore"):
+            steep = 1.0 / np.abs(directions)
+            v, a, j = (
+                (row * steep).min(axis=1, initial=np.inf) for row in (self.velocity, self.acceleration, self.jerk)
+            )
+        return v, a, j
+
+    def _fits(self, count: int) -> None:
+        """Refuse a number of joints that the limits are not for."""
+        if len(self.velocity) not in (1, count):
+            given = len(self.velocity)
+            raise InputError(f"limits: there are {count} joints, but limits for {given}; give one, or one a joint")
+
+    def for_joints(self, count: int) -> RateLimits:
+        """The same limits for so many joints: limits of one number each are those of all joints.
+
+        Raises:
+            InputError: If they are for another number of joints.
+        """
+        self._fits(whole_number(count, "number of joints", 1))
+        return RateLimits(*(np.broadcast_to(row, (count,)) for row in (self.velocity, self.acceleration, self.jerk)))
+
+    def slowing(self, velocity: Vector, acceleration: Vector, jerk: Vector | None = None) -> float:
+        """Factor by which a motion with these peaks must be slowed to keep the limits; 1 if it keeps them already.
+
+        Raises:
+            InputError: If these are not one number a joint.
+        """
+        shares = []
+        peaks = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+        for (name, peak), limit in zip(peaks.items(), (self.velocity, self.acceleration, self.jerk), strict=True):
+            if peak is not None or name != "jerk":
+                row = number_rows(np.nan if peak is None else peak, f"peaks of {name}").reshape(-1)
+                self._fits(len(row))
+                kept = finite_array(np.where(np.isfinite(limit), row, 0.0), (None,), f"peaks of {name}")
+                shares.append((kept / limit).max(initial=0.0))
+        factors = [float(share) ** (1.0 / power) for power, share in enumerate(shares, start=1)]
+        return 1.0 if max(shares) <= 1.0 else max(factors) * ROUNDING_MARGIN
+
+
+def default_words(robot: Robot, given: Collection[str] = ()) -> str:
+    """A line that says which limits of a robot are defaults; "" if none is, those ``given`` by name aside."""
+    rules = {
+        "velocity": f"{DEFAULT_TURN_RATE:g} rad/s or {DEFAULT_SLIDE_RATE:g} m/s",
+        "acceleration": f"full speed after {RAMP_SECONDS:g} s",
+        "jerk": f"full acceleration after {ONSET_SECONDS:g} s",
+    }
+    said = []
+    for name, rule in rules.items():
+        unknown = ~np.isfinite(getattr(robot, name))
+        if name not in given and unknown.any():
+            which = "all joints" if unknown.all() else ", ".join(np.array(robot.joint_names)[unknown])
+            said.append(f"{name} of {which} ({rule})")
+    return f"limits by default, not stated by '{robot.name}': {'; '.join(said)}" if said else ""
+
+
+def _row(values: ArrayLike, name: str) -> Vector:
+    """Positive numbers, infinity allowed, shape (n,) or (1,)."""
+    row: Vector = number_rows(values, f"{name} limits").reshape(-1)
+    if dimensions(values) > 1 or row.size == 0 or not (row > 0.0).all():
+        shown = str(row[:20].tolist())[:60]
+        raise InputError(f"{name} limits: expected numbers greater than 0, one per joint, got {shown}")
+    return row
+
+
+def _of_robot(robot: Robot, given: ArrayLike | None, name: str, own: Vector, default: Vector) -> Vector:
+    if given is None:
+        return np.where(np.isfinite(own), own, default)
+    row = _row(given, name)
+    if len(row) not in (1, robot.dof):
+        raise InputError(f"{name} limits: robot '{robot.name}' has {robot.dof} joints, but got {len(row)} numbers")
+    return np.broadcast_to(row, (robot.dof,)).astype(np.float64)

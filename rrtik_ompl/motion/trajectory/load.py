@@ -1,0 +1,88 @@
+"""Timed motions from files."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import finite_array
+from rrtik_ompl.base.errors import InputError, in_file, require
+from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
+from rrtik_ompl.files.text import known_ending, read_text
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.motion.trajectory.cubics import are_set_points, in_thirds
+from rrtik_ompl.motion.trajectory.motion import Trajectory
+from rrtik_ompl.motion.trajectory.text import FORMATS, holds_motion, loads
+from rrtik_ompl.world.path import JointPath, load_path
+
+
+def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
+    """Read a motion written by :meth:`Trajectory.save`, or a JointTrajectory message as JSON or YAML.
+
+    Points at a control rate (even steps of 20 ms or less, what ``Trajectory.save(file, rate=...)`` writes) stay what
+    they are, with their velocities and accelerations, and limits are judged at them, as a drive does: ``set_points`` of
+    the motion. Where accelerations lead elsewhere than to the next point (other programs join their points by other
+    curves), three cubics lead there, so that the acceleration does not jump.
+
+    Args:
+        file: A .json, .yaml or .csv file.
+        robot: If given, the motion must have its joints.
+
+    Raises:
+        InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
+
+    Example:
+        >>> motion = rrtik.time_parameterize(rrtik.JointPath([[0.0], [1.0]]), rrtik.RateLimits(1.0, 4.0))
+        >>> motion.save("motion.json")
+        >>> rrtik.load_trajectory("motion.json").duration
+        1.25
+    """
+    require(robot, Robot | None, "robot of a trajectory", "use load_robot(name)")
+    ending = known_ending(file, FORMATS, "trajectory")
+    try:
+        document = loads(read_text(file), ending)
+        found = _from_document(document, robot)
+        if robot is not None and found.joint_names != robot.joint_names:
+            own, wanted = ", ".join(found.joint_names), ", ".join(robot.joint_names)
+            raise InputError(f"the trajectory moves {own}, but robot '{robot.name}' has the joints {wanted}")
+        return found
+    except InputError as error:
+        raise in_file(file, error) from None
+
+
+def load_motion_or_path(file: str | os.PathLike[str], robot: Robot) -> Trajectory | JointPath:
+    """A timed motion or a path, whichever the file holds.
+
+    Raises:
+        InputError: If it holds neither, or what does not fit the robot.
+    """
+    ending = known_ending(file, (*PATH_FORMATS, ".yaml"), "path or trajectory")
+    is_motion = ending == ".yaml" or (ending != ".txt" and holds_motion(read_text(file), ending))
+    return load_trajectory(file, robot) if is_motion else load_path(file, robot)
+
+
+def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
+    units = document["units"]
+    sliding = None if units is None else [unit == "m" for unit in units]
+    if sliding is None and robot is not None and document["joint_names"] == list(robot.joint_names):
+        sliding = robot.prismatic.tolist()
+    names = {"joint_names": document["joint_names"], "prismatic": sliding, "robot_name": document["robot"]}
+    plain = Trajectory(document["times"], document["positions"], document["velocities"], **names)
+    if document["accelerations"] is None:
+        return plain
+    bends = finite_array(document["accelerations"], plain.positions.shape, "trajectory accelerations")
+    points = (plain.times, plain.positions, plain.velocities, bends)
+    dense = are_set_points(*points)
+    if not dense:
+        try:
+            return Trajectory(*points, **names)
+        except InputError:
+            pass
+    clock, *rows = in_thirds(*points)
+    try:
+        smooth = Trajectory(clock[:, 0], *rows, **names)
+    except InputError:  # numbers do not suffice
+        return plain
+    return smooth.at_set_points(np.arange(0, len(clock), 3)) if dense else smooth

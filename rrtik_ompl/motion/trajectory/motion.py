@@ -1,0 +1,321 @@
+"""A timed motion: knots in time, a cubic between each two, and what follows from that: values, peaks, faults."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.base.copies import as_value, in_notebook
+from rrtik_ompl.base.errors import InputError, at_most, require
+from rrtik_ompl.base.units import joint_units
+from rrtik_ompl.files.text import write_text
+from rrtik_ompl.model.robot import require_joints
+from rrtik_ompl.motion.trajectory.chords import proof_by_chords
+from rrtik_ompl.motion.trajectory.cubics import (
+    cubic_peaks,
+    ends_of,
+    even_parts,
+    hermite_accelerations,
+    jerks_of,
+    places,
+    set_point_peaks,
+)
+from rrtik_ompl.motion.trajectory.messages import write_mcap
+from rrtik_ompl.motion.trajectory.text import dumps, written_ending
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, not_proven
+from rrtik_ompl.world.world import Proof, World
+
+END_ERROR = 1e-6  # [s] before the end; a tick there is the end, for no drive takes two points at once
+FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it
+
+
+class State(NamedTuple):
+    """Where a motion is, shape (n,) each for one time, (k, n) for k times.
+
+    Attributes:
+        positions: [rad or m].
+        velocities: [rad/s or m/s].
+        accelerations: [rad/s^2 or m/s^2]; just after a jump.
+    """
+
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    accelerations: NDArray[np.float64]
+
+
+class Peaks(NamedTuple):
+    """Largest absolute velocity, acceleration and jerk of each joint, shape (n,); inf is a jump of acceleration."""
+
+    velocity: Vector
+    acceleration: Vector
+    jerk: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Joint positions over time: between two knots every joint follows a cubic.
+
+    Attributes:
+        times: Of the knots [s], shape (m,), increasing from 0.
+        positions: Shape (m, n), rad (m for sliding joints).
+        velocities: Shape (m, n).
+        accelerations: Shape (m, n): at the beginning of each piece, in the last row at the end of the last one.
+        joint_names: Names of the n joints.
+        prismatic: Which joints slide, shape (n,).
+        robot_name: Name of the robot it is for, or "".
+        set_points: Numbers of the knots that a file had at a control rate, see :func:`load_trajectory`; None if the
+            motion is known between its knots too.
+    """
+
+    times: Vector
+    positions: Matrix
+    velocities: Matrix
+    accelerations: Matrix
+    joint_names: tuple[str, ...]
+    prismatic: Mask
+    robot_name: str = ""
+    set_points: NDArray[np.int64] | None = None
+
+    __reduce__, _repr_html_ = as_value, in_notebook
+
+    def __init__(
+        self,
+        times: ArrayLike,
+        positions: ArrayLike,
+        velocities: ArrayLike,
+        accelerations: ArrayLike | None = None,
+        *,
+        joint_names: Iterable[str] | None = None,
+        prismatic: ArrayLike | None = None,
+        robot_name: str = "",
+    ) -> None:
+        """Take knots; without accelerations the cubics are those through positions and velocities (Hermite's).
+
+        Raises:
+            InputError: If the shapes differ, a number is not finite, the times do not increase from 0, or the
+                accelerations lead elsewhere than to the next knot.
+        """
+        # the names and units of a path obey the same rules, so a path checks them
+        path = JointPath(positions, joint_names, prismatic, robot_name)
+        rows = path.waypoints
+        clock = finite_array(times, (len(rows),), "trajectory times")
+        if len(clock) < 2 or clock[0] != 0.0 or not (clock[1:] > clock[:-1]).all():
+            raise InputError("trajectory times: expected two or more, beginning with 0, each greater than the last")
+        rates = finite_array(velocities, rows.shape, "trajectory velocities")
+        if accelerations is None:
+            bends = hermite_accelerations(clock, rows, rates)
+        else:
+            bends = finite_array(accelerations, rows.shape, "trajectory accelerations")
+            apart = np.abs(ends_of(clock, rows, rates, bends) - rows[1:])
+            if apart.max() > FIT_TOLERANCE * max(1.0, np.abs(rates).max()):
+                point = int(apart.max(axis=1).argmax()) + 2
+                raise InputError(
+                    f"trajectory: point {point} is {apart.max():.2g} away from where the point "
+                    "before it leads; leave the accelerations out to have positions and velocities decide"
+                )
+        values = {"times": clock, "positions": rows, "velocities": rates, "accelerations": bends}
+        for name, value in values.items():
+            object.__setattr__(self, name, frozen(value))
+        for name in ("joint_names", "prismatic", "robot_name"):
+            object.__setattr__(self, name, getattr(path, name))
+        object.__setattr__(self, "set_points", None)
+
+    def __repr__(self) -> str:
+        return f"Trajectory({len(self.joint_names)} joints, {len(self.times)} knots, {self.duration:.3g} s)"
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last knot [s]."""
+        return float(self.times[-1])
+
+    def __call__(self, t: ArrayLike) -> State:
+        """Positions, velocities and accelerations at a time [s], or at many: shape (n,), or (k, n) for t of shape (k,).
+
+        Before its beginning and after its end the arm does not move.
+
+        Raises:
+            InputError: If a time is not finite.
+        """
+        many = getattr(t, "ndim", int(np.iterable(t))) > 0
+        wanted = finite_array(t, (None,) if many else (), "time of a trajectory")
+        clock = np.clip(np.atleast_1d(wanted), 0.0, self.duration)
+        piece = np.clip(np.searchsorted(self.times, clock, side="right") - 1, 0, len(self.times) - 2)
+        x = (clock - self.times[piece])[:, None]
+        q, v, a = (rows[piece] for rows in (self.positions, self.velocities, self.accelerations))
+        j = jerks_of(self.times, self.velocities, self.accelerations, piece)
+        found = [q + x * (v + x * (a / 2.0 + x * j / 6.0)), v + x * (a + x * j / 2.0), a + x * j]
+        found[0][clock == self.duration] = self.positions[-1]  # to the bit
+        outside = np.atleast_1d(wanted) != clock
+        found[1][outside] = found[2][outside] = 0.0
+        return State(*found) if many else State(*(rows[0] for rows in found))
+
+    @property
+    def jerks(self) -> Matrix:
+        """Jerk of each piece [rad/s^3 or m/s^3], shape (m - 1, n)."""
+        return jerks_of(self.times, self.velocities, self.accelerations)
+
+    def peaks(self) -> Peaks:
+        """The largest velocity, acceleration and jerk of each joint: exact, not sampled, for every piece is a cubic.
+
+        With ``set_points``: at these, the jerk by their differences.
+        """
+        at, found = (slice(None), cubic_peaks) if self.set_points is None else (self.set_points, set_point_peaks)
+        return Peaks(*found(self.times[at], self.velocities[at], self.accelerations[at]))
+
+    def slowed(self, factor: float) -> Trajectory:
+        """The same motion, ``factor`` times as long.
+
+        Raises:
+            InputError: If the factor is not from 1e-6 to 1e6.
+        """
+        k = positive(factor, "factor of a trajectory")
+        if not 1e-6 <= k <= 1e6:
+            raise InputError(f"factor of a trajectory: expected 1e-6 to 1e6, got {k:g}")
+        rates = (self.velocities / k, self.accelerations / k**2)
+        slow = Trajectory(self.times * k, self.positions, *rates, **self._names())
+        return slow if self.set_points is None else slow.at_set_points(self.set_points)
+
+    def at_set_points(self, knots: NDArray[np.int64]) -> Trajectory:
+        """The same motion, known at these knots alone: limits are judged there."""
+        found = Trajectory(self.times, self.positions, self.velocities, self.accelerations, **self._names())
+        object.__setattr__(found, "set_points", frozen(places(knots, len(self.times), "set points"), np.int64))
+        return found
+
+    def path(self) -> JointPath:
+        """The knots as waypoints of a path."""
+        return JointPath(self.positions, self.joint_names, self.prismatic, self.robot_name)
+
+    def faults(self, world: World) -> tuple[str, ...]:
+        """Check the motion itself, not the path it was made from, densely and independently of planners.
+
+        Each piece is checked in steps in which no point of the arm moves more than half of the world's motion
+        resolution, by :meth:`World.certify`; where motions have to be proven (:meth:`World.proving`), it is proven too.
+
+        Returns:
+            A line for the first fault of every piece that has one: time, and the pair or limit; empty if it is valid.
+
+        Raises:
+            InputError: If it moves other joints than the world's robot, or these in another order.
+        """
+        require(world, World, "world of a trajectory's check")
+        require_joints(world.robot, self.joint_names, "trajectory")
+        return tuple(f"after {moment:.3f} s: {reason}" for moment, reason in faults_of(self, world))
+
+    def prove(self, world: World, *, clearance: float | None = None) -> Proof:
+        """Prove the motion itself free, at every time, not the path it was made from.
+
+        Each piece is cut into parts so short that no point of the arm leaves the straight motion between the ends of a
+        part by more than 0.1 mm, which an acceleration bounds; the straight motions are proven with that to spare.
+        Where it is nearer to something, parts that leave it by less are tried, down to 0.01 um.
+
+        Args:
+            world: The world.
+            clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None.
+
+        Returns:
+            The proof; its motions are the pieces between two knots.
+
+        Raises:
+            InputError: If it moves other joints than the world's robot, or these in another order, or the clearance is
+                negative.
+        """
+        require(world, World, "world of a trajectory's proof")
+        require_joints(world.robot, self.joint_names, "trajectory")
+        return proof_of_pieces(self, world, clearance, 0, len(self.times) - 1)
+
+    def jumps(self) -> Matrix:
+        """How much the acceleration jumps at each knot, shape (m, n): from rest at the first, to rest at the last."""
+        a = self.accelerations
+        ends = a[:-1] + np.diff(self.times)[:, None] * self.jerks
+        before, after = np.vstack([np.zeros_like(a[:1]), ends]), np.vstack([a[:-1], np.zeros_like(a[:1])])
+        found: Matrix = np.abs(after - before)
+        return found
+
+    def sampled(self, rate: float) -> tuple[Vector, State]:
+        """Times at a control rate [1/s] from 0 to the end, shape (k,), and the states then; the end is the last one.
+
+        Raises:
+            InputError: If the rate is no number greater than 0.
+        """
+        step = 1.0 / positive(rate, "control rate of a trajectory")
+        at_most(self.duration / step, MOST_ROWS, "times of a trajectory at that rate")
+        clock = np.append(np.arange(0.0, self.duration - min(END_ERROR, 1e-3 * step), step), self.duration)
+        return clock, self(clock)
+
+    def save(self, file: str | os.PathLike[str], *, rate: float | None = None, accelerations: bool = True) -> None:
+        """Write the motion to a file.
+
+        A .json or .csv file (``time,<joint>...``) gives back the same motion by :func:`load_trajectory`. A .yaml or
+        .ros.json file is the message JointTrajectory of ROS 2 and nothing else. A .mcap file has joint states for
+        Foxglove (it needs the package mcap). Each is written whole or not at all.
+
+        Args:
+            file: See above.
+            rate: Points at a control rate [1/s]; None for one point a knot.
+            accelerations: Whether points have accelerations: controllers of ROS then follow quintics, else cubics.
+                Files of .csv and .mcap always have them.
+
+        Raises:
+            InputError: If the ending is another one or the file cannot be written.
+        """
+        require(accelerations, bool, "accelerations of a file")
+        ending, at = written_ending(file), slice(None) if self.set_points is None else self.set_points
+        known = self.times[at], State(self.positions[at], self.velocities[at], self.accelerations[at])
+        clock, state = known if rate is None else self.sampled(rate)
+        columns = [(column + 0.0).tolist() for column in (clock, *state)]
+        if ending == ".mcap":
+            write_mcap(file, self.robot_name, self.joint_names, columns)
+            return
+        if not accelerations and ending != ".csv":
+            columns.pop()
+        write_text(file, dumps(self.robot_name, self.joint_names, joint_units(self.prismatic), columns, ending))
+
+    def _names(self) -> dict[str, Any]:
+        return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}
+
+
+def proof_of_pieces(motion: Trajectory, world: World, clearance: float | None, first: int, end: int) -> Proof:
+    """A proof of the pieces from ``first`` up to ``end``; see :meth:`Trajectory.prove`."""
+    h, begin = np.diff(motion.times)[first:end], motion.accelerations[first:end]
+    pushes = np.maximum(np.abs(begin), np.abs(begin + h[:, None] * motion.jerks[first:end]))
+    times = motion.times[first : end + 1]
+    return proof_by_chords(times, pushes @ world.weights, lambda clock: motion(clock).positions, world, clearance)
+
+
+def greatest_speeds(motion: Trajectory) -> Matrix:
+    """Bounds of the rates of all joints on each piece, shape (m, n) [rad/s or m/s]."""
+    h = np.diff(motion.times)[:, None]
+    peak = np.abs(motion.velocities)
+    found: Matrix = np.maximum(peak[1:], peak[:-1]) + h * np.abs(motion.jerks * h) / 8.0
+    return found
+
+
+def faults_of(motion: Trajectory, world: World) -> list[tuple[float, str]]:
+    """The first fault of every piece that has one, time [s] and reason; see :meth:`Trajectory.faults`."""
+    clock = bad_moments(motion, world)
+    rows = motion(clock).positions
+    return [(moment, world.explain(q) or not_proven(world)) for moment, q in zip(clock.tolist(), rows, strict=True)]
+
+
+def bad_moments(motion: Trajectory, world: World) -> Vector:
+    """Times of the first fault of every piece that has one; see :meth:`Trajectory.faults`."""
+    h = np.diff(motion.times)
+    ways = h * (greatest_speeds(motion) @ world.weights)
+    counts = np.ceil(ways * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
+    pieces, shares = even_parts(counts)
+    clock = np.append(motion.times[pieces] + shares * h[pieces], motion.duration)
+    bad = np.flatnonzero(~world.certify(motion(clock).positions))
+    touching, where = np.unique(np.append(pieces, len(h) - 1)[bad], return_index=True)
+    moments = np.asarray(clock[bad[where]])
+    if world.settings.proving is None:
+        return moments
+    gaps = proof_of_pieces(motion, world, world.settings.proving, 0, len(h)).unproven
+    unproven = np.setdiff1d([gap.motion for gap in gaps], touching).astype(np.int64)
+    return np.sort(np.concatenate([moments, motion.times[unproven]]))

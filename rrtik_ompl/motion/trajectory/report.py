@@ -1,0 +1,111 @@
+"""What a drive would say to a motion: peaks against limits, changes of sign of the acceleration, jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.copies import in_one_line
+from rrtik_ompl.base.errors import require
+from rrtik_ompl.base.units import shown_unit
+from rrtik_ompl.motion.trajectory.cubics import JUMP_SHARE
+from rrtik_ompl.motion.trajectory.limits import RateLimits
+from rrtik_ompl.motion.trajectory.motion import Trajectory
+
+QUIET_SHARE = 0.02  # of a joint's largest acceleration; what is less is no push
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionReport:
+    """How a motion uses the limits of each joint, shape (n,) each.
+
+    Attributes:
+        joint_names: Of the n joints.
+        prismatic: Which of them slide.
+        duration: [s].
+        velocity, acceleration, jerk: Peaks as shares of the limits; 0 where there is no limit, inf for the jerk of a
+            motion whose acceleration jumps.
+        switches: Changes of sign of the acceleration a second, of what is above 2 % of the joint's largest.
+        jump: The largest jump of the acceleration between two pieces, from rest or to rest [rad/s^2 or m/s^2].
+    """
+
+    joint_names: tuple[str, ...]
+    prismatic: NDArray[np.bool_]
+    duration: float
+    velocity: Vector
+    acceleration: Vector
+    jerk: Vector
+    switches: Vector
+    jump: Vector
+
+    __repr__ = in_one_line
+
+    @property
+    def kept(self) -> bool:
+        """Whether all limits are kept, to 1e-9 of them."""
+        return all(bool((row <= 1.0 + 1e-9).all()) for row in (self.velocity, self.acceleration, self.jerk))
+
+    def __str__(self) -> str:
+        said = "within all limits" if self.kept else "exceeds limits"
+        lines = [f"{self.duration:.3f} s, {said}"]
+        for k, name in enumerate(self.joint_names):
+            factor, unit = shown_unit(self.prismatic[k])
+            peaks = ", ".join(
+                f"{word} {100.0 * row[k]:.1f} %"
+                for word, row in (("velocity", self.velocity), ("acceleration", self.acceleration), ("jerk", self.jerk))
+            )
+            jump = f"jumps by {factor * self.jump[k]:.4g} {unit}/s^2" if self.jump[k] > 0.0 else "no jump"
+            lines.append(f"{name}: {peaks} of the limit; {self.switches[k]:.1f} switches a second; {jump}")
+        return "\n".join(lines)
+
+
+def motion_report(motion: Trajectory, limits: RateLimits) -> MotionReport:
+    """Report how a motion uses limits.
+
+    Args:
+        motion: The motion.
+        limits: Of its joints.
+
+    Raises:
+        InputError: If the limits are for another number of joints.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> limits = rrtik.RateLimits(1.0, 2.0, 10.0)
+        >>> motion = rrtik.time_parameterize(rrtik.JointPath([[0.0], [1.0]]), limits)
+        >>> rrtik.motion_report(motion, limits).kept
+        True
+    """
+    require(motion, Trajectory, "motion to report of")
+    require(limits, RateLimits, "limits of a report", "use RateLimits.of(robot)")
+    bounds, peaks = limits.for_joints(len(motion.joint_names)), motion.peaks()
+    jerk = np.divide(peaks.jerk, bounds.jerk, out=np.zeros(len(peaks.jerk)), where=np.isfinite(bounds.jerk))
+    jumps = motion.jumps()
+    noise = JUMP_SHARE * peaks.acceleration.max()
+    return MotionReport(
+        motion.joint_names,
+        motion.prismatic,
+        motion.duration,
+        peaks.velocity / bounds.velocity,
+        peaks.acceleration / bounds.acceleration,
+        jerk,
+        switches(motion) / motion.duration,
+        np.where(jumps > noise, jumps, 0.0).max(axis=0),
+    )
+
+
+def switches(motion: Trajectory) -> Vector:
+    """How often the acceleration of each joint changes its sign, shape (n,)."""
+    if motion.set_points is not None:
+        both = motion.accelerations[motion.set_points]
+    else:
+        ends = motion.accelerations[:-1] + np.diff(motion.times)[:, None] * motion.jerks
+        both = np.stack([motion.accelerations[:-1], ends], axis=1).reshape(-1, ends.shape[1])
+    loud = np.abs(both) > QUIET_SHARE * np.abs(both).max(axis=0)
+    return np.array(
+        [np.count_nonzero(np.diff(np.sign(column[used]))) for column, used in zip(both.T, loud.T, strict=True)],
+        dtype=np.float64,
+    )

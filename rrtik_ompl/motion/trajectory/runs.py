@@ -1,0 +1,184 @@
+"""Runs from stop to stop: a straight one, or a curve through rounded corners; each becomes a motion of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.motion.trajectory.corners import COINCIDENCE
+from rrtik_ompl.motion.trajectory.curve import Curve, Samples
+from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
+from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest
+from rrtik_ompl.motion.trajectory.limits import RateLimits
+from rrtik_ompl.motion.trajectory.line import along_lines
+from rrtik_ompl.motion.trajectory.pieces import Pieces
+from rrtik_ompl.motion.trajectory.smoothing import Spline, smoothed, steps_for, widest_window
+
+PERIOD = 1e-3  # [s] the least piece of a curve: the control period of a fast drive
+CRUISE_SLACK = 1e-3  # of a speed, by which it may be more than is said while the acceleration changes its sign
+SHORT_WINDOW = 0.02  # [s]
+MAX_SLOWINGS = 3  # by limits of the tip or of torques; two are enough but for rounding
+SMOOTHED_SHARE = 0.12  # of a corner's radius: by which the smoothing over time alone may leave the rounded corner
+
+
+class Attempt(NamedTuple):
+    """How a motion is smoothed.
+
+    Attributes:
+        window: Largest one, of the widest that the jerk limits can ask for.
+        cruises: Whether the speed holds for as long between growing and falling: a shorter window is enough then.
+    """
+
+    window: float
+    cruises: bool = False
+
+
+ATTEMPTS = (Attempt(1.0), Attempt(0.7, cruises=True), Attempt(0.35))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """A motion from rest to rest.
+
+    Attributes:
+        pieces: Its cubics, m of them.
+        places: Where on the path each begins, from the beginning of the path, shape (m,).
+        apart: How far from there the motion is, shape (m,) [rad or m].
+        on_path: Which of them do not leave the path, shape (m,).
+    """
+
+    pieces: Pieces
+    places: Vector
+    apart: Vector
+    on_path: Mask
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.pieces.durations.sum())
+
+
+def runs(
+    corners: Matrix, radii: Vector, limits: RateLimits, *, room: float = np.inf, more: DynamicLimits | None = None
+) -> list[Run]:
+    """The motions from stop to stop, each as fast as the limits allow.
+
+    Args:
+        corners: The vertices, shape (k, n).
+        radii: How far from each inner one its rounding begins, shape (k - 2,); 0 for a stop.
+        limits: Of n joints.
+        room: How far from the path the motion may be, if that can be.
+        more: Limits of the tip or of torques.
+    """
+    stops = [0, *(np.flatnonzero(radii == 0.0) + 1).tolist(), len(corners) - 1]
+    along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    lines = along_lines(corners, limits) if more is None and (len(stops) > 2 or len(corners) == 2) else []
+    found = []
+    for first, last in pairwise(stops):
+        if last == first + 1 and more is None:
+            found.append(_straight(lines[first], corners[first], along[first]))
+        else:
+            curve = Curve.of(corners[first : last + 1], radii[first : last - 1])
+            found.append(along_curve(curve, limits, room=room, more=more, begin=along[first]))
+    return found
+
+
+def along_curve(
+    curve: Curve,
+    limits: RateLimits,
+    *,
+    room: float = np.inf,
+    more: DynamicLimits | None = None,
+    begin: float = 0.0,
+) -> Run:
+    """The motion along a curve; where its jerk is limited it passes bends on their inner side.
+
+    Args:
+        curve: From rest to rest.
+        limits: Of its joints.
+        room: How far from the path the motion may be; kept where one of the windows does.
+        more: Limits of the tip or of torques.
+        begin: Where on the whole path the curve begins.
+
+    Raises:
+        InputError: If numbers do not suffice.
+    """
+    grid, tightest = curve.grid()
+    shape = curve.at(grid)
+    extra = None if more is None else more.bounds(shape)
+    bends = _lengths(shape.bends)
+    slow = SMOOTHED_SHARE * tightest / np.maximum(bends, 1e-300)
+    splines = (_smooth(curve, (grid, shape, extra), slow, limits, attempt) for attempt in _attempts(limits))
+    tried = [_along(curve, spline if more is None else _slowed(spline, more), begin) for spline in splines]
+    return min(tried, key=lambda run: (run.apart.max() > room, run.duration))
+
+
+def _along(curve: Curve, spline: Spline, begin: float) -> Run:
+    """A spline in joints and place as the run that it is."""
+    knots, velocities, accelerations = (rows[:-1] for rows in spline.knots())
+    n = curve.vertices.shape[1]
+    apart = _lengths(knots[:, :n] - curve.path_at(knots[:, n]))
+    # a piece lies among its four control points: on an edge, if all of them lie on it
+    controls, at = spline.controls[:, :n], spline.controls[:, n]
+    near = _lengths(controls - curve.path_at(at)) <= COINCIDENCE
+    edge = curve.edges(at)
+    count = len(knots)
+    on_path = (edge[:count] == edge[3 : 3 + count]) & np.logical_and.reduce([near[k : k + count] for k in range(4)])
+    pieces = Pieces(np.full(count, spline.step), knots[:, :n], velocities[:, :n], accelerations[:, :n])
+    return Run(pieces, begin + knots[:, n], apart, on_path)
+
+
+def _attempts(limits: RateLimits) -> tuple[Attempt, ...]:
+    """What to try: one window where it is so short that it costs nothing."""
+    return ATTEMPTS if widest_window(limits) > SHORT_WINDOW else (Attempt(1.0),)
+
+
+def _smooth(
+    curve: Curve, samples: tuple[Vector, Samples, Bounds | None], slow: Vector, limits: RateLimits, attempt: Attempt
+) -> Spline:
+    """The fastest motion that the windows of an attempt leave near the curve.
+
+    That is where the path speed squared, times a twenty-fourth of the window squared, is at most ``slow``, shape (m,).
+    """
+    window = attempt.window * widest_window(limits)
+    grid, shape, extra = samples
+    bounds = Bounds.capped(2.0 * slow / (window**2 / 12.0 + PERIOD**2 / 3.0))
+    bounds = bounds if extra is None else bounds.and_also(extra)
+    timing = fastest(grid, shape, limits, bounds)
+    if not np.isfinite(timing.duration) or timing.duration <= 0.0:
+        raise InputError(
+            f"no motion along {curve.length:.3g} rad or m could be calculated; choose limits of an ordinary size"
+        )
+    if attempt.cruises:
+        cap = np.square((1.0 + CRUISE_SLACK) * timing.cruising(window))
+        timing = fastest(grid, shape, limits, bounds.and_also(Bounds.capped(cap)))
+    step, count, most = steps_for(timing.duration, window, PERIOD)
+    places = timing.places(np.linspace(0.0, timing.duration, count + 1))
+    return smoothed(np.column_stack([curve.at(places).positions, places]), step, most, limits)
+
+
+def _lengths(rows: Matrix) -> Vector:
+    """Of each row, shape (m,)."""
+    found: Vector = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    return found
+
+
+def _slowed(spline: Spline, more: DynamicLimits) -> Spline:
+    """The spline, slowed until it keeps the limits of the tip and of torques at its knots and between them."""
+    n = more.robot.dof
+    for _ in range(MAX_SLOWINGS):
+        factor = more.slowing(*(rows[:, :n] for rows in spline.states()))
+        if factor == 1.0:
+            break
+        spline = spline.slowed(factor)
+    return spline
+
+
+def _straight(pieces: Pieces, start: Vector, begin: float) -> Run:
+    travelled = np.linalg.norm(pieces.positions - start, axis=1)
+    return Run(pieces, begin + travelled, np.zeros(len(travelled)), np.ones(len(travelled), dtype=bool))

@@ -1,0 +1,127 @@
+"""A motion as a cubic spline of even steps in time, so that acceleration never jumps and jerk keeps its limit.
+
+The control points of the spline are means of the motion over a window of time. What a mean does to positions it does
+to velocities and accelerations, so none of them is larger than it was, whatever the window; the wider it is, the less
+jerk there is. A motion on a straight line stays on it. Where the path bends the mean lies inside the bend, by at most
+half of the window's variance times the acceleration across the path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.motion.trajectory.limits import ROUNDING_MARGIN, RateLimits
+
+WIDTHS = (1.0, 0.75, 0.55, 0.4, 0.25)  # of the widest window, tried in turn
+MOST_PIECES = 1250  # of a curve, about
+MOST_STEPS = 16  # of the widest window
+LEAST_PIECES = 8  # of a motion
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spline:
+    """A cubic spline of even steps that rests at both ends.
+
+    Attributes:
+        controls: Control points, the first and the last three times, shape (m, n).
+        step: Between two knots [s].
+    """
+
+    controls: Matrix
+    step: float
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return (len(self.controls) - 3) * self.step
+
+    def knots(self) -> tuple[Matrix, Matrix, Matrix]:
+        """Positions, velocities and accelerations at the knots, shape (m - 2, n) each."""
+        before, here, after = self.controls[:-2], self.controls[1:-1], self.controls[2:]
+        bends = after - 2.0 * here + before
+        return here + bends / 6.0, (after - before) / (2.0 * self.step), bends / self.step**2
+
+    def states(self) -> tuple[Matrix, Matrix, Matrix]:
+        """As :meth:`knots`, then the same in the middle between each two knots, shape (2 m - 5, n) each."""
+        first, second, third, fourth = (self.controls[k : len(self.controls) - 3 + k] for k in range(4))
+        between = (
+            (first + 23.0 * (second + third) + fourth) / 48.0,
+            (fourth - first + 5.0 * (third - second)) / (8.0 * self.step),
+            (first - second - third + fourth) / (2.0 * self.step**2),
+        )
+        found = [np.vstack(pair) for pair in zip(self.knots(), between, strict=True)]
+        return found[0], found[1], found[2]
+
+    def slowed(self, factor: float) -> Spline:
+        """The same, ``factor`` times as long."""
+        return Spline(self.controls, self.step * factor)
+
+    def peaks(self) -> tuple[Vector, Vector, Vector]:
+        """Bounds of velocity, acceleration and jerk of each coordinate, shape (n,) each; exact but for the first."""
+        # joints in rows: numpy looks for the largest number along a row much faster than down a column
+        found, rows = [], np.ascontiguousarray(self.controls.T)
+        for power in (1, 2, 3):
+            rows = rows[:, 1:] - rows[:, :-1]
+            found.append(np.maximum(rows.max(axis=1), -rows.min(axis=1)) / self.step**power)
+        return found[0], found[1], found[2]
+
+
+def widest_window(limits: RateLimits) -> float:
+    """The widest window that the jerk limits can ask for [s]: within it the acceleration comes from end to end."""
+    return float(np.where(np.isinf(limits.jerk), 0.0, 2.0 * limits.acceleration / limits.jerk).max())
+
+
+def steps_for(duration: float, window: float, period: float) -> tuple[float, int, int]:
+    """Steps of a spline [s], how many a motion has, and how many the widest window has.
+
+    Args:
+        duration: Of the motion to be smoothed [s].
+        window: The widest one [s].
+        period: The least step [s].
+    """
+    least = max(period, window / MOST_STEPS, duration / MOST_PIECES)
+    count = max(int(duration / least), LEAST_PIECES)
+    step = max(duration / count, period)
+    return step, count, max(1, min(int(np.ceil(window / step)), MOST_STEPS))
+
+
+def smoothed(rows: Matrix, step: float, most: int, limits: RateLimits) -> Spline:
+    """The shortest spline that keeps the limits, over some windows of up to ``most`` steps.
+
+    Args:
+        rows: The motion at even steps from rest to rest, shape (m, k): coordinates of joints, then any others.
+        step: Between two rows [s].
+        most: The widest window, 1 or more.
+        limits: Of the joints, the first columns.
+    """
+    n = len(limits.velocity)
+    widths = {int(np.ceil(share * most)) for share in WIDTHS}
+    splines = (Spline(controls, step) for controls in _means(rows, widths))
+    timed = (spline.slowed(slowing(Spline(spline.controls[:, :n], step), limits)) for spline in splines)
+    return min(timed, key=lambda spline: spline.duration)
+
+
+def slowing(spline: Spline, limits: RateLimits) -> float:
+    """Factor by which a spline must be slowed to keep the limits, 1 or more."""
+    bounds = (limits.velocity, limits.acceleration, limits.jerk)
+    shares = [float((peak / bound).max()) for peak, bound in zip(spline.peaks(), bounds, strict=True)]
+    most: float = max(share ** (1.0 / power) for power, share in enumerate(shares, start=1))
+    return max(1.0, most * ROUNDING_MARGIN)
+
+
+def _means(rows: Matrix, widths: set[int]) -> Iterator[Matrix]:
+    """Control points: means over windows of so many rows, with as many more at both ends as the spline needs."""
+    first = rows[:1]
+    gaps = rows - first
+    total = np.zeros((len(rows) - 1, rows.shape[1]))
+    for width in range(1, max(widths) + 1):
+        rest = np.broadcast_to((width - 1) * gaps[-1], (1, rows.shape[1]))
+        total = np.vstack([total, rest])
+        total[width - 1 :] += gaps
+        if width in widths:
+            mean = first + total / width
+            yield np.vstack([mean[[0, 0]], mean, mean[[-1, -1]]])

@@ -1,0 +1,118 @@
+"""The text of a trajectory file: JSON in the shape of ROS's JointTrajectory, that message as YAML or JSON, or CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.files.tables import json_object, table_rows
+from rrtik_ompl.files.text import file_name, known_ending
+from rrtik_ompl.motion.trajectory.messages import FIELDS, from_yaml, joint_trajectory, to_yaml
+
+FORMATS = (".json", ".csv", ".yaml")
+ROS_JSON = ".ros.json"  # the message alone: ROS refuses fields that it does not know
+KIND = "joint_trajectory"
+_DURATION = (("sec", "secs"), ("nanosec", "nsecs"))
+
+
+def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Sequence[list[Any]], ending: str) -> str:
+    """Text of a trajectory; ``columns``: times (m), positions, velocities and, not always, accelerations (m, n)."""
+    if ending == ".yaml":
+        return to_yaml(joint_trajectory(names, columns))
+    if ending == ROS_JSON:
+        return json.dumps(joint_trajectory(names, columns), indent=1) + "\n"
+    if ending == ".json":
+        points = [
+            dict(zip(FIELDS, values, strict=False)) | {"time_from_start": time}
+            for time, *values in zip(*columns, strict=True)
+        ]
+        head = {"version": 1, "kind": KIND, "robot": robot, "joint_names": list(names), "units": list(units)}
+        return json.dumps(head | {"points": points}, indent=1) + "\n"
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(_header(names))
+    for time, *values in zip(*columns, strict=True):
+        table.writerow([repr(number) for number in (time, *(x for value in values for x in value))])
+    return text.getvalue()
+
+
+def written_ending(file: str | os.PathLike[str]) -> str:
+    """What is written to a file of this name: an ending of ``FORMATS``, ``ROS_JSON`` or ".mcap".
+
+    Raises:
+        InputError: If the ending is another one.
+    """
+    ending = known_ending(file, (*FORMATS, ".mcap"), "trajectory")
+    return ROS_JSON if file_name(file).name.lower().endswith(ROS_JSON) else ending
+
+
+def loads(text: str, ending: str) -> dict[str, Any]:
+    """What :func:`dumps` wrote: ``times`` and ``FIELDS`` (accelerations may be None), ``joint_names``, ``units``.
+
+    Raises:
+        InputError: If the text is malformed; the message names the line, the point or the key.
+    """
+    if ending == ".csv":
+        return _from_csv(text)
+    return _from_message(json_object(text, KIND, "points") if ending == ".json" else from_yaml(text))
+
+
+def holds_motion(text: str, ending: str) -> bool:
+    """Whether the text of a .json or .csv file is a trajectory, well formed or not, rather than a path."""
+    if ending == ".csv":
+        return text.startswith("time,") and " velocity" in text.partition("\n")[0]
+    return '"points"' in text and '"waypoints"' not in text
+
+
+def _header(names: Iterable[str]) -> list[str]:
+    own = list(names)
+    return ["time", *own, *(f"{name} velocity" for name in own), *(f"{name} acceleration" for name in own)]
+
+
+def _from_message(document: dict[str, Any]) -> dict[str, Any]:
+    points = document["points"]
+    if not isinstance(points, list) or not all(isinstance(point, dict) for point in points):
+        raise InputError("points: expected a list of objects with positions, velocities and time_from_start")
+    for number, point in enumerate(points, start=1):
+        for key in ("positions", "velocities", "time_from_start"):
+            if not point.get(key) and point.get(key) != 0:
+                raise InputError(f"point {number}: no {key}; a motion needs positions, velocities and time_from_start")
+    bends = [point.get("accelerations") for point in points]
+    return {
+        "times": [_seconds(point["time_from_start"]) for point in points],
+        "positions": [point["positions"] for point in points],
+        "velocities": [point["velocities"] for point in points],
+        "accelerations": bends if all(bends) else None,
+        "joint_names": document.get("joint_names"),
+        "units": document.get("units"),
+        "robot": str(document.get("robot", "")),
+    }
+
+
+def _seconds(time: object) -> object:
+    """A duration as a number of seconds, or as the messages of ROS 1 and 2 write it."""
+    if not isinstance(time, dict):
+        return time
+    whole, fraction = (next((time[key] for key in keys if key in time), 0) for keys in _DURATION)
+    try:
+        return whole + 1e-9 * fraction
+    except TypeError:
+        raise InputError(f"time_from_start: expected seconds, or sec and nanosec, got {time!r}") from None
+
+
+def _from_csv(text: str) -> dict[str, Any]:
+    names, rows = table_rows(text, ",")
+    count = (len(names or ()) - 1) // 3
+    joints = (names or [])[1 : 1 + count]
+    if count < 1 or names != _header(joints):
+        wanted = "time,<joint>...,<joint> velocity...,<joint> acceleration..."
+        raise InputError(f"line 1: expected the columns {wanted}; is this a trajectory file?")
+    found: dict[str, Any] = {"times": [row[0] for row in rows], "joint_names": joints, "units": None, "robot": ""}
+    for k, field in enumerate(FIELDS):
+        found[field] = [row[1 + k * count : 1 + (k + 1) * count] for row in rows]
+    return found

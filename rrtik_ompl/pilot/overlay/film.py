@@ -1,0 +1,163 @@
+"""Augmented films: objects are detected in every picture of a film, and an arm that follows a path is drawn in."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from itertools import chain, islice
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.pilot.overlay.augment import Augmenter, Ghost
+from rrtik_ompl.sensing.cameras.pictures import Picture, quiet
+from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera
+from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.sensing.sensor import Sensor
+
+FILMS = {".mp4": "mp4v", ".avi": "MJPG"}
+DEFAULT_RATE, MAX_RATE = 30.0, 240.0  # pictures a second
+TRAIL_POINTS = 80
+ROOM_BYTES = 65536
+
+
+class ArmInPictures:
+    """Draws an arm that follows a path into pictures, one after the other.
+
+    Attributes:
+        count: How many pictures there were.
+        without_base: How many of them came before the pose of the arm's base was known; they are left unchanged.
+    """
+
+    def __init__(self, robot: Robot, sensor: Sensor, waypoints: ArrayLike, *, seconds: float, ghosts: int = 1) -> None:
+        """Prepare the arm.
+
+        Args:
+            robot: The arm.
+            sensor: Detects objects in the pictures.
+            waypoints: Of its path, shape (k, dof), k at least 1; with one the arm does not move.
+            seconds: From the first to the last of them.
+            ghosts: So many configurations ahead are drawn as well, the last of them the end of the path.
+
+        Raises:
+            InputError: If a number is out of range.
+        """
+        self._rows = finite_array(waypoints, (None, robot.dof), "waypoints of the film")
+        if len(self._rows) == 0 or not seconds > 0.0 or not 0 <= ghosts <= 20:
+            raise InputError(f"a film needs a waypoint, seconds above 0 and 0 to 20 ghosts; got {seconds:g}, {ghosts}")
+        lengths = np.linalg.norm(np.diff(self._rows, axis=0), axis=1)
+        self._shares = np.concatenate([[0.0], np.cumsum(lengths)]) / max(float(lengths.sum()), 1e-12)
+        self._robot, self._sensor, self._seconds = robot, sensor, seconds
+        self._augmenter = Augmenter(robot, sensor.camera)
+        self._ahead = np.linspace(0.0, 1.0, ghosts + 1)[1:]
+        self._trail = robot.fk_batch(self._along(np.linspace(0.0, 1.0, TRAIL_POINTS)))[:, :3, 3]
+        self._T_base_camera: pin.SE3 | None = None
+        self._known: dict[str, SeenObject] = {}
+        self._begin: float | None = None
+        self.count = self.without_base = 0
+
+    def draw(self, picture: Picture) -> NDArray[np.uint8]:
+        """The picture with arm, ghosts, the trail of the tip, and the frames of tip and objects.
+
+        Objects that were seen hide what is behind them; what is out of view stays where it was seen last.
+
+        Raises:
+            InputError: If the picture does not have the camera's size, or times go backwards.
+        """
+        view = self._sensor.view(picture)
+        self.count += 1
+        try:
+            self._T_base_camera = base_from_camera(self._sensor.marker_map, view.seen)[0]
+        except NoBaseError:
+            if self._T_base_camera is None:
+                self.without_base += 1
+                return picture.pixels
+        self._known |= {each.object.name: each for each in view.placed}
+        self._begin = picture.time if self._begin is None else self._begin
+        share = min((picture.time - self._begin) / self._seconds, 1.0)
+        q = self._along(np.array([share]))[0]
+        ghosts = [Ghost(row) for row in self._along(self._ahead[self._ahead > share])] if len(self._rows) > 1 else []
+        return self._augmenter.draw(
+            picture.pixels, self._T_base_camera, q, ghosts=ghosts,
+            real=[solid for each in self._known.values() for solid in each.solids()],
+            trail=self._trail if len(self._rows) > 1 else None,
+            frames=[self._robot.fk(q), *(each.T_base_object for each in self._known.values())],
+        )  # fmt: skip
+
+    def _along(self, shares: Vector) -> Matrix:
+        """Configurations at shares of the path's length. Shape (m, dof)."""
+        columns = [np.interp(shares, self._shares, column) for column in self._rows.T]
+        return np.stack(columns, axis=1)
+
+
+def rate_of(pictures: Iterator[Picture]) -> tuple[float, Iterator[Picture]]:
+    """Pictures a second, by the times of the first two, and all of the pictures."""
+    first = list(islice(pictures, 2))
+    apart = first[1].time - first[0].time if len(first) == 2 else 0.0
+    rate = 1.0 / apart if apart > 1.0 / MAX_RATE else DEFAULT_RATE
+    return rate, chain(first, pictures)
+
+
+def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> None:
+    """Write pictures as a film; the file appears when it is whole.
+
+    Raises:
+        InputError: If the ending is none of `FILMS`, there is no picture, or the file cannot be written.
+    """
+    if path.suffix.lower() not in FILMS:
+        raise InputError(f"{path}: a film ends in {', '.join(FILMS)}")
+    unfinished, writer, count = path.with_name(f".{path.stem}.unfinished{path.suffix}"), None, 0
+    try:
+        for frame in frames:
+            writer = writer or _writer(unfinished, path, rate, frame.shape)
+            writer.write(frame)
+            count += 1
+        if writer is None:
+            raise InputError(f"{path}: there is no picture to write")
+        writer.release()
+        if not _room_behind(unfinished) or _pictures_in(unfinished) != count:
+            raise InputError(f"{path}: cannot be written whole; is there room on the disk?")
+        os.replace(unfinished, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    finally:
+        if writer is not None:
+            writer.release()
+        unfinished.unlink(missing_ok=True)
+
+
+def _room_behind(file: Path) -> bool:
+    """Whether a file could be longer: of a full disk the writer of films says nothing, and may lack the index alone."""
+    size = file.stat().st_size
+    try:
+        with open(file, "ab", buffering=0) as film:
+            return film.write(bytes(ROOM_BYTES)) == ROOM_BYTES
+    except OSError:
+        return False
+    finally:
+        os.truncate(file, size)
+
+
+def _pictures_in(film: Path) -> int:
+    """How many pictures a film says that it has; 0 if it cannot be read."""
+    with quiet():
+        opened = cv2.VideoCapture(str(film))
+        try:
+            return int(opened.get(cv2.CAP_PROP_FRAME_COUNT)) if opened.isOpened() else 0
+        finally:
+            opened.release()
+
+
+def _writer(file: Path, path: Path, rate: float, shape: tuple[int, ...]) -> cv2.VideoWriter:
+    code = cv2.VideoWriter.fourcc(*FILMS[path.suffix.lower()])
+    with quiet():
+        writer = cv2.VideoWriter(str(file), code, rate, (shape[1], shape[0]))
+    if not writer.isOpened():
+        raise InputError(f"{path}: cannot be written; is the folder there, and yours to write in?")
+    return writer

@@ -1,0 +1,47 @@
+"""A virtual camera: the view from outside, turned and zoomed by the pilot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import finite_array, finite_number, positive
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.viewer.drawing import palette
+
+
+def pinhole_camera(width: int = 640, height: int = 480, opening: float = np.deg2rad(45.0)) -> Camera:
+    """A camera without distortion whose picture opens by an angle from top to bottom [rad]."""
+    focal = 0.5 * height / float(np.tan(0.5 * opening))
+    matrix = [[focal, 0.0, 0.5 * (width - 1)], [0.0, focal, 0.5 * (height - 1)], [0.0, 0.0, 1.0]]
+    return Camera(matrix, width, height)
+
+
+def orbit_pose(centre: ArrayLike, distance: float, azimuth: float, elevation: float) -> pin.SE3:
+    """``T_world_camera`` of a camera directed at a point, the world's z axis upwards in the picture.
+
+    Args:
+        centre: The point, shape (3,) [m].
+        distance: From there [m].
+        azimuth: Of the camera, seen from the centre, from the x axis towards y [rad].
+        elevation: Above the horizon [rad]; straight from above the x axis points to the right or as azimuth says.
+
+    Raises:
+        InputError: If a number is not finite or the distance not positive.
+    """
+    at = finite_array(centre, (3,), "centre")
+    away = positive(distance, "distance")
+    turn, rise = finite_number(azimuth, "azimuth"), finite_number(elevation, "elevation")
+    back = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
+    right = np.array([-np.sin(turn), np.cos(turn), 0.0])
+    down = np.cross(-back, right)
+    return pin.SE3(np.stack([right, down, -back], 1), at + away * back)
+
+
+def background(camera: Camera) -> NDArray[np.uint8]:
+    """A pale background. Shape (height, width, 3), blue, green, red."""
+    ends = np.array([palette.fractions(c)[::-1] for c in (palette.BACKGROUND_TOP, palette.BACKGROUND_BOTTOM)])
+    share = np.linspace(0.0, 1.0, camera.height)[:, None]
+    rows = np.rint(255.0 * ((1.0 - share) * ends[0] + share * ends[1])).astype(np.uint8)
+    return np.repeat(rows[:, None], camera.width, axis=1)

@@ -1,0 +1,201 @@
+"""The perception of a session: a camera and a sensor, live or simulated."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
+from rrtik_ompl.pilot.devices.base_motion import BaseMotion
+from rrtik_ompl.pilot.devices.camera_feed import ENDED, Feed, PictureSource
+from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
+from rrtik_ompl.pilot.devices.watchdog import Report
+from rrtik_ompl.pilot.interlock import STALE_SECONDS
+from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.pictures import Picture
+from rrtik_ompl.sensing.frames import base_from_camera, tip_seen
+from rrtik_ompl.sensing.sensor import Sensor, View
+
+REPEATS = "the camera repeats its last picture"
+FINGERS = 0.02  # [m]; a gripper that closes this near to a grasp takes the object
+EXPLANATION_SECONDS = 5.0  # between two searches for unknown markers
+
+
+class Perception(Protocol):
+    """Camera and sensor, as the engine uses them.
+
+    Attributes:
+        camera: The lens.
+        picture: The last picture, shape (height, width, 3).
+        T_base_camera: Pose of the camera, None if it is not known yet.
+        arm_in_picture: Whether the arm itself is in the picture.
+        lost: Why there are no pictures any more; "" if there are.
+        hint: Why no object can be placed by the last picture; "" if one can.
+    """
+
+    camera: Camera
+    picture: NDArray[np.uint8]
+    T_base_camera: pin.SE3 | None
+    arm_in_picture: bool
+    lost: str
+    hint: str
+
+    def update(self, session: Session, time: float) -> None:
+        """Process the newest picture, and give the objects in it to the session."""
+
+    def close(self) -> None:
+        """Release the camera."""
+
+
+class LivePerception:
+    """A camera and the sensor behind it.
+
+    Attributes:
+        source: Of the pictures.
+        others: The last pictures of the other cameras of a rig.
+    """
+
+    def __init__(self, sensor: Sensor, source: PictureSource, *, arm_in_picture: bool = False) -> None:
+        """Take the parts; see `Perception`."""
+        self.camera, self.arm_in_picture = sensor.camera, arm_in_picture
+        self.picture = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
+        self.T_base_camera: pin.SE3 | None = sensor.marker_map.T_base_camera
+        self.others: tuple[NDArray[np.uint8], ...] = ()
+        self.lost = self.hint = ""
+        self._explain_again = -np.inf
+        self._last: Picture | None = None
+        self._sensor, self.source = sensor, source
+
+    def update(self, session: Session, time: float) -> None:
+        """Process the newest picture, and give the objects in it to the session."""
+        try:
+            taken = self.source.latest()
+            if taken is None:
+                return
+            if self._frozen(taken) and not session.past:
+                self.lost = REPEATS if session.time - session.picture_time > STALE_SECONDS else self.lost
+                return
+            others = [Picture(each.pixels, each.name, time) for each in taken.others]
+            view = self._sensor.view(Picture(taken.pixels, taken.name, time), *others)
+        except RrtikError as error:
+            self.lost = str(error)
+            if self.lost != ENDED:  # the last picture of a film was a good one
+                session.unusable = self.lost
+            return
+        self.lost, self.picture = "", taken.pixels
+        self.others = tuple(each.pixels for each in taken.others)
+        session.see(view.placed, time)
+        if tip := tip_seen(self._sensor.marker_map, view.seen):
+            session.see_arm(*tip, time)
+        self.hint = self._why_nothing(view, time, known=bool(session.surroundings.seen))
+        if not view.why_not_placed:
+            self.T_base_camera, _ = base_from_camera(self._sensor.marker_map, view.seen)
+
+    def _frozen(self, taken: Picture) -> bool:
+        """Whether a picture, or that of another camera of the rig, is the last one again: it shows no present."""
+        before, self._last = self._last, taken
+        if before is None or len(before.others) != len(taken.others):
+            return False
+        now, then = (taken, *taken.others), (before, *before.others)
+        return any(each.repeats(last) for each, last in zip(now, then, strict=True))
+
+    def close(self) -> None:
+        """Release the camera."""
+        self.source.close()
+
+    def reports(self) -> dict[str, Report]:
+        """When the thread of the camera reported last, by name; nothing if it has none."""
+        source = self.source
+        return {"the camera": lambda: source.reported} if isinstance(source, Feed) else {}
+
+    def _why_nothing(self, view: View, time: float, known: bool) -> str:
+        """Why no object has a pose. The search for unknown markers is slow: only while no object was ever seen."""
+        if view.placed:
+            return ""
+        if view.seen:
+            refused = next((f"{each.object.name}: {each.refused}" for each in view.seen if each.refused), "")
+            return refused or view.why_not_placed
+        if known:
+            return "no marker in view"
+        if time >= self._explain_again:
+            self._explain_again = time + EXPLANATION_SECONDS
+            return self._sensor.why_nothing("camera")
+        return self.hint
+
+
+class CameraOfRig:
+    """The second camera of a rig, whose pictures are sensed with those of the first."""
+
+    def __init__(self, perception: LivePerception) -> None:
+        """Take what senses them."""
+        self._perception = perception
+
+    def picture(self) -> NDArray[np.uint8] | None:
+        """The picture that was sensed last; None if there is none yet."""
+        return self._perception.others[0] if self._perception.others else None
+
+    def close(self) -> None:
+        """Nothing to release: the perception has it."""
+
+
+class SimulatedSource:
+    """Pictures of a simulated camera, made on demand.
+
+    Attributes:
+        camera: Makes them.
+        arm: That they show.
+    """
+
+    def __init__(self, camera: SimulatedCamera, arm: Arm, motion: BaseMotion | None = None) -> None:
+        """Take camera and arm, and how their base moves."""
+        self.camera, self.arm, self._motion = camera, arm, motion
+        self._count, self._time = 0, 0.0
+        self._was_closed = False
+        self._carried: tuple[str, pin.SE3] | None = None  # an object that the gripper has taken, and T_tip_object
+
+    def advance(self, seconds: float) -> None:
+        """Advance the simulated time: the base moves."""
+        self._time += seconds
+        if self._motion is not None:
+            self.camera.T_start_base = self._motion.at(self._time)
+
+    def latest(self) -> Picture:
+        """A picture with the arm at its present configuration."""
+        self._count += 1
+        arm = self.arm
+        q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
+        if isinstance(arm, SimulatedArm):
+            self._carry(arm, arm.robot.fk(q))
+        tip = self.camera.T_start_base * self.camera.robot.fk(q)
+        on_arm = {each.name: tip for each in self.camera.marker_map.objects if each.role == "arm"}
+        if on_arm:
+            self.camera.places = {**self.camera.places, **on_arm}
+        return self.camera.picture(q, float(self._count))
+
+    def _carry(self, arm: SimulatedArm, T_base_tip: pin.SE3) -> None:
+        """Objects that can be carried move with a closed gripper, if it was closed where they can be grasped."""
+        tip, camera = self.camera.T_start_base * T_base_tip, self.camera
+        if arm.closed and not self._was_closed:
+            near = [
+                (float(np.linalg.norm(tip.actInv(camera.places[thing.name] * level).translation)), thing.name)
+                for thing in camera.marker_map.objects
+                if thing.loose and thing.name in camera.places
+                for grasp in thing.grasps
+                for level in grasp.levels
+            ]
+            if near and min(near)[0] <= FINGERS:
+                name = min(near)[1]
+                self._carried = (name, tip.actInv(camera.places[name]))
+        if self._carried is not None:
+            camera.places = {**camera.places, self._carried[0]: tip * self._carried[1]}
+        if not arm.closed:  # it was laid where the gripper has opened
+            self._carried = None
+        self._was_closed = arm.closed
+
+    def close(self) -> None:
+        """Nothing to release."""

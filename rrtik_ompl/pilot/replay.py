@@ -1,0 +1,164 @@
+"""A recorded session played again, shown with a simulated camera, for no pictures are recorded."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import Vector, finite_array
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
+from rrtik_ompl.pilot.records.pictures import RecordedPictures
+from rrtik_ompl.pilot.records.record import read_record
+from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.pilot.surroundings import Structure
+from rrtik_ompl.sensing.markers.marker_map import MarkerMap
+from rrtik_ompl.sensing.scene_from_view import SIGMAS, SeenObject
+
+Entry = dict[str, Any]
+
+
+class RecordedArm:
+    """An arm that is where the record says; commands do not move it."""
+
+    def __init__(self, robot: Robot, start: Vector) -> None:
+        """Begin at a configuration, shape (dof,)."""
+        self.robot, self.lost = robot, ""
+        self.q = robot.configuration(start, "start")
+
+    def read(self) -> Vector:
+        """Where the joints are. Shape (dof,), rad or m."""
+        return self.q.copy()
+
+    def move(self, joint: int, target: float) -> None:
+        """Without effect: the record holds the result."""
+
+    def follow(self, q: ArrayLike) -> None:
+        """Without effect: the record holds the result."""
+
+    def stop(self) -> None:
+        """Without effect: the record holds the result."""
+
+    def grip(self, closed: bool) -> None:
+        """Without effect: the record holds the result."""
+
+
+class RecordedPerception:
+    """Gives the entries of a record to a session when their time has come."""
+
+    def __init__(
+        self,
+        entries: list[Entry],
+        arm: RecordedArm,
+        world: SimulatedCamera,
+        structure: Structure | None = None,
+        pictures: RecordedPictures | None = None,
+    ) -> None:
+        """Begin at the beginning.
+
+        Args:
+            entries: Of a record; see `entries_for`.
+            arm: What the session takes for its arm.
+            world: Makes the pictures; its places follow the record.
+            structure: To what its obstacles are fixed; None if they move with the base.
+            pictures: That were recorded too; else the scene is drawn.
+        """
+        self._structure = structure
+        self._entries, self._arm, self._world, self._next = entries, arm, world, 0
+        self.camera, self.T_base_camera, self.arm_in_picture = world.camera, world.T_base_camera, True
+        self.picture: NDArray[np.uint8] = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
+        self.lost = self.hint = ""
+        self._pictures = pictures
+
+    def update(self, session: Session, time: float) -> None:
+        """Apply the entries up to a time of the record [s]."""
+        while self._next < len(self._entries) and self._entries[self._next]["time"] <= time:
+            self._apply(self._entries[self._next], session)
+            self._next += 1
+        session.see((), time)
+        if self._pictures is None:
+            self.picture = self._world.picture(self._arm.q, time).pixels
+        self.lost = "the record ends here" if self._next == len(self._entries) else ""
+
+    def close(self) -> None:
+        """Close the pictures."""
+        if self._pictures is not None:
+            self._pictures.close()
+
+    def _place(self, seen: list[SeenObject]) -> None:
+        """Put objects, and what is fixed to one of them, where they were seen."""
+        fixed = next((each for each in seen if self._structure and each.object.name == self._structure.name), None)
+        if fixed is not None and self._structure is not None:
+            self._world.T_start_base = self._structure.T_base_object * fixed.T_base_object.inverse()
+        self._world.places = {each.object.name: self._world.T_start_base * each.T_base_object for each in seen}
+
+    def _apply(self, entry: Entry, session: Session) -> None:
+        time = entry["time"]
+        if entry["kind"] == "joints":
+            self._arm.q = self._arm.robot.configuration(entry["q"], "q")
+            session.tick(time)
+        elif entry["kind"] == "command":
+            session.tick(time)  # as before every command that was given
+            session.command(entry["name"], time, **entry["arguments"])
+        elif entry["kind"] == "seen":
+            seen = [_seen(self._world.marker_map, each) for each in entry["objects"]]
+            self._place(seen)
+            session.see(seen, time)
+        elif entry["kind"] == "picture" and self._pictures is not None:
+            found = self._pictures.at(entry["at"], entry["size"], self.picture)
+            self.picture = self.picture if found is None else found
+
+
+def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker_map: MarkerMap) -> list[Entry]:
+    """The entries of a record, checked.
+
+    Raises:
+        InputError: If the file cannot be read, belongs to another problem, or an entry does not fit.
+    """
+    entries = list(read_record(path))
+    begin = next((entry for entry in entries if entry["kind"] == "begin"), {})
+    if begin.get("problem", problem) != problem:
+        raise InputError(f"{path}: is a record of the problem '{begin['problem']}', not of '{problem}'")
+    for count, entry in enumerate(entries, start=1):
+        try:
+            _check(entry, robot, marker_map)
+        except (KeyError, TypeError, ValueError, InputError) as error:
+            why = f"lacks {error}" if isinstance(error, KeyError) else str(error)
+            raise InputError(f"{path}:{count}: a line '{str(entry['kind'])[:20]}' that does not fit: {why}") from None
+    if not begin:
+        raise InputError(f"{path}: holds no line 'begin'; give a record of rrtik pilot")
+    return entries
+
+
+def start_of(entries: list[Entry], usual: Vector) -> tuple[Vector, int]:
+    """Where the arm stood when a record began, and the seed of its random numbers."""
+    begin = next((entry for entry in entries if entry["kind"] == "begin"), {})
+    return np.asarray(begin.get("q", usual)), int(begin.get("seed", 0))
+
+
+def _check(entry: Entry, robot: Robot, marker_map: MarkerMap) -> None:
+    float(entry["time"])
+    if entry["kind"] in ("begin", "joints"):
+        robot.configuration(entry["q"], "q")
+    elif entry["kind"] == "command":
+        dict(**entry["arguments"])
+        if not isinstance(entry["name"], str):
+            raise TypeError("the name of a command is a word")
+    elif entry["kind"] == "picture":
+        if not all(type(entry[key]) is int and entry[key] >= 0 for key in ("at", "size")):
+            raise ValueError("'at' and 'size' must be whole numbers")
+    elif entry["kind"] == "seen":
+        for each in entry["objects"]:
+            _seen(marker_map, each)
+
+
+def _seen(marker_map: MarkerMap, entry: Entry) -> SeenObject:
+    thing = marker_map.named(entry["name"])
+    xyz, turn = finite_array(entry["xyz"], (3,), "xyz"), finite_array(entry["rotation"], (3, 3), "rotation")
+    spread = finite_array(entry.get("covariance", np.zeros((6, 6))), (6, 6), "covariance")
+    return SeenObject(thing, pin.SE3(turn, xyz), spread, None, entry.get("sigmas", SIGMAS))

@@ -1,0 +1,180 @@
+"""A lamp for every grasp type and level of an object: can the arm get there, hold it and lift it?
+
+Green: the grasp is in reach, inside the limits and free, the arm gets to it from before the object, and can lift it.
+Amber: the grasp is in reach, but something is in the way of it, of the approach or of the lift. Red: the grasp is out
+of reach: no route leads there. Source: [1, ch. 6]; here the whole sequence of approach, grasp and lift counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.ik.analytic.closed_form import solutions
+from rrtik_ompl.ik.batch import solve_ik_batch
+from rrtik_ompl.ik.solve import chosen_method, solve_ik
+from rrtik_ompl.model.goal import PoseGoal, joint_difference
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.pilot.routes.approach import approaches
+from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject
+from rrtik_ompl.world.world import World
+
+Stage: TypeAlias = Literal["approach", "grasp", "lift"]
+Color: TypeAlias = Literal["green", "amber", "red"]
+
+STAGES: tuple[Stage, Stage, Stage] = ("approach", "grasp", "lift")
+GREEN: Final = "green"
+AMBER: Final = "amber"
+RED: Final = "red"
+LIMITS, UNREACHABLE = "joint limits", "out of reach"
+NUMERIC_SECONDS = 0.01  # for a pose, where the arm has no closed form
+DIAGNOSIS_SECONDS = 0.02  # for the reason why one grasp cannot be made
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lamp:
+    """What the arm can do with one grasp.
+
+    Attributes:
+        type: Name of the grasp type.
+        level: Number of the level, from 0.
+        color: "green", "amber" or "red".
+        stage: The stage that fails; None if green.
+        reason: Which stage fails and why; "" if green.
+        q: Configurations of approach, grasp and lift, NaN where there is none. Shape (3, dof).
+        grasps: All configurations of the grasp that are found, inside the limits and free. Shape (k, dof).
+    """
+
+    type: str
+    level: int
+    color: Color
+    stage: Stage | None
+    reason: str
+    q: Matrix
+    grasps: Matrix
+
+
+def stage_poses(T_base_object: pin.SE3, grasp: GraspType, level: int) -> tuple[pin.SE3, pin.SE3, pin.SE3]:
+    """``T_base_tip`` of approach, grasp and lift."""
+    at = T_base_object * grasp.levels[level]
+    before, after = at.copy(), at.copy()
+    before.translation = at.translation - grasp.approach * at.rotation[:, 2]
+    after.translation = at.translation + np.array([0.0, 0.0, grasp.lift])
+    return before, at, after
+
+
+def lamps(
+    world: World,
+    thing: MarkedObject,
+    T_base_object: pin.SE3,
+    near: Vector,
+    *,
+    holding: World,
+    seconds: float = NUMERIC_SECONDS,
+) -> tuple[Lamp, ...]:
+    """The lamps of all types and levels of an object where it is now.
+
+    Args:
+        world: For the approach: everything that must not be touched, the object too.
+        thing: What is to be grasped.
+        T_base_object: Where it is.
+        near: Where the arm is, shape (dof,); the nearest configurations are wanted.
+        holding: For grasp and lift: the same world in which the gripper may touch the object.
+        seconds: For each pose, where the arm has no closed form [s].
+    """
+    names = [(grasp, level) for grasp in thing.grasps for level in range(len(grasp.levels))]
+    if not names:
+        return ()
+    poses = np.array([[T.homogeneous for T in stage_poses(T_base_object, *name)] for name in names])
+    postures, why = _postures(world.robot, poses.reshape(-1, 4, 4), near, seconds)
+    shape = (len(names), len(STAGES), *postures.shape[1:])
+    postures = postures.reshape(shape)
+    free = _free(postures, (world, holding, holding))
+    nearest = _nearest(world.robot, postures, free, near)
+    found, stuck = [], not (world.valid(near) or holding.valid(near))
+    for row, (grasp, level) in enumerate(names):
+        reasons = why[row * len(STAGES) : (row + 1) * len(STAGES)]
+        grasps = postures[row, 1][free[row, 1]]
+        clear = free[row].any(axis=1)
+        if clear[1] and not clear[0]:
+            clear[0] = _approached(world, holding, nearest[row, 1], stage_poses(T_base_object, grasp, level))
+        color, stage, fault = _color(reasons, clear)
+        if stuck and color == GREEN:
+            color, stage, fault = AMBER, STAGES[0], "the arm touches something where it is"
+        reason = "" if stage is None else f"{stage}: {fault}"
+        found.append(Lamp(grasp.name, level, color, stage, reason, nearest[row], grasps))
+    return tuple(found)
+
+
+def _approached(world: World, holding: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3]) -> bool:
+    """Whether a few joints lead to a grasp from about the pose before the object, as a route would."""
+    return bool(approaches(world, holding, grasp, stages, max_count=1))
+
+
+def diagnose(
+    lamp: Lamp, thing: MarkedObject, T_base_object: pin.SE3, near: Vector, world: World, holding: World
+) -> str:
+    """Which stage of a grasp fails, and by how much it is out of reach or what would touch; "" for a green lamp.
+
+    Args:
+        lamp: Of the grasp.
+        thing: What is to be grasped.
+        T_base_object: Where it is.
+        near: Posture near which the arm would be, shape (dof,).
+        world: For the approach.
+        holding: For grasp and lift.
+    """
+    if lamp.stage is None:
+        return ""
+    stage = STAGES.index(lamp.stage)
+    goal = PoseGoal(stage_poses(T_base_object, thing.grasp(lamp.type), lamp.level)[stage])
+    found = solve_ik(world.robot, goal, near=near, world=(world, holding, holding)[stage], seconds=DIAGNOSIS_SECONDS)
+    return f"{lamp.stage}: {found.detail}" if found.detail else lamp.reason
+
+
+def _postures(
+    robot: Robot, poses: NDArray[np.float64], near: Vector, seconds: float
+) -> tuple[NDArray[np.float64], list[str]]:
+    """For each pose the postures inside the limits, NaN for the others, shape (m, b, dof); and why there is none."""
+    if chosen_method(robot, (PoseGoal(poses[0]),), "auto") == "closed-form":
+        found = solutions(robot, poses, near=near, check=False)
+        postures = np.where(found.valid[..., None], found.branches, np.nan)
+        reasons = np.where(found.real.any(axis=1), LIMITS, UNREACHABLE)
+        return postures, np.where(found.valid.any(axis=1), "", reasons).tolist()
+    batch = solve_ik_batch(robot, poses, near=near, seconds=seconds)
+    return np.array(batch.q[:, None]), list(batch.reasons)
+
+
+def _free(postures: NDArray[np.float64], worlds: tuple[World, ...]) -> NDArray[np.bool_]:
+    """Which postures exist and touch nothing, each stage in its own world. Shape (m, stages, b)."""
+    free = ~np.isnan(postures[..., 0])
+    for world in dict.fromkeys(worlds):
+        stages = [k for k, each in enumerate(worlds) if each is world]
+        pending = np.zeros_like(free)
+        pending[:, stages] = free[:, stages]
+        free[pending] = world.valid_batch(postures[pending])
+    return free
+
+
+def _nearest(robot: Robot, postures: NDArray[np.float64], free: NDArray[np.bool_], near: Vector) -> NDArray[np.float64]:
+    """Of the free postures of each stage the nearest one, NaN where there is none. Shape (m, stages, dof)."""
+    away = np.linalg.norm(joint_difference(robot, postures, near), axis=-1)
+    best = np.argmin(np.where(free, away, np.inf), axis=2)
+    chosen: NDArray[np.float64] = np.take_along_axis(postures, best[..., None, None], axis=2)[:, :, 0]
+    some: NDArray[np.bool_] = np.asarray(free.any(axis=2))
+    return np.where(some[..., None], chosen, np.nan)
+
+
+def _color(reasons: list[str], clear: NDArray[np.bool_]) -> tuple[Color, Stage | None, str]:
+    """Color, the first stage that fails and why; reasons why stages are out of reach, and which stages are free."""
+    if reasons[1]:
+        return RED, STAGES[1], reasons[1]
+    failing = next((k for k in (1, 0, 2) if not clear[k]), None)
+    if failing is None:
+        return GREEN, None, ""
+    return AMBER, STAGES[failing], reasons[failing] or "something is in the way"

@@ -1,0 +1,164 @@
+"""Fewer single-joint moves: the axis post-processor. Source: [1, ch. 6.3, algorithm 12].
+
+Works on arrays: a route is (k, n) waypoints, every edge of which should move one joint; ``motions_free(A, B)`` says
+for batches which straight motions are free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.transitions import merge_moves
+from rrtik_ompl.world.motion_queries import MotionsFree, Stop, no_stop
+
+PART, LONGER = 16, 4  # moves of the first parts that are cut, and how many times longer they are the next time
+FIRST_TESTS, MORE_TESTS = 4, 4  # waypoints tried together from a pivot, and how many times more the next time
+
+
+def axis_cut(
+    waypoints: ArrayLike, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
+) -> Matrix:
+    """One pass of the axis post-processor.
+
+    From the end of the route (the pivot) it looks for the earliest waypoint that a sequence of single-joint moves
+    reaches without collision, goes there, and repeats from there until it has come to the start.
+
+    Args:
+        waypoints: Shape (k, n), start first. Every edge must be free. An edge that moves several joints is kept as it
+            is where no sequence of single-joint moves replaces it.
+        motions_free: Which straight motions are free, for batches of shape (m, n).
+        axes: Order of the joints within a sequence; the last joint first if None, because distal joints sweep less.
+        stop: Called at every pivot; true leaves the rest of the route as it is.
+
+    Returns:
+        Shape (m, n), start first, ends as given, with no more moves than the route had.
+
+    Raises:
+        InputError: If the waypoints are no (k, n) numbers or ``axes`` is no permutation of the joints.
+    """
+    return _backward_pass(_route(waypoints), check_once(motions_free), axes, stop)[::-1]
+
+
+def double_axis_cut(
+    waypoints: ArrayLike, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
+) -> Matrix:
+    """The published post-processing: a pass from the end of the route, then one from the start. See :func:`axis_cut`.
+
+    Each pass turns the route round, so the second one cuts the other way and restores the direction.
+    """
+    free = check_once(motions_free)
+    return _backward_pass(_backward_pass(_route(waypoints), free, axes, stop), free, axes, stop)
+
+
+def cut_parts(waypoints: ArrayLike, motions_free: MotionsFree, *, stop: Stop = no_stop) -> Matrix:
+    """The double cut of short parts of a long route, then of longer ones of what is left, up to the whole.
+
+    The cut of a whole route checks about the square of its moves, and far waypoints come first; most of its gain is
+    near. See :func:`axis_cut`.
+    """
+    route, size = _route(waypoints), PART
+    while size < len(route) - 1 and not stop():
+        parts = [route[k : k + size + 1] for k in range(0, len(route) - 1, size)]
+        cut = [double_axis_cut(part, motions_free, stop=stop) for part in parts]
+        route, size = merge_moves(np.vstack(cut), tolerance=0.0), LONGER * size
+    return double_axis_cut(route, motions_free, stop=stop)
+
+
+def axis_moves(a: Vector, b: Vector, axes: Sequence[int]) -> Matrix:
+    """The waypoints after a of the single-joint moves from a to b, joints in the order ``axes``, shape (moves, n)."""
+    changing = [axis for axis in axes if a[axis] != b[axis]]
+    steps = np.repeat(a[None], len(changing), axis=0)
+    for i, axis in enumerate(changing):
+        steps[i:, axis] = b[axis]
+    return steps
+
+
+def check_once(motions_free: MotionsFree) -> MotionsFree:
+    """The same test, but each motion is checked once, from its lexicographically smaller end.
+
+    So both directions have one answer, and what an earlier pass has checked is remembered.
+    """
+    answers: dict[bytes, bool] = {}
+
+    def free(A: Matrix, B: Matrix) -> Mask:
+        turned = np.array([a > b for a, b in zip(A.tolist(), B.tolist(), strict=True)], dtype=bool)[:, None]
+        first, second = np.where(turned, B, A), np.where(turned, A, B)
+        keys = [motion.tobytes() for motion in np.hstack([first, second])]
+        fresh = {key: k for k, key in enumerate(keys) if key not in answers}
+        if fresh:
+            rows = list(fresh.values())
+            answers.update(zip(fresh, motions_free(first[rows], second[rows]).tolist(), strict=True))
+        return np.array([answers[key] for key in keys], dtype=bool)
+
+    return free
+
+
+def _backward_pass(route: Matrix, motions_free: MotionsFree, axes: Sequence[int] | None, stop: Stop) -> Matrix:
+    """Algorithm 12. The returned route runs from the last waypoint to the first."""
+    order = _order(axes, route.shape[1])
+    pivot, new = len(route) - 1, [route[-1:]]
+    while pivot > 0 and not stop():
+        test = _earliest_reachable(route, pivot, motions_free, order)
+        new.append(_way(route, pivot, test, motions_free, order))
+        pivot = test
+    new.append(route[:pivot][::-1])
+    return merge_moves(np.vstack(new), tolerance=0.0)
+
+
+def _earliest_reachable(route: Matrix, pivot: int, motions_free: MotionsFree, order: Sequence[int]) -> int:
+    """The first waypoint that single-joint moves reach from the pivot; its neighbour if there is no other."""
+    first, count = 0, FIRST_TESTS
+    while first < pivot - 1:
+        last = min(first + count, pivot - 1)
+        reached = _reached(route[pivot], route[first:last], motions_free, order)
+        if reached.any():
+            return first + int(reached.argmax())
+        first, count = last, MORE_TESTS * count
+    return pivot - 1
+
+
+def _reached(a: Vector, goals: Matrix, motions_free: MotionsFree, order: Sequence[int]) -> Mask:
+    """Which goals, shape (m, n), single-joint moves from a reach, the joints in the order given. Shape (m,)."""
+    # What moves last from a, a proximal joint, sweeps most, so it refutes soonest. The answers are the same.
+    reached, order = np.ones(len(goals), dtype=bool), list(order)
+    for k, axis in reversed(list(enumerate(order))):
+        here = np.repeat(a[None], len(goals), axis=0)
+        here[:, order[:k]] = goals[:, order[:k]]
+        there = here.copy()
+        there[:, axis] = goals[:, axis]
+        open_ = np.flatnonzero(reached & (there[:, axis] != here[:, axis]))
+        if len(open_):
+            reached[open_] = motions_free(here[open_], there[open_])
+    return reached
+
+
+def _way(route: Matrix, pivot: int, test: int, motions_free: MotionsFree, order: Sequence[int]) -> Matrix:
+    """The moves from the pivot to a waypoint before it.
+
+    A neighbour is reached by the original edge. That is not tested again if it moves one joint: a doubt by rounding
+    must not stop the pass.
+    """
+    moves = axis_moves(route[pivot], route[test], order)
+    neighbours = test == pivot - 1 and len(moves) > 1
+    if neighbours and not _reached(route[pivot], route[test:pivot], motions_free, order).all():
+        return route[test:pivot]
+    return moves
+
+
+def _order(axes: Sequence[int] | None, dof: int) -> list[int]:
+    order = list(range(dof))[::-1] if axes is None else [int(axis) for axis in axes]
+    if sorted(order) != list(range(dof)):
+        raise InputError(f"axes: expected each of 0 to {dof - 1} once, got {order}")
+    return order
+
+
+def _route(waypoints: ArrayLike) -> Matrix:
+    route = finite_array(waypoints, (None, None), "waypoints")
+    if len(route) == 0:
+        raise InputError("waypoints: a route needs at least one configuration")
+    return merge_moves(route, tolerance=0.0)

@@ -1,0 +1,190 @@
+"""Proofs that a list of moves cannot be shorter: whatever the one free value of such a list is, something collides.
+
+A route of one move more than joints must move has a single free value: where the joint that moves twice turns back.
+The same holds for three moves if one joint must move: another leaves and returns. The free value's range is halved
+until each part is refuted: on every route is a collision so deep that no value of the part avoids it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector
+from rrtik_ompl.geometry.collision.overlap_depth import OverlapDepth
+from rrtik_ompl.model.transitions import moved
+from rrtik_ompl.world.motion_queries import Stop
+from rrtik_ompl.world.world import World
+
+MOST_WORK = 4096  # parts of a range, times the corners of the other joints
+SMALLEST_PART = 1e-5  # of a range
+PROBES = 4  # stretches of a colliding motion in the middle of which the depth is computed
+MOST_CORNERS = 256
+START, FREE, GOAL = range(3)  # where the free joint is
+
+Place: TypeAlias = tuple[int, int]  # which of the other joints have arrived, a set of bits; where the free joint is
+Step: TypeAlias = tuple[Place, Place]
+
+
+def sharper_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector, stop: Stop) -> int:
+    """A lower bound of the moves between two configurations, shape (n,), that are not joined by the least number.
+
+    Args:
+        world: Checks motions, which are taken as they are, without regard to their resolution.
+        joints: Those that may move.
+        start: Where the moves begin.
+        goal: Where they end.
+        stop: True ends the work; nothing is proven then.
+
+    Returns:
+        With c joints that differ, c + 2 (4 for c = 1) if there is a proof that c + 1 (3 for c = 1) moves will not do;
+        else c + 1 (3 for c = 1).
+    """
+    changing = np.flatnonzero(moved(start, goal)).tolist()
+    known = 3 if len(changing) == 1 else len(changing) + 1
+    twice = [j for j in joints if j not in changing] if len(changing) == 1 else changing
+    proofs = (OneFreeValue(world, start, goal, joint, stop).refuted() for joint in twice)
+    return known + 1 if all(proofs) else known
+
+
+def remembered(world: World, joints: Sequence[int]) -> Callable[[Vector, Vector, Stop], int]:
+    """:func:`sharper_bound` of a world, computed once for each start and goal; again if it was stopped."""
+    known: dict[tuple[bytes, bytes], int] = {}
+
+    def bound(start: Vector, goal: Vector, stop: Stop) -> int:
+        ends = (start.tobytes(), goal.tobytes())
+        if ends not in known:
+            found = sharper_bound(world, joints, start, goal, stop)
+            if stop():
+                return found
+            known[ends] = found
+        return known[ends]
+
+    return bound
+
+
+class OneFreeValue:
+    """All routes in which each joint that differs moves once, but one joint moves twice and so has a free value.
+
+    Args:
+        world: Checks motions.
+        start: Shape (n,).
+        goal: Shape (n,).
+        joint: The one that moves twice.
+        stop: True ends the work.
+    """
+
+    def __init__(self, world: World, start: Vector, goal: Vector, joint: int, stop: Stop) -> None:
+        self._world, self._start, self._goal, self._joint, self._stop = world, start, goal, joint, stop
+        self._others = [k for k in np.flatnonzero(moved(start, goal)).tolist() if k != joint]
+        self._full = (1 << len(self._others)) - 1
+        self._depth = OverlapDepth(world.robot, world.bodies, world.pairs)
+        ends = start[joint], goal[joint]
+        self._lower = float(max(world.robot.lower[joint], min(ends) - TAU))
+        self._upper = float(min(world.robot.upper[joint], max(ends) + TAU))
+
+    def refuted(self) -> bool:
+        """Whether there is a proof that something collides on every such route."""
+        if self._full >= MOST_CORNERS:
+            return False
+        corners = range(self._full + 1)
+        self._stretches = {(mask, end): self._stretch(mask, end) for end in (START, GOAL) for mask in corners}
+        steps = [step for end in (START, GOAL) for step in self._steps_of_others(end)]
+        self._standing = {step for step in steps if self._is_free(step, 0.0)}
+        parts = [(self._lower, self._upper)]
+        for _ in range(MOST_WORK // (self._full + 1)):
+            if not parts:
+                return True
+            low, high = parts.pop()
+            verdict = None if self._stop() else self._verdict(low, high)
+            if verdict is None or high - low < SMALLEST_PART * (self._upper - self._lower):
+                return False
+            if verdict is False:
+                parts += [(low, 0.5 * (low + high)), (0.5 * (low + high), high)]
+        return False
+
+    def _verdict(self, low: float, high: float) -> bool | None:
+        """Whether no value of a part makes a free route; None if its middle does."""
+        middle, refuted = 0.5 * (low + high), set[Step]()
+        while True:
+            route = self._route(low, high, refuted)
+            if route is None:
+                return True
+            free = [step for step in pairwise(route) if step[0][1] == step[1][1] == FREE]
+            fresh = {step for step in free if self._collides_deeply(step, middle, 0.5 * (high - low))}
+            if not fresh:
+                return None if all(self._is_free(step, middle) for step in pairwise(route)) else False
+            refuted |= fresh
+
+    def _route(self, low: float, high: float, refuted: set[Step]) -> list[Place] | None:
+        """A route from start to goal on which nothing is known to collide for all values of a part, or None."""
+        origin: dict[Place, Place | None] = {(0, START): None}
+        for here in ((mask, state) for state in (START, FREE, GOAL) for mask in range(self._full + 1)):
+            if here in origin:
+                for there in self._open_from(here, low, high, refuted):
+                    origin.setdefault(there, here)
+        place: Place | None = (self._full, GOAL)
+        if place not in origin:
+            return None
+        route = []
+        while place is not None:
+            route.append(place)
+            place = origin[place]
+        return route[::-1]
+
+    def _open_from(self, here: Place, low: float, high: float, refuted: set[Step]) -> Iterator[Place]:
+        """The next places of a route."""
+        mask, state = here
+        for step in self._steps_from(here):
+            if step in self._standing if state != FREE else step not in refuted:
+                yield step[1]
+        if state != GOAL:
+            least, most = self._stretches[mask, START if state == START else GOAL]
+            if low <= most and high >= least:
+                yield mask, state + 1
+
+    def _steps_from(self, here: Place) -> list[Step]:
+        """The moves of the other joints from a place."""
+        mask, state = here
+        return [(here, (mask | 1 << k, state)) for k in range(len(self._others)) if not mask >> k & 1]
+
+    def _steps_of_others(self, state: int) -> list[Step]:
+        return [step for mask in range(self._full + 1) for step in self._steps_from((mask, state))]
+
+    def _configuration(self, place: Place, value: float) -> Vector:
+        """Where the arm is at a place; ``value`` is that of the free joint where it is free."""
+        mask, state = place
+        q = self._start.copy()
+        arrived = [joint for k, joint in enumerate(self._others) if mask >> k & 1]
+        q[arrived] = self._goal[arrived]
+        q[self._joint] = (self._start[self._joint], value, self._goal[self._joint])[state]
+        return q
+
+    def _is_free(self, step: Step, value: float) -> bool:
+        return self._world.motion_valid(*(self._configuration(place, value) for place in step))
+
+    def _stretch(self, mask: int, end: int) -> tuple[float, float]:
+        """Between which values the free joint could move to or from an end of its motion, while the others rest."""
+        rows = self._between(*((mask, FREE, value) for value in (self._lower, self._upper)))
+        here = self._configuration((mask, end), 0.0)[self._joint]
+        hits = rows[~self._world.valid_batch(rows), self._joint]
+        return hits[hits <= here].max(initial=self._lower), hits[hits >= here].min(initial=self._upper)
+
+    def _between(self, first: tuple[int, int, float], last: tuple[int, int, float]) -> Matrix:
+        """Configurations from one to another as dense as the world checks a motion, shape (k, n)."""
+        a, b = (self._configuration((mask, state), value) for mask, state, value in (first, last))
+        shares = np.linspace(0.0, 1.0, self._world.steps(a, b) + 1)[:, None]
+        rows: Matrix = (1.0 - shares) * a + shares * b
+        return rows
+
+    def _collides_deeply(self, step: Step, value: float, reach: float) -> bool:
+        """Whether a move collides wherever the free joint is within ``reach`` of a value."""
+        rows = self._between(*((mask, state, value) for mask, state in step))
+        needed = float(self._world.weights[self._joint]) * reach
+        hits = np.flatnonzero(~self._world.valid_batch(rows))
+        stretches = sorted(np.split(hits, np.flatnonzero(np.diff(hits) > 1) + 1), key=len, reverse=True)
+        probes = [stretch[len(stretch) // 2] for stretch in stretches[:PROBES] if len(stretch)]
+        return any(self._depth.travel(rows[k]) > needed for k in probes)

@@ -1,0 +1,164 @@
+"""Rules for a list of single-joint moves, so that planners and shortening keep to the same."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, whole_number
+from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, listed, name_of, require
+from rrtik_ompl.description.joint_weights import given_weights
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.transitions import merge_moves
+
+MOST_JOINTS = 1_000  # of an arm
+
+Joints = Sequence[int | str]
+PerJoint = float | Sequence[float]
+
+
+class MoveRules:
+    """The options of the planners that move one joint at a time, for what comes after them.
+
+    Attributes:
+        joint_costs: Cost of each joint's travel, shape (n,).
+        frozen_joints: Numbers of the joints that must not move.
+        last_joints: Numbers of the joints that move once each, after all others have arrived.
+        smallest_move: No move is shorter, shape (n,) [rad or m].
+
+    Args:
+        names: Of the n joints; empty if they have none, and then ``dof`` is needed.
+        joint_costs: Greater than 0, one number or one for each joint; all 1 if None.
+        frozen_joints: By number, from 0, or by name.
+        last_joints: Likewise.
+        smallest_move: One number or one for each joint, at least 0.
+        dof: Number of joints; that of their names if None.
+
+    Raises:
+        InputError: If a number is out of range.
+        UnknownNameError: If there is no joint of a name.
+
+    Example:
+        >>> rules = rrtik.MoveRules(["base", "elbow", "wrist"], last_joints=["wrist"], joint_costs=[3.0, 2.0, 1.0])
+        >>> list(rules.last_joints)
+        [2]
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        *,
+        joint_costs: PerJoint | None = None,
+        frozen_joints: Joints = (),
+        last_joints: Joints = (),
+        smallest_move: PerJoint = 0.0,
+        dof: int | None = None,
+    ) -> None:
+        names = tuple(name_of(name, "a joint") for name in listed(names, "names of joints"))
+        dof = len(names) if dof is None else whole_number(dof, "dof")
+        at_most(dof, MOST_JOINTS, "dof")
+        self.joint_costs = costs_of_joints(joint_costs, dof)
+        self.frozen_joints = joint_numbers(frozen_joints, names, dof, "frozen_joints")
+        self.last_joints = joint_numbers(last_joints, names, dof, "last_joints")
+        self.smallest_move = smallest_moves(smallest_move, dof)
+
+    @classmethod
+    def of_robot(cls, robot: Robot, **options: Any) -> MoveRules:
+        """Those of a robot; weights of its joints are their costs, unless others are given."""
+        require(robot, Robot, "robot")
+        return cls(robot.joint_names, **weights_as_costs(robot) | options)
+
+    def kept_by(self, route: Matrix) -> bool:
+        """Whether a route of single-joint moves, shape (k, n), keeps to all of them.
+
+        Raises:
+            InputError: If it is no route of n joints, or has no row.
+        """
+        route = self._route(route)
+        ending = np.diff(route[self.head(route) - 1 :], axis=0)
+        others = np.delete(ending, self.last_joints, axis=1)
+        once = (np.count_nonzero(np.diff(merge_moves(route, tolerance=0.0), axis=0), axis=0) <= 1)[self.last_joints]
+        rests = (route[:, self.frozen_joints] == route[0, self.frozen_joints]).all()
+        return bool(rests and once.all() and not others.any() and long_enough(route, self.smallest_move))
+
+    def head(self, route: Matrix) -> int:
+        """How many waypoints of a route, shape (k, n), come before the last joints move.
+
+        Raises:
+            InputError: As :meth:`kept_by`.
+        """
+        route = self._route(route)
+        waiting = (route[:, self.last_joints] == route[0, self.last_joints]).all(axis=1)
+        return len(route) if waiting.all() else int(waiting.argmin())
+
+    def _route(self, given: Matrix) -> Matrix:
+        route = finite_array(given, (None, len(self.joint_costs)), "route")
+        if len(route) == 0:
+            raise InputError("route: needs at least one row")
+        return route
+
+
+def weights_as_costs(robot: Robot) -> dict[str, Any]:
+    """The option ``joint_costs`` that the weights of a robot's joints make; nothing if it has none."""
+    return {"joint_costs": given_weights(robot)} if robot.joint_weights else {}
+
+
+def long_enough(route: Matrix, smallest_move: Vector) -> bool:
+    """Whether no move of a route, shape (k, n), is too short, once those of the same joint in a row are joined."""
+    if not smallest_move.any():
+        return True
+    moves = np.abs(np.diff(merge_moves(route, tolerance=0.0), axis=0))
+    return bool(((moves == 0.0) | (moves >= smallest_move)).all())
+
+
+def costs_of_joints(costs: PerJoint | None, dof: int) -> Vector:
+    """Costs of travel, one number or one for each joint, checked. Shape (dof,).
+
+    Raises:
+        InputError: If one is not greater than 0.
+    """
+    found = _per_joint(1.0 if costs is None else costs, dof, "joint_costs")
+    if not (found > 0.0).all():
+        raise InputError(f"joint_costs: expected numbers greater than 0, got {costs!r}")
+    return found
+
+
+def smallest_moves(size: PerJoint, dof: int) -> Vector:
+    """Smallest moves, one number or one for each joint [rad or m], checked. Shape (dof,).
+
+    Raises:
+        InputError: If one is negative.
+    """
+    found = _per_joint(size, dof, "smallest_move")
+    if not (found >= 0.0).all():
+        raise InputError(f"smallest_move: expected 0 or more, got {size!r}")
+    return found
+
+
+def _per_joint(value: PerJoint, dof: int, what: str) -> Vector:
+    shape = () if isinstance(value, int | float) else (dof,)
+    return np.broadcast_to(finite_array(value, shape, what), dof).astype(np.float64)
+
+
+def joint_numbers(joints: Joints, names: Sequence[str], dof: int, option: str) -> list[int]:
+    """Numbers of joints that are given by number or name, each once.
+
+    Raises:
+        InputError: If they are not a list of joint numbers.
+        UnknownNameError: If there is no joint of a name.
+    """
+    if isinstance(joints, str) or not isinstance(joints, Sequence):
+        raise InputError(f"{option}: expected a list of joints, got {joints!r}")
+    numbers = {}
+    for joint in joints:
+        if isinstance(joint, str):
+            if joint not in names:
+                raise UnknownNameError(f"{option}: joint", joint, names)
+            numbers[list(names).index(joint)] = True
+        elif isinstance(joint, bool) or not isinstance(joint, int) or not 0 <= joint < dof:
+            raise InputError(f"{option}: expected joint numbers from 0 to {dof - 1}, got {joint!r}")
+        else:
+            numbers[joint] = True
+    return list(numbers)

@@ -1,0 +1,300 @@
+"""A search for the fewest single-joint moves, least travel second, that can be stopped at any time.
+
+It looks for the best route on one small lattice of joint values after another. A route of a few moves more than joints
+must move has few values that are not those of the start or the goal, so lattices of all corners between start and goal
+and many values of one, two or three joints hold such routes. Others are made of the values of the routes known so far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from itertools import combinations, islice, product
+from typing import TypeAlias
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.transitions import lower_bound, merge_moves, transitions
+from rrtik_ompl.planning.moves.axis_cut import axis_moves
+from rrtik_ompl.planning.moves.best_route import BestRoute
+from rrtik_ompl.planning.moves.staircase import staircase_orders
+from rrtik_ompl.planning.moves.values import Values, lattice_size, near_values, values_of, with_spread
+from rrtik_ompl.world.motion_queries import BatchedMotionQueries, MotionsFree, OutOfTime, Stop, no_stop
+
+MOST_NODES = 4096  # of a lattice: some milliseconds in the kernels
+MOST_FREE = 3  # joints with free values in one lattice
+WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # of the search for less travel, shares of a joint's range
+NEAR_NODES = 512  # of a lattice close to a route
+CUTS = 3  # in random orders, without gain, in every round
+SPARE = 8  # configurations for each of a known part when further values come in
+REPEATS = 8  # of a search for less travel at the same width
+
+Proof: TypeAlias = Callable[[Vector, Vector, Stop], int]  # a lower bound between a start and a goal
+
+
+class MoveSearch:
+    """Routes from starts to goals, better and better.
+
+    Attributes:
+        pairs: Each start with each goal.
+        rounds: Rounds of improvement so far.
+
+    Args:
+        starts: Free configurations, shape (s, n).
+        goals: Free configurations, shape (g, n).
+        lower, upper: Finite limits of the joint values, shapes (n,).
+        motions_free: Which straight motions are free, for batches of shape (m, n).
+        seed: Of all random choices.
+        costs: Cost of each joint's travel, shape (n,); all 1 if None.
+        frozen: Joints that must not move.
+        smallest_move: No move is shorter, shape (n,); any may be if None.
+        most_nodes: Size of the lattices.
+        prove: Sharpens the bound between a start and a goal; called once, when one move more than it remains.
+        all_free: Which motions are free where no clearance is kept and nothing has to be proven: only what these say
+            is not free raises the bound. As ``motions_free`` if None.
+    """
+
+    def __init__(
+        self,
+        starts: Matrix,
+        goals: Matrix,
+        lower: Vector,
+        upper: Vector,
+        motions_free: MotionsFree,
+        *,
+        seed: int = 0,
+        costs: Vector | None = None,
+        frozen: Sequence[int] = (),
+        smallest_move: Vector | None = None,
+        most_nodes: int = MOST_NODES,
+        prove: Proof | None = None,
+        all_free: MotionsFree | None = None,
+    ) -> None:
+        self.pairs = [(s, g) for s, g in product(starts, goals)]
+        self._bounds = [lower_bound(s, g) for s, g in self.pairs]
+        self._differing = min(self._bounds)
+        self._lower, self._upper = lower, upper
+        self._queries = BatchedMotionQueries(motions_free)
+        self._rng = np.random.default_rng(seed)
+        count = starts.shape[1]
+        order = self._rng.permutation(count).tolist()
+        shortest = np.zeros(count) if smallest_move is None else smallest_move
+        travel = np.ones(count) if costs is None else costs
+        self._best = BestRoute(self._queries, travel, order, shortest)
+        self._unkept = None if all_free is None else BatchedMotionQueries(all_free)
+        self._any = self._best if self._unkept is None else BestRoute(self._unkept, travel, order, shortest)
+        self._movable = [j for j in range(count) if j not in frozen and lower[j] < upper[j]]
+        self._most_nodes = most_nodes
+        self._prove = prove
+        self._offers: list[Matrix] = []
+        self.rounds = 0
+
+    @property
+    def route(self) -> Matrix | None:
+        """The best so far, shape (k, n), or None."""
+        return self._best.route
+
+    @property
+    def moves(self) -> int:
+        """Of the best route; more than any number if there is none."""
+        return self._best.moves
+
+    @property
+    def bound(self) -> int:
+        """No route has fewer moves. Sharpened by :meth:`try_corner_routes` and :meth:`raise_bound`."""
+        return min(*self._bounds, self.moves)
+
+    @property
+    def proven(self) -> bool:
+        """Whether no route has fewer moves than the best one."""
+        return self.moves == self.bound
+
+    @property
+    def direct(self) -> bool:
+        """Whether each joint of the best route moves once, straight to the goal: nothing can be better."""
+        return self.route is not None and self.proven and self.moves <= lower_bound(self.route[0], self.route[-1])
+
+    @property
+    def motions(self) -> int:
+        """How many straight motions have been checked."""
+        return self._queries.asked + (0 if self._unkept is None else self._unkept.asked)
+
+    def raise_bound(self, pair: int, bound: int) -> None:
+        """Take note that no route between a start and a goal, counted as in ``pairs``, has fewer moves."""
+        self._bounds[pair] = max(self._bounds[pair], bound)
+
+    def offer(self, route: Matrix) -> None:
+        """Take in a free route of single-joint moves, shape (k, n), ends as given."""
+        merged = merge_moves(route, tolerance=0.0)
+        self._offers.append(merged)
+        self._best.take(merged)
+
+    def try_corner_routes(self, stop: Stop = no_stop) -> None:
+        """Find out for each start and goal whether they are joined without a detour of any joint; sharpens the bound.
+
+        Such routes have no free values: they pass the corners of the box between start and goal, all of which are
+        tried. If there is none, a joint has to move twice. A joint alone cannot: another has to leave and return.
+        """
+        for queries in (self._queries, self._unkept):
+            if queries is not None:
+                queries.stop = stop
+        with suppress(OutOfTime):
+            for number, (start, goal) in enumerate(self.pairs):
+                values = values_of(np.array([start, goal]))
+                least = self._bounds[number]
+                if not 0 < least <= self.moves:
+                    continue
+                if lattice_size(values) > self._most_nodes:
+                    self._try_plain_orders(start, goal)
+                    continue
+                found = self._best.search(values, start, goal)
+                if (found is None or transitions(found) > least) and self._any is not self._best:
+                    found = self._any.search(values, start, goal)
+                if found is None or transitions(found) > least:
+                    self.raise_bound(number, 3 if least == 1 else least + 1)
+
+    def _try_plain_orders(self, start: Vector, goal: Vector) -> None:
+        """Take in the moves of the joints from the last to the first, or from the first to the last, if free."""
+        for order in (range(len(start))[::-1], range(len(start))):
+            route = np.vstack([start, axis_moves(start, goal, order)])
+            if self._queries(route[:-1], route[1:]).all():
+                self._best.take(route)
+
+    def _try_some_corners(self) -> None:
+        """Take in a route without a detour if one is found where the corners are too many for all to be tried."""
+        for start, goal in self.pairs:
+            many = lattice_size(values_of(np.array([start, goal]))) > self._most_nodes
+            orders = staircase_orders(start, goal, self._queries) if many and not self.direct else []
+            if orders:
+                self._best.take(np.vstack([start, axis_moves(start, goal, orders[0])]))
+
+    def improve(self, rounds: int, stop: Stop = no_stop) -> None:
+        """Look for better routes, for at most ``rounds`` rounds or until ``stop()``.
+
+        Once it is proven that no route has fewer moves, only the travel is still made less, in a few steps.
+        """
+        if self.direct:
+            return
+        self._queries.stop = stop
+        with suppress(OutOfTime):
+            self._try_some_corners()
+            if not self.proven:
+                self._offers = [self._cut(offered) for offered in self._offers]
+                self._cut_again()
+            for joint in self._movable:
+                self._free_values([joint])
+            for offered in self._offers:
+                if not self.proven:
+                    self._rearrange(offered)
+            for joints in islice(self._free_joints(), rounds):
+                self._sharpen()
+                if self.proven:
+                    break
+                self.rounds += 1
+                self._free_values(joints)
+                self._cut_again()
+                if self.route is not None:
+                    self._around(self.route)
+            self._other_orders()
+            self._less_travel()
+
+    def _cut(self, offered: Matrix) -> Matrix:
+        """A free route cut by both methods, whichever is better."""
+        return min(self._best.cut_parts(offered), self._best.cut(offered), key=self._best.rank)
+
+    def _cut_again(self) -> None:
+        """Further cuts of the best route, joints in random orders, until several in a row gain no move."""
+        idle = 0
+        while self.route is not None and not self.proven and idle < CUTS:
+            if self._queries.stop():
+                raise OutOfTime
+            before = self.moves
+            self._best.cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
+            idle = idle + 1 if self.moves == before else 0
+
+    def _rearrange(self, route: Matrix) -> None:
+        """The best route that the values of a route allow; part by part if they are many."""
+        first = 0
+        while first < len(route) - 1:
+            last = self._window(route, first)
+            self._best.replace(route, first, last, values_of(route[first : last + 1]))
+            first = last
+
+    def _window(self, route: Matrix, first: int) -> int:
+        """The last waypoint of the longest part from ``first`` on whose values fit in a lattice."""
+        last = first + 1
+        while last + 1 < len(route) and lattice_size(values_of(route[first : last + 2])) <= self._most_nodes:
+            last += 1
+        return last
+
+    def _sharpen(self) -> None:
+        """Prove a better bound where that would settle the matter."""
+        if self._prove is None or self.moves != self.bound + 1:
+            return
+        prove, self._prove = self._prove, None
+        for number, (start, goal) in enumerate(self.pairs):
+            if lower_bound(start, goal) < self._bounds[number] < self.moves:  # its corners are settled
+                self.raise_bound(number, prove(start, goal, self._queries.stop))
+
+    def _free_values(self, joints: Sequence[int]) -> None:
+        """Routes from corner to corner, some joints free; none if a lattice cannot hold the corners."""
+        promising = [k for k, bound in enumerate(self._bounds) if bound <= self.moves]
+        if promising:
+            start, goal = self.pairs[int(self._rng.choice(promising))]
+            values = self._with_spread(np.array([start, goal]), joints)
+            if lattice_size(values) <= self._most_nodes:
+                self._best.search(values, start, goal, shorter=self.proven)
+
+    def _around(self, route: Matrix) -> None:
+        """The values of a part of a route and further ones of some joints."""
+        first = int(self._rng.integers(len(route) - 1))
+        last = self._window(route, first)
+        while first > 0 and lattice_size(values_of(route[first - 1 : last + 1])) <= self._most_nodes // SPARE:
+            first -= 1
+        joints = self._some_joints(MOST_FREE)
+        self._best.replace(route, first, last, self._with_spread(route[first : last + 1], joints))
+
+    def _less_travel(self) -> None:
+        """Move the free values of the best route by less and less, as long as its travel gets less."""
+        for width in WIDTHS:
+            for _ in range(REPEATS):
+                before = self.route
+                if before is None or len(before) < 2:
+                    return
+                last = self._window(before, 0)
+                part = before[: last + 1]
+                near = near_values(part, float(width), self._lower, self._upper, NEAR_NODES)
+                self._best.replace(before, 0, last, near, shorter=self.proven)
+                if self.route is before:
+                    break
+
+    def _other_orders(self) -> None:
+        """Let the joints that make detours in the best route make others, in other orders."""
+        if self.route is not None:
+            values, ends = values_of(self.route), values_of(self.route[[0, -1]])
+            detours = [j for j in self._movable if len(values[j]) > len(ends[j])]
+            if detours:
+                self._free_values(detours)
+
+    def _with_spread(self, rows: Matrix, joints: Sequence[int]) -> Values:
+        return with_spread(values_of(rows), joints, self._lower, self._upper, self._most_nodes, self._rng)
+
+    def _some_joints(self, most: int) -> list[int]:
+        """One to ``most`` joints that may move, at random."""
+        count = int(self._rng.integers(1, min(most, len(self._movable)) + 1)) if self._movable else 0
+        return self._rng.choice(self._movable, size=count, replace=False).tolist() if count else []
+
+    def _free_joints(self) -> Iterator[list[int]]:
+        """Which joints are free, without end: all pairs in random order, all sets of three, each alone, and again.
+
+        Never more than can have free values in a route that is better by a move.
+        """
+        alone = False  # each joint alone comes before all others, see `improve`
+        while self._movable:
+            for size in range(1 if alone else 2, MOST_FREE + 1):
+                sets = list(combinations(self._movable, size))
+                for k in self._rng.permutation(len(sets)):
+                    if size <= max(self.moves - 1 - self._differing, 1):
+                        yield list(sets[k])
+            alone = True

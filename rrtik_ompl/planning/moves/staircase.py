@@ -1,0 +1,207 @@
+"""From any path to one that moves one joint at a time: staircases beside its edges, as coarse as the world allows.
+
+Source: the discretisation of an ordinary route of [1, ch. 6.3]. The ``n!`` orders of a piece are not tried one by one:
+together they pass no more than the ``2^n`` corners of the piece's box, and its edges are what is checked.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector, positive
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.transitions import SAME, merge_moves
+from rrtik_ompl.world.kept_clearance import check_route_clearance, keeping, provable_clearances
+from rrtik_ompl.world.motion_queries import MotionsFree
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
+from rrtik_ompl.world.world import FINEST_RESOLUTION, World
+
+Order: TypeAlias = tuple[int, ...]  # the joints of a piece, the first to move first
+
+# Of the checks of single-joint moves, relative to the world's; the next one where the second check rejects the path.
+DENSITIES = (1.0, VERIFICATION_DENSITY, 2.0 * VERIFICATION_DENSITY)
+FINEST = 1.0 / 64.0  # of the world's motion resolution: no point of the arm moves less in a piece that is still cut
+WIDEST = 64  # corners followed per step; a piece of up to seven joints has no more, so its search is exact
+
+
+def one_joint_moves(
+    path: JointPath, problem: Problem | World, *, finest: float | None = None, clearance: float | None = None
+) -> JointPath:
+    """Turn a path of any planner into single-joint moves.
+
+    Every edge becomes a staircase, one step per joint that changes, in an order that is free. An edge for which no
+    order is free is halved, and its halves again: the grid is fine only where the path passes close to something.
+
+    Args:
+        path: A valid path.
+        problem: Its problem, or the world that checks the moves.
+        finest: Where no point of the arm moves farther than this [m], a piece is not halved again; a 64th of the
+            motion resolution if None.
+        clearance: What the moves keep from every obstacle on top of its margin [m], if the path keeps it. None: 1 mm,
+            or what the ends of the path have.
+
+    Returns:
+        A path with the same ends, bit for bit, every edge of which moves exactly one joint, with its proof. If the
+        path is proven free, so are the moves, with the clearance if the path has it; else they have passed the same
+        second check as a plan. They follow the path closely, so there are many: ``shorten`` makes fewer of them.
+
+    Raises:
+        InputError: If the path is not valid, or comes so close to something that no staircase passes there; if an end
+            of the path cannot keep the clearance.
+
+    Example:
+        >>> problem = rrtik.load_problem("titan4_prisms")
+        >>> path = rrtik.plan(problem, "fastrrtconnect", seed=1).path
+        >>> rrtik.one_joint_moves(path, problem).one_joint_at_a_time
+        True
+    """
+    world = problem.world if isinstance(problem, Problem) else problem
+    require(path, JointPath, "path to convert", "a plan has one if plan.found")
+    require(world, World, "world of a path to convert")
+    if len(path.waypoints) < 2:
+        raise InputError("path to convert: it has one waypoint, so there is nothing to convert")
+    faults = path.violations(world)
+    if faults:
+        raise InputError(f"path to convert: motion {faults[0].edge + 1} is not valid: {faults[0].reason}")
+    least = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
+    check_route_clearance(world, clearance, path.waypoints)
+    for kept in provable_clearances(world, path.waypoints, clearance):
+        with suppress(InputError):  # no staircase keeps so much; one that keeps less may
+            converted = path.with_waypoints(_converted(path.waypoints, keeping(world, 0.0, proven=kept), least))
+            return converted.proved(world, clearance=kept)
+    for density in DENSITIES:
+        finer = world.with_resolution(max(world.motion_resolution / density, FINEST_RESOLUTION))
+        converted = path.with_waypoints(_converted(path.waypoints, finer, least))
+        if not converted.violations(world):
+            return converted.proved(world)
+    raise InputError("path to convert: its single-joint moves do not pass the second check; lower motion_resolution")
+
+
+def staircase_orders(a: Vector, b: Vector, motions_free: MotionsFree) -> list[Order]:
+    """Orders in which the joints may change one after the other from a to b.
+
+    Args:
+        a: Beginning of a piece, shape (n,).
+        b: Its end, shape (n,).
+        motions_free: Which straight motions are free, for batches of shape (m, n).
+
+    Returns:
+        One free order for every joint that can move first; empty if no order is free.
+    """
+    joints = np.flatnonzero(a != b)
+    steps = _free_steps(a, b, joints, motions_free)
+    full = (1 << len(joints)) - 1
+    orders = []
+    for first in steps.get(0, []):
+        picked = [first]
+        while (corner := sum(1 << k for k in picked)) != full:
+            picked.append(steps[corner][0])
+        orders.append(tuple(int(joints[k]) for k in picked))
+    return orders
+
+
+def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_free: MotionsFree) -> dict[int, list[int]]:
+    """The free steps that lead from a to b, by the corner of the box where they begin; a corner is a set of bits."""
+    places = range(len(joints))[::-1]  # the last joint first: distal joints sweep less
+    frontier, layers = [0], []
+    for _ in places:
+        tried = [(corner, k) for corner in frontier for k in places if not corner >> k & 1]
+        tails = np.array([_corner(a, b, joints, corner) for corner, _ in tried])
+        heads = np.array([_corner(a, b, joints, corner | 1 << k) for corner, k in tried])
+        free = [step for step, ok in zip(tried, motions_free(tails, heads), strict=True) if ok]
+        layers.append(free)
+        frontier = sorted({corner | 1 << k for corner, k in free})[:WIDEST]
+        if not frontier:
+            return {}
+    alive, steps = {(1 << len(joints)) - 1}, dict[int, list[int]]()
+    for layer in reversed(layers):  # backwards, so that steps into dead ends fall away
+        for corner, k in layer:
+            if corner | 1 << k in alive:
+                steps.setdefault(corner, []).append(k)
+        alive = set(steps)
+    return steps
+
+
+def _corner(a: Vector, b: Vector, joints: NDArray[np.int64], corner: int) -> Vector:
+    q = a.copy()
+    for place, joint in enumerate(joints):
+        if corner >> place & 1:
+            q[joint] = b[joint]
+    return q
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Piece:
+    """A part of edge number ``edge``, and the orders known to be free on it."""
+
+    a: Vector
+    b: Vector
+    edge: int
+    orders: list[Order]
+
+
+def _converted(waypoints: Matrix, world: World, finest: float) -> Matrix:
+    """Waypoints of the staircases along a route: all pieces of a level are checked together, then the next level."""
+    rows = _without_tremble(waypoints)
+    pieces = [_Piece(a, b, edge, []) for edge, (a, b) in enumerate(pairwise(rows)) if (a != b).any()]
+    while any(not piece.orders for piece in pieces):
+        found = iter(_free_orders([piece for piece in pieces if not piece.orders], world))
+        pieces = [piece if piece.orders else replace(piece, orders=next(found)) for piece in pieces]
+        pieces = [part for piece in pieces for part in ([piece] if piece.orders else _halves(piece, world, finest))]
+    walked, last = [rows[:1]], -1
+    for piece in pieces:
+        order = next((order for order in piece.orders if order[0] == last), piece.orders[0])  # two moves become one
+        walked.append(_staircase(piece, order)[1:])
+        last = order[-1]
+    return merge_moves(np.vstack(walked), tolerance=0.0)
+
+
+def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
+    """For every piece: last joint first and first joint first, as far as they are free, else whichever order is."""
+    joints = [tuple(np.flatnonzero(piece.a != piece.b).tolist()) for piece in pieces]
+    trials = [(piece, order) for piece, own in zip(pieces, joints, strict=True) for order in (own[::-1], own)]
+    stairs = [_staircase(*trial) for trial in trials]
+    free = world.motion_valid_batch(np.vstack([s[:-1] for s in stairs]), np.vstack([s[1:] for s in stairs]))
+    ends = np.cumsum([len(s) - 1 for s in stairs])[:-1]
+    passed = [bool(ok.all()) for ok in np.split(free, ends)]
+    found = []
+    for k, piece in enumerate(pieces):
+        both = zip(trials[2 * k : 2 * k + 2], passed[2 * k : 2 * k + 2], strict=True)
+        plain = [order for (_, order), ok in both if ok]
+        found.append(plain or staircase_orders(piece.a, piece.b, world.motion_valid_batch))
+    return found
+
+
+def _halves(piece: _Piece, world: World, finest: float) -> list[_Piece]:
+    if world.weights @ np.abs(piece.b - piece.a) <= finest:
+        raise InputError(
+            f"path to convert: motion {piece.edge + 1} passes too close to something to be walked one joint at a time "
+            f"in steps of {1e3 * finest:.3g} mm; use a planner of single-joint moves instead, such as the default one"
+        )
+    middle = 0.5 * (piece.a + piece.b)
+    ends = ((piece.a, middle), (middle, piece.b))
+    return [_Piece(a, b, piece.edge, []) for a, b in ends if (a != b).any()]
+
+
+def _staircase(piece: _Piece, order: Order) -> Matrix:
+    """The corners that an order passes, both ends of the piece included, shape (moves + 1, n)."""
+    rows = np.repeat(piece.a[None], len(order) + 1, axis=0)
+    for k, joint in enumerate(order, start=1):
+        rows[k:, joint] = piece.b[joint]
+    return rows
+
+
+def _without_tremble(waypoints: Matrix) -> Matrix:
+    """The same route without changes too small to count as moves; start and end stay as they are, bit for bit."""
+    rows = waypoints.copy()
+    for k in range(len(rows) - 2, 0, -1):
+        rows[k] = np.where(np.abs(rows[k] - rows[k + 1]) <= SAME, rows[k + 1], rows[k])
+    return rows

@@ -1,0 +1,156 @@
+"""`plan()`: from a problem to a path that has been checked twice, or to the reason why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any, get_args
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import not_negative, positive, whole_number
+from rrtik_ompl.base.choices import Accuracy, ImproveStrategy, PathObjective, ProofMode, one_of
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.goal import GoalSet
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
+from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
+from rrtik_ompl.ompl_bridge.planner_options import planner_options
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
+from rrtik_ompl.planning.improving import Improvement, improved
+from rrtik_ompl.planning.one_planner import run_planner
+from rrtik_ompl.planning.outcome import Plan as Plan
+from rrtik_ompl.planning.outcome import Request
+from rrtik_ompl.planning.portfolio import run_portfolio
+from rrtik_ompl.planning.second_check import fixed_ends
+from rrtik_ompl.world.kept_clearance import check_clearance
+from rrtik_ompl.world.problem import Problem
+
+RESTARTS = 20
+MAX_RESTARTS = 1_000_000
+BOUND_OPTION = "bound"  # of planners that can be told how long a path may be
+MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
+PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
+OBJECTIVES: tuple[PathObjective, ...] = get_args(PathObjective)
+STRATEGIES: tuple[ImproveStrategy, ...] = get_args(ImproveStrategy)
+
+
+def plan(
+    problem: Problem,
+    planner: str | PlannerFactory | None = None,
+    *,
+    seconds: float = 5.0,
+    seed: int | None = None,
+    restarts: int = RESTARTS,
+    parameters: Mapping[str, Any] | None = None,
+    accuracy: Accuracy | None = None,
+    proof: ProofMode = "preferred",
+    clearance: float | None = None,
+    improve: float = 0.0,
+    objective: PathObjective = "length",
+    strategy: ImproveStrategy = "restart-shorten",
+) -> Plan:
+    """Find a collision-free path from the start to the goal of a problem.
+
+    A goal of the tip is first turned into free configurations by inverse kinematics, unless the planner finds them
+    itself. If it does not get to them with some effort, more are drawn and it is started anew with twice the effort
+    (see :class:`GoalSearch`).
+
+    The planner first relies on what the kernels can prove without coal, for a short while; where that finds no path its
+    motions are checked exactly. Either way a path is returned only if a second check agrees: its motions are proven
+    free for their whole length (:meth:`World.prove`), with a clearance. What is not proven gets a detour. Where none is
+    found, the planner is started anew with more room around obstacles. If that does not help in a few attempts, the
+    path is returned that is proven in most parts, the others checked in steps (:meth:`JointPath.violations`).
+
+    If a planner gives up before its time it is started anew with another random stream; if the second check rejects its
+    path, it is started anew and its motions are checked as densely as by the second check.
+
+    Args:
+        problem: What to solve.
+        planner: Name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
+            class that is built from a SpaceInformation alone. "auto" lets several search one after the other, until
+            one finds a path, and shortens that a little. None: what the problem names, or else "auto".
+        seconds: Limit of wall time for all attempts together [s]; a busy machine gets less done in it.
+        seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None. PRM and
+            PRMstar work by the clock, so theirs may differ.
+        restarts: Further attempts at most.
+        parameters: Options of the planner; of OMPL's planners in snake case, such as ``range`` or ``goal_bias``.
+        accuracy: "exact", or "conservative" to leave it at what can be proven without coal: faster, and blind to narrow
+            passages. None: that of the problem's world.
+        proof: "preferred": see above. "required": no path is found unless all of it is proven. "off": motions are
+            checked, and nothing is said of proofs.
+        clearance: What the path keeps from every obstacle on top of its margin [m], if there is such a path. None:
+            1 mm, or what start and goal have. At a goal of the tip configurations that keep it are preferred.
+        improve: How long the path may go on getting better after it was found [s], within ``seconds``: further plans
+            with other seeds, each shortened, of which the best is kept. It ends when sixty of them in a row gain
+            nothing, or the path is as short as can be. ``statistics["cost_over_time"]`` has the course, rows of seconds
+            and cost, ``"length_bound"`` a length below which there is none. Ctrl-C ends it, and the best path so far is
+            returned. The clock decides how many plans are tried, so paths of a seed may differ.
+        objective: What ``improve`` makes small: "length" in joint space; "time", which the robot's velocity limits
+            allow at least; or "clearance", the length of which each piece counts more the nearer the arm is to
+            something, double at 5 cm. Paths are shortened in length all the same: the objective chooses among them.
+        strategy: Of ``improve``: "restart-shorten" as above, or "shorten", the first path alone.
+
+    Raises:
+        UnknownNameError: If there is no planner, accuracy, objective or strategy of that name.
+        InputError: If a number or a parameter makes no sense, start or goal cannot keep the clearance, or the objective
+            is "time" and the robot has no velocity limits.
+        PlannerError: If the planner broke.
+
+    Example:
+        >>> problem = rrtik.load_problem("titan4_sdu")
+        >>> rrtik.plan(problem, "fewest-moves", seed=1).path.transitions
+        6
+    """
+    require(problem, Problem, "problem to plan", "use Problem(world, start, goal) or load_problem(name)")
+    planner = (problem.planner or AUTO) if planner is None else planner
+    require(planner, str | Callable, "planner", "use a name of list_planners() or a planner class")
+    limit = positive(seconds, "seconds")
+    if limit > MAX_SECONDS:
+        raise InputError(f"seconds must be {MAX_SECONDS:g} or less, got {limit:g}")
+    if isinstance(restarts, bool) or not isinstance(restarts, int) or not 0 <= restarts <= MAX_RESTARTS:
+        raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
+    require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
+    used = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")
+    one_of(PROOF_MODES, proof, "proof")
+    request = Request(limit, used, restarts, parameters or {}, proof, clearance)
+    problem = problem if accuracy is None else problem.with_accuracy(accuracy)
+    check_clearance(problem.world, clearance, fixed_ends(problem))
+    how = Improvement(
+        not_negative(improve, "improve"),
+        one_of(OBJECTIVES, objective, "objective"),
+        one_of(STRATEGIES, strategy, "strategy of improve"),
+    )
+    found = _search_of(problem, planner)(request)
+    found = _improved(problem, planner, found, request, how) if found.found and how.seconds > 0.0 else found
+    if found.path is None or not isinstance(problem.goal, GoalSet):
+        return found
+    return replace(found, member=problem.goal.member_at(problem.robot, found.path.end))
+
+
+def _improved(problem: Problem, planner: str | PlannerFactory, found: Plan, request: Request, how: Improvement) -> Plan:
+    """The plan improved by its planner; of several by the one that found the path."""
+    again = found.planner if isinstance(planner, str) else planner
+    bounded = BOUND_OPTION in planner_options(find_planner(again) if isinstance(again, str) else again)
+    return improved(problem, found, _search_of(problem, again), request, replace(how, bounded=bounded))
+
+
+def plan_counted(problem: Problem, iterations: int, *, seconds: float, seed: int) -> Plan:
+    """A plan by "auto" that ends after a number of iterations of each planner, about, so that no clock decides.
+
+    Args:
+        problem: What to solve.
+        iterations: Of each planner.
+        seconds: Limit of wall time on top of that [s].
+        seed: Of everything random.
+    """
+    return run_portfolio(problem, Request(seconds, seed, RESTARTS, {}, "preferred", None, iterations))
+
+
+def _search_of(problem: Problem, planner: str | PlannerFactory) -> Callable[[Request], Plan]:
+    """What plans by a planner, given a request."""
+    if not isinstance(planner, str):
+        return partial(run_planner, problem, planner.__name__, planner)
+    if is_auto(planner):
+        return partial(run_portfolio, problem)
+    return partial(run_planner, problem, planner, find_planner(planner))

@@ -1,0 +1,315 @@
+"""A roadmap of a world: made once, asked many times, saved to a file, checked again when an obstacle moves."""
+
+from __future__ import annotations
+
+import os
+import time
+from functools import partial
+from io import BytesIO
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, filled_rows, finite_array, positive, whole_number
+from rrtik_ompl.base.errors import InputError, called, require
+from rrtik_ompl.files.named_arrays import NamedArrays
+from rrtik_ompl.files.text import known_ending, write_bytes
+from rrtik_ompl.geometry.collision.digests import robot_digest, world_digest
+from rrtik_ompl.kernels.search.roadmap.graph import KernelGraph
+from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, KERNELS, UNKNOWN
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.planning.search.roadmap_in_python import PythonGraph
+from rrtik_ompl.world.motion_queries import MotionQueries, Stop, decider, has_kernels, keeps_constraints
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import usable_configurations
+from rrtik_ompl.world.world import World
+
+VERTICES, NEAR = 2000, 10
+SECONDS = 60.0  # that making one takes at most, where next to nothing is free
+MOST_VERTICES = 1_000_000
+FORMAT = 1
+NOT_PROVING = -1.0  # in a file, in the place of a clearance [m]
+
+
+class Graph(Protocol):
+    """A roadmap without its world: a :class:`KernelGraph` or a :class:`PythonGraph`."""
+
+    @property
+    def size(self) -> int:
+        """Number of vertices."""
+
+    @property
+    def rows(self) -> Matrix:
+        """The vertices, shape (size, n)."""
+
+    @property
+    def edges(self) -> NDArray[np.int32]:
+        """Pairs of vertices, shape (m, 2)."""
+
+    @property
+    def states(self) -> NDArray[np.int32]:
+        """What is known of the edges, shape (m,)."""
+
+    def restore(self, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32]) -> None:
+        """Fill an empty one."""
+
+    def grow(self, wanted: int, stop: Stop) -> int:
+        """Add free samples; how many were added."""
+
+    def learn(self, path: Matrix) -> int:
+        """Make a free path, shape (k, n), part of it."""
+
+    def check(self, stop: Stop) -> None:
+        """Check all edges."""
+
+    def route(self, starts: Matrix, goals: Matrix, stop: Stop) -> Matrix | None:
+        """The shortest path on it from a start to a goal, shape (k, n), or None."""
+
+    def statistics(self) -> dict[str, int | float]:
+        """Counts."""
+
+
+def checked_near(near: object) -> int:
+    """With how many of the vertices near it a new one is joined.
+
+    Raises:
+        InputError: If it is none of 1 to 100.
+    """
+    if not 1 <= (count := whole_number(near, "near")) <= 100:
+        raise InputError(f"near must be from 1 to 100, got {near}")
+    return count
+
+
+def graph_in(
+    world: MotionQueries | None, lower: Vector, upper: Vector, *, near: int, seed: int, checks: MotionQueries
+) -> Graph:
+    """An empty roadmap in a box of a world: in kernels where it has some; ``checks`` answers what these do not."""
+    if not has_kernels(world, KERNELS):
+        return PythonGraph(lower, upper, near=near, seed=seed, valid=checks.valid, motion_free=checks.motion_valid)
+    ask = decider(world, checks.motion_valid_batch)
+    lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)
+    return KernelGraph(world.motions, lower, upper, near=near, seed=seed, ask=ask)
+
+
+class Roadmap:
+    """A roadmap of a world: free configurations joined by free motions, for any number of queries.
+
+    A query joins its start and goal with the vertices near them and searches the shortest path on the roadmap, in a
+    tenth of a millisecond or so. Its motions are checked in steps. `plan()` with the planner "roadmap" proves them too,
+    and where the roadmap has no path it adds one that RRT-Connect finds. For one thread at a time.
+
+    Attributes:
+        world: Where it is.
+        seed: Of its samples.
+        near: With how many of the vertices near it a new one is joined.
+
+    Args:
+        world: Robot and scene.
+        vertices: How many free configurations to begin with; fewer where they are not found within a minute.
+        seed: The same seed gives the same roadmap.
+        near: See above.
+
+    Raises:
+        InputError: If a number makes no sense, or the world has path constraints, which a roadmap does not keep.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> problem = rrtik.load_problem("titan4_prisms")
+        >>> roadmap = rrtik.Roadmap(problem.world)
+        >>> roadmap.path(problem.start, problem.goal.q).start.tolist() == problem.start.tolist()
+        True
+        >>> rrtik.plan(problem, "roadmap", parameters={"roadmap": roadmap}).found
+        True
+    """
+
+    def __init__(self, world: World, *, vertices: int = VERTICES, seed: int = 0, near: int = NEAR) -> None:
+        require(world, World, "world of a roadmap", "use World(robot, scene)")
+        if not 0 <= whole_number(vertices, "vertices") <= MOST_VERTICES:
+            raise InputError(f"vertices must be {MOST_VERTICES} or less, got {vertices}")
+        if keeps_constraints(world):  # no sample keeps them, and files say nothing of them
+            raise InputError("world of a roadmap: it has path constraints, which a roadmap does not keep; use cbirrt")
+        self.near, self.world, self.seed = checked_near(near), world, whole_number(seed, "seed")
+        self.graph = graph_in(world, *_box(world.robot), near=near, seed=self.seed, checks=world)
+        self.grow(vertices)
+
+    def __repr__(self) -> str:
+        return f"Roadmap({self.world.robot.name}, {self.graph.size} vertices, {len(self.graph.states)} edges)"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        kept = (self.world, self.graph.rows, self.graph.edges, self.graph.states)
+        return partial(_restored, seed=self.seed, near=self.near), kept
+
+    @property
+    def vertices(self) -> Matrix:
+        """The configurations, shape (n, dof)."""
+        return self.graph.rows
+
+    @property
+    def edges(self) -> NDArray[np.int32]:
+        """Pairs of vertices whose motions are not known to be blocked, shape (m, 2)."""
+        edges: NDArray[np.int32] = self.graph.edges[self.graph.states != BLOCKED]
+        return edges
+
+    def grow(self, vertices: int, *, seconds: float = SECONDS) -> int:
+        """Add so many vertices and check their edges, for some seconds at most; how many were added."""
+        end = time.perf_counter() + positive(seconds, "seconds")
+        added = self.graph.grow(whole_number(vertices, "vertices"), lambda: time.perf_counter() > end)
+        self.graph.check(lambda: time.perf_counter() > end)
+        return added
+
+    def path(self, start: ArrayLike, goal: ArrayLike, *, seconds: float = 1.0) -> JointPath | None:
+        """The shortest path on the roadmap between two configurations, its motions checked in steps.
+
+        Args:
+            start: Shape (dof,), rad or m.
+            goal: Likewise.
+            seconds: Wall time after which to give up [s].
+
+        Returns:
+            The path, or None if the roadmap has none; `plan()` with the planner "roadmap" then adds one.
+
+        Raises:
+            ProblemError: If start or goal is not free.
+            InputError: If one of them is no configuration of the robot.
+        """
+        ends = usable_configurations(self.world, {"start": start, "goal": goal})
+        end = time.perf_counter() + positive(seconds, "seconds")
+        rows = self.route(ends["start"][None], ends["goal"][None], lambda: time.perf_counter() > end)
+        return None if rows is None else JointPath.of(self.world.robot, rows)
+
+    def route(self, starts: Matrix, goals: Matrix, stop: Stop) -> Matrix | None:
+        """As :meth:`path`, between free configurations of shapes (s, dof) and (g, dof); shape (k, dof).
+
+        Joints without limits are turned by whole turns, so that the first start lies on the roadmap.
+        """
+        called(stop, "stop of a roadmap")
+        starts, goals = (filled_rows(rows, self.world.robot.dof, "ends of a route") for rows in (starts, goals))
+        turns = self._turns(starts[0])
+        if not turns.any():
+            return self.graph.route(starts, goals, stop)
+        rows = self.graph.route(starts - turns, goals - turns, stop)
+        if rows is None:
+            return None
+        rows = rows + turns
+        rows[0], rows[-1] = _nearest(starts, rows[0]), _nearest(goals, rows[-1])
+        return rows
+
+    def learn(self, path: Matrix) -> None:
+        """Make a free path, shape (k, dof), part of the roadmap, as far as it lies in its box."""
+        rows = filled_rows(path, self.world.robot.dof, "path to learn")
+        self.graph.learn(rows - self._turns(rows[0]))
+
+    def _turns(self, start: Vector) -> Vector:
+        """The whole turns of joints without limits that lie between the roadmap and a configuration, shape (dof,)."""
+        turns: Vector = np.where(self.world.robot.continuous, np.rint(start / TAU) * TAU, 0.0)
+        return turns
+
+    def moved_to(self, world: World) -> Roadmap:
+        """The same roadmap in another world of the robot, for instance after an obstacle has moved.
+
+        Its vertices are checked at once and edges that end at one that is not free are left out; the motions of the
+        others are checked again as soon as a query comes to them. This roadmap stays as it is.
+
+        Raises:
+            InputError: If the world is of another robot or has path constraints.
+        """
+        require(world, World, "world of a roadmap", "use World(robot, scene)")
+        if robot_digest(world.robot) != robot_digest(self.world.robot):
+            raise InputError(f"roadmap of robot '{self.world.robot.name}': the world is of another robot")
+        rows, edges = self.graph.rows, self.graph.edges
+        free = world.valid_batch(rows) if len(rows) else np.zeros(0, dtype=bool)
+        states = np.where(free[edges].all(axis=1), UNKNOWN, BLOCKED).astype(np.int32)
+        return _restored(world, rows, edges, states, seed=self.seed, near=self.near)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write everything as .npz, whole or not at all.
+
+        Raises:
+            InputError: If the ending is another one or the file cannot be written.
+        """
+        known_ending(path, (".npz",), "file of a roadmap")
+        data, world = BytesIO(), self.world
+        numbers = {"format": FORMAT, "seed": self.seed, "near": self.near, "resolution": world.motion_resolution}
+        names = {"robot": world.robot.name, "digest": world_digest(world.robot, world.bodies, world.pairs)}
+        graph = {"rows": self.graph.rows, "edges": self.graph.edges, "states": self.graph.states.astype(np.int8)}
+        everything: dict[str, Any] = {**numbers, "kept": _kept(world), **names, **graph}
+        np.savez_compressed(data, **everything)
+        write_bytes(path, data.getvalue())
+
+
+def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = False) -> Roadmap:
+    """Read a roadmap that was saved.
+
+    Args:
+        path: The file.
+        world: The world that it is of.
+        moved: Whether the world may be another one of the same robot; then all is checked again, as by
+            :meth:`Roadmap.moved_to`.
+
+    Raises:
+        InputError: If the file cannot be used or is of another world, or this one has path constraints.
+
+    Example:
+        >>> world = rrtik.World(rrtik.load_robot("planar3"))
+        >>> rrtik.Roadmap(world, seed=1).save("map.npz")
+        >>> rrtik.load_roadmap("map.npz", world).world is world
+        True
+    """
+    known_ending(path, (".npz",), "file of a roadmap")
+    require(world, World, "world of a roadmap", "use World(robot, scene)")
+    data = NamedArrays(path)
+    try:
+        if (version := data.count("format")) != FORMAT:
+            raise InputError(f"its format is {version}, not {FORMAT}")
+        digest, seed, near = str(data["digest"]), data.count("seed"), data.count("near")
+        rows = finite_array(data["rows"], (None, world.robot.dof), "vertices")
+        edges, states = data.whole("edges"), data.whole("states")
+        if not 1 <= near <= 100 or not _fit(edges, states, len(rows)):
+            raise InputError("its edges make no sense")
+        kept = finite_array(data["kept"], (2,), "kept").tolist() if "kept" in data else [0.0, NOT_PROVING]
+        same_checks = positive(data["resolution"], "resolution") == world.motion_resolution and kept == _kept(world)
+    except InputError as error:
+        raise InputError(f"{path}: is no roadmap of robot '{world.robot.name}': {error}") from error
+    known = edges.astype(np.int32), states.astype(np.int32)
+    found = world_digest(world.robot, world.bodies, world.pairs)
+    if digest == found and same_checks:
+        return _restored(world, rows, *known, seed=seed, near=near)
+    if moved is not True and digest != found:
+        raise InputError(f"{path}: is the roadmap of another world; load it with moved=True, or make a new one")
+    return _restored(world, rows, *known, seed=seed, near=near).moved_to(world)
+
+
+def _fit(edges: NDArray[np.int64], states: NDArray[np.int64], count: int) -> bool:
+    """Whether edges and what is known of each are those of a graph of so many vertices."""
+    if edges.ndim != 2 or edges.shape[1] != 2 or states.shape != (len(edges),):
+        return False
+    if not len(edges):
+        return True
+    return bool(0 <= edges.min() <= edges.max() < count and 0 <= states.min() <= states.max() <= BLOCKED)
+
+
+def _kept(world: World) -> list[float]:
+    """What free motions of a world keep: its clearance, and that of its proofs [m]."""
+    proving = world.settings.proving
+    return [world.settings.clearance + world.settings.inflation, NOT_PROVING if proving is None else proving]
+
+
+def _restored(
+    world: World, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32], *, seed: int, near: int
+) -> Roadmap:
+    """A roadmap from what another one had; what it adds later begins with other samples."""
+    made = Roadmap(world, vertices=0, seed=seed, near=near)
+    made.graph = graph_in(world, *_box(world.robot), near=near, seed=seed + len(rows), checks=world)
+    made.graph.restore(rows, edges, states)
+    return made
+
+
+def _box(robot: Robot) -> tuple[Vector, Vector]:
+    """Where vertices lie: inside the limits; joints without limits within a turn of 0 either way."""
+    return np.where(robot.continuous, -TAU, robot.lower), np.where(robot.continuous, TAU, robot.upper)
+
+
+def _nearest(rows: Matrix, row: Vector) -> Vector:
+    nearest: Vector = rows[np.linalg.norm(rows - row, axis=1).argmin()]
+    return nearest

@@ -1,0 +1,182 @@
+"""A roadmap in Python, for any motion check; :mod:`rrtik_ompl.kernels.search.roadmap.kernels` is its twin in kernels."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, SURE, UNKNOWN
+from rrtik_ompl.world.motion_queries import MotionFree, Stop
+
+ROOT = -1  # by which edge a start was reached
+
+
+class PythonGraph:
+    """A roadmap whose searches run in Python; see :class:`rrtik_ompl.kernels.search.roadmap.graph.KernelGraph`.
+
+    Args:
+        lower, upper: The box of configurations, shape (n,), finite.
+        near: With how many of the vertices near it a new one is joined, at least 1.
+        seed: Of the samples.
+        valid: Whether a configuration, shape (n,), is free.
+        motion_free: Whether a straight motion is free.
+    """
+
+    def __init__(
+        self,
+        lower: Vector,
+        upper: Vector,
+        *,
+        near: int,
+        seed: int,
+        valid: Callable[[Vector], bool],
+        motion_free: MotionFree,
+    ) -> None:
+        self._box, self._near, self._rng = (lower, upper), near, np.random.default_rng(seed)
+        self._valid, self._motion_free = valid, motion_free
+        self._rows: Matrix = np.empty((0, len(lower)))
+        self._edges: list[tuple[int, int]] = []
+        self._states: list[int] = []
+        self._leaving: list[list[int]] = []  # edges of each vertex
+        self.samples = self.motions = 0
+
+    @property
+    def size(self) -> int:
+        """Number of vertices."""
+        return len(self._rows)
+
+    @property
+    def rows(self) -> Matrix:
+        """The vertices, shape (size, n); a copy."""
+        return self._rows.copy()
+
+    @property
+    def edges(self) -> NDArray[np.int32]:
+        """Pairs of vertices, shape (m, 2)."""
+        return np.array(self._edges, dtype=np.int32).reshape(-1, 2)
+
+    @property
+    def states(self) -> NDArray[np.int32]:
+        """What is known of the edges, shape (m,): UNKNOWN, SURE or BLOCKED."""
+        return np.array(self._states, dtype=np.int32)
+
+    def restore(self, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32]) -> None:
+        """Fill an empty roadmap with what another one gave."""
+        for row in rows:
+            self._add(row)
+        for (first, second), state in zip(edges.tolist(), states.tolist(), strict=True):
+            self._join(first, second)
+            self._states[-1] = state
+
+    def grow(self, wanted: int, stop: Stop) -> int:
+        """Add free samples until there are ``wanted`` more, or it is time to stop; how many were added."""
+        added = 0
+        while added < wanted and not stop():
+            self.samples += 1
+            row = self._rng.uniform(*self._box)
+            if self._valid(row):
+                self._add_near(row, self.size)
+                added += 1
+        return added
+
+    def learn(self, path: Matrix) -> int:
+        """Make the rows of a free path, shape (k, n), vertices; how many."""
+        for k, row in enumerate(path):
+            before = self.size
+            self._add_near(row, before)
+            if k > 0:
+                self._join(before - 1, before)
+        return len(path)
+
+    def check(self, stop: Stop) -> None:
+        """Check all edges that nobody has looked at, until it is time to stop."""
+        for edge in range(len(self._edges)):
+            if stop():
+                return
+            self._blocked(edge)
+
+    def doubt(self) -> None:
+        """Forget what is known of the edges, since an obstacle has moved."""
+        self._states = [UNKNOWN] * len(self._states)
+
+    def route(self, starts: Matrix, goals: Matrix, stop: Stop) -> Matrix | None:
+        """The shortest path on the roadmap from a start to a goal, shape (k, n); None if there is none in time."""
+        mapped, edges = self.size, len(self._edges)
+        ends = np.concatenate([starts, goals])
+        for k, row in enumerate(ends):
+            self._add_near(row, mapped)
+            for start in range(len(starts) if k >= len(starts) else 0):
+                self._join(mapped + start, mapped + k)
+        found = self._search(range(mapped, mapped + len(starts)), goals, stop)
+        path = None if found is None else self._rows[found].copy()
+        while len(self._edges) > edges:
+            for vertex in self._edges.pop():
+                self._leaving[vertex].pop()
+            self._states.pop()
+        self._rows, self._leaving = self._rows[:mapped], self._leaving[:mapped]
+        return path
+
+    def statistics(self) -> dict[str, int | float]:
+        """Counts since the roadmap was made."""
+        counts = {"vertices": self.size, "edges": len(self._edges)}
+        return {**counts, "motions": self.motions, "iterations": self.samples}
+
+    def _search(self, starts: range, goals: Matrix, stop: Stop) -> list[int] | None:
+        """Vertices of the shortest path from a start to the last vertices, which are the goals."""
+        ahead = np.linalg.norm(self._rows[:, None] - goals, axis=2).min(axis=1)
+        heap: list[tuple[float, float, int, int]] = [(float(ahead[start]), 0.0, start, ROOT) for start in starts]
+        heapq.heapify(heap)
+        came: dict[int, int] = {}
+        while heap and not stop():
+            _, cost, vertex, edge = heapq.heappop(heap)
+            if vertex in came or (edge != ROOT and self._blocked(edge)):
+                continue
+            came[vertex] = edge
+            if vertex >= self.size - len(goals):
+                return self._traced(vertex, came)
+            for leaving in self._leaving[vertex]:
+                head = self._other(leaving, vertex)
+                if head not in came:
+                    reached = cost + float(np.linalg.norm(self._rows[head] - self._rows[vertex]))
+                    heapq.heappush(heap, (reached + float(ahead[head]), reached, head, leaving))
+        return None
+
+    def _traced(self, vertex: int, came: dict[int, int]) -> list[int]:
+        found = [vertex]
+        while came[vertex] != ROOT:
+            vertex = self._other(came[vertex], vertex)
+            found.append(vertex)
+        return found[::-1]
+
+    def _other(self, edge: int, vertex: int) -> int:
+        first, second = self._edges[edge]
+        return second if vertex == first else first
+
+    def _blocked(self, edge: int) -> bool:
+        if self._states[edge] == UNKNOWN:
+            self.motions += 1
+            first, second = self._edges[edge]
+            self._states[edge] = SURE if self._motion_free(self._rows[first], self._rows[second]) else BLOCKED
+        return self._states[edge] == BLOCKED
+
+    def _add(self, row: Vector) -> int:
+        self._rows = np.vstack([self._rows, row])
+        self._leaving.append([])
+        return self.size - 1
+
+    def _add_near(self, row: Vector, below: int) -> None:
+        """Add a vertex, joined with those nearest to it among the first ``below`` ones."""
+        near = np.argsort(np.linalg.norm(self._rows[:below] - row, axis=1), kind="stable")[: self._near]
+        vertex = self._add(row)
+        for other in near.tolist():
+            self._join(vertex, other)
+
+    def _join(self, first: int, second: int) -> None:
+        for vertex in (first, second):
+            self._leaving[vertex].append(len(self._edges))
+        self._edges.append((first, second))
+        self._states.append(UNKNOWN)

@@ -1,0 +1,156 @@
+"""RRT-Connect in Python, for any motion check; :mod:`rrtik_ompl.kernels.search.connect_kernels` is its twin in kernels.
+
+Sources: [4]; the smaller tree grows: [5]; the dynamic domain, in which a vertex that was blocked is extended: [6].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.planning.search.tree import ConfigurationTree
+from rrtik_ompl.world.motion_queries import MotionFree, Stop
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConnectRules:
+    """How the trees grow.
+
+    Attributes:
+        lower, upper: The box in which samples are drawn, shape (n,).
+        max_edge: Length of an edge at most [unit of the space].
+        domain: Radius within which a vertex is extended once an extension of it was blocked; +inf: as before.
+        balanced: Whether the smaller tree grows next; otherwise they take turns.
+        max_iterations: Samples at most, None for no limit.
+    """
+
+    lower: Vector
+    upper: Vector
+    max_edge: float
+    domain: float = np.inf
+    balanced: bool = False
+    max_iterations: int | None = None
+
+
+class RrtConnect:
+    """A search between two sets of configurations.
+
+    Attributes:
+        trees: From the starts and from the goals.
+        iterations: Samples drawn so far.
+
+    Args:
+        starts: Free configurations, shape (s, n).
+        goals: Free configurations, shape (g, n).
+        rules: How the trees grow.
+        motion_free: Whether a straight motion is free.
+        rng: Draws the samples.
+    """
+
+    def __init__(
+        self, starts: Matrix, goals: Matrix, rules: ConnectRules, motion_free: MotionFree, rng: np.random.Generator
+    ) -> None:
+        self.trees = ConfigurationTree(starts), ConfigurationTree(goals)
+        self.iterations = 0
+        self._rules, self._motion_free, self._rng = rules, motion_free, rng
+        self._side = 1  # of the tree that grew last
+        self._limit = np.inf if rules.max_iterations is None else rules.max_iterations
+
+    @property
+    def vertices(self) -> int:
+        """Vertices of both trees."""
+        return sum(tree.size for tree in self.trees)
+
+    def run(self, stop: Stop) -> Matrix | None:
+        """Grow until the trees meet: the path from a start to a goal, shape (k, n); None if the search has ended first.
+
+        Args:
+            stop: Called before every sample and every edge; true ends the search.
+        """
+        rules, motion_free = self._rules, self._motion_free
+        lower, extent = rules.lower, rules.upper - rules.lower
+        while not stop() and self.iterations < self._limit:
+            self.iterations += 1
+            side = self._side = self._next_side()
+            growing, other = self.trees[side], self.trees[1 - side]
+            vertex = extend(growing, lower + extent * self._rng.random(len(lower)), rules, motion_free)
+            if vertex is None:
+                continue
+            met = reach(other, growing.row(vertex), rules, motion_free, stop)
+            if met is not None:
+                ends = (vertex, met) if side == 0 else (met, vertex)
+                return path_between(self.trees[0].branch(ends[0]), self.trees[1].branch(ends[1]))
+        return None
+
+    def _next_side(self) -> int:
+        """Number of the tree that grows next."""
+        side = 1 - self._side
+        larger = self.trees[side].size > self.trees[1 - side].size
+        return 1 - side if self._rules.balanced and larger else side
+
+
+def straight_path(starts: Matrix, goals: Matrix, motion_free: MotionFree, stop: Stop) -> Matrix | None:
+    """A straight motion from the nearest start to a goal, shape (2, n) or (1, n) if they are one; None if none is free.
+
+    Args:
+        starts: Shape (s, n).
+        goals: Shape (g, n), tried in this order.
+        motion_free: Whether a straight motion is free.
+        stop: Called before every motion; true leaves it out.
+    """
+    for goal in goals:
+        start = starts[np.linalg.norm(starts - goal, axis=1).argmin()]
+        if (start == goal).all() or (not stop() and motion_free(start, goal)):
+            return path_between(start[None], goal[None])
+    return None
+
+
+def extend(tree: ConfigurationTree, sample: Vector, rules: ConnectRules, motion_free: MotionFree) -> int | None:
+    """EXTEND: an edge from the nearest vertex towards a sample, shape (n,); the new vertex, or None.
+
+    A vertex that was blocked before takes only samples within the domain.
+    """
+    near = tree.nearest(sample)
+    start = tree.row(near)
+    length = float(np.linalg.norm(sample - start))
+    if length == 0.0 or length > tree.radii[near]:
+        return None
+    end = _towards(start, sample, length, rules.max_edge)
+    if motion_free(start, end):
+        return tree.add(end, near)
+    tree.radii[near] = rules.domain
+    return None
+
+
+def reach(
+    tree: ConfigurationTree, target: Vector, rules: ConnectRules, motion_free: MotionFree, stop: Stop
+) -> int | None:
+    """CONNECT: edges towards a target, shape (n,), until one is blocked.
+
+    Returns:
+        The vertex from which the target itself is reached, which is not added to the tree; None if it is not reached.
+    """
+    vertex = tree.nearest(target)
+    while not stop():
+        start = tree.row(vertex)
+        length = float(np.linalg.norm(target - start))
+        end = _towards(start, target, length, rules.max_edge)
+        if length > 0.0 and not motion_free(start, end):
+            return None
+        if length <= rules.max_edge:
+            return vertex
+        vertex = tree.add(end, vertex)
+    return None
+
+
+def path_between(first: Matrix, second: Matrix) -> Matrix:
+    """A branch from a start, then a branch from a goal in reverse, shapes (k, n); an end of both occurs once."""
+    shared = bool((first[-1] == second[-1]).all())
+    return np.vstack([first, second[::-1][int(shared) :]])
+
+
+def _towards(start: Vector, end: Vector, length: float, most: float) -> Vector:
+    """The end, or the point at a distance of ``most`` from the start on the straight line to it."""
+    return end if length <= most else start + (end - start) * (most / length)

@@ -1,0 +1,287 @@
+"""Post-processing behind one interface: a valid path in, a path with the same ends that is no worse out."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, positive, whole_number
+from rrtik_ompl.base.choices import ShorteningMethod, one_of
+from rrtik_ompl.base.errors import InputError, PathWarning, called, require
+from rrtik_ompl.description.joint_weights import weights_of
+from rrtik_ompl.ompl_bridge.simplify import simplified
+from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
+from rrtik_ompl.planning.moves.axis_cut import double_axis_cut
+from rrtik_ompl.planning.moves.axis_cut_rounds import axis_cut_rounds
+from rrtik_ompl.planning.moves.rules import MoveRules
+from rrtik_ompl.planning.shortening.acceptance import Acceptance, Form
+from rrtik_ompl.planning.shortening.along_constraints import along_constraints
+from rrtik_ompl.planning.shortening.best import best_in_time
+from rrtik_ompl.planning.shortening.corners import snap_corners
+from rrtik_ompl.planning.shortening.random_cut import random_cut, shortcut
+from rrtik_ompl.planning.shortening.retraction import retract
+from rrtik_ompl.planning.shortening.sequential import sequential_cut
+from rrtik_ompl.planning.shortening.task import Task
+from rrtik_ompl.world.kept_clearance import check_route_clearance
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
+
+__all__ = ["METHODS", "Method", "MoveRules", "Task", "shorten"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Method:
+    """A method of shortening.
+
+    Attributes:
+        run: Shortens a route, shape (k, n), of a problem, as a task says.
+        keeps_moves: Whether a path of single-joint moves stays one, wanted or not, and has no more moves afterwards;
+            its length may grow then.
+        can_keep_moves: Whether it stays one if that is wanted.
+        moves_only: Whether it takes nothing but such a path.
+        leaves_room: Whether it keeps a clearance itself, where that costs no move.
+        samples: Whether it checks motions in steps, by the problem's world alone.
+        chooses: Whether it leaves single-joint moves to other methods, and takes no path that is longer.
+    """
+
+    run: Callable[[Matrix, Task, Problem], Matrix]
+    keeps_moves: bool = False
+    can_keep_moves: bool = True
+    moves_only: bool = False
+    leaves_room: bool = False
+    samples: bool = False
+    chooses: bool = False
+
+
+def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
+    rows, checked = simplified(problem, route, seconds=task.seconds_left, seed=task.seed)
+    task.asked += checked
+    return rows
+
+
+def _axis(route: Matrix, task: Task, _: Problem) -> Matrix:
+    return double_axis_cut(route, task.free_batch, stop=task.expired)
+
+
+def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
+    return axis_cut_rounds(route, task.free_batch, seed=task.seed, stop=task.expired)
+
+
+def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
+    from rrtik_ompl.planning.shortening.fewest_moves import fewest_moves  # many paths are shortened without its search
+
+    return fewest_moves(
+        route, problem.world, seed=task.seed, stop=task.expired, rules=task.rules, clearance=task.clearance
+    ).route
+
+
+METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
+    {
+        "axis": Method(_axis, keeps_moves=True),
+        "axis-rounds": Method(_axis_rounds, keeps_moves=True),
+        "fewest-moves": Method(_fewest_moves, keeps_moves=True, moves_only=True, leaves_room=True),
+        "sequential": Method(lambda route, task, _: sequential_cut(route, task)),
+        "random": Method(lambda route, task, _: random_cut(route, task)),
+        "shortcut": Method(lambda route, task, _: shortcut(route, task)),
+        "retraction": Method(lambda route, task, _: retract(route, task)),
+        "corners": Method(lambda route, task, _: snap_corners(route, task), can_keep_moves=False),
+        "ompl": Method(_ompl, can_keep_moves=False, samples=True),
+        "auto": Method(lambda route, task, _: best_in_time(route, task), chooses=True),
+    }
+)
+_HELD = Method(along_constraints, can_keep_moves=False, samples=True)  # in place of these, under path constraints
+_CUTS = ("auto", "random", "shortcut")
+_SINGLE_JOINT = METHODS["fewest-moves"], METHODS["axis-rounds"]  # in whose place "auto" is asked for single-joint moves
+
+
+def shorten(
+    path: JointPath,
+    problem: Problem,
+    *,
+    method: ShorteningMethod = "auto",
+    seconds: float | None = None,
+    checks: int | None = None,
+    seed: int = 0,
+    one_joint: bool | None = None,
+    rules: MoveRules | None = None,
+    on_better: Callable[[JointPath], object] | None = None,
+    stop: Callable[[], bool] | None = None,
+    clearance: float | None = None,
+) -> JointPath:
+    """Shorten a path of a problem.
+
+    Args:
+        path: A valid path of the problem.
+        problem: Its world checks the new motions.
+        method: "auto" pulls several cut paths taut and is the best choice for straight motions; single-joint moves it
+            leaves to "fewest-moves". "axis" is the published double axis cut: fewer moves of one joint at a time.
+            "axis-rounds" goes on with twenty passes in random joint orders: fewer moves still, several times as long.
+            Both return a path as it is, with a warning, if it moves several joints at once. "fewest-moves" takes
+            single-joint moves and looks for the fewest, with the least travel among those. "sequential", "random" and
+            "retraction" are the published methods for straight motions: quick, simple, and near the shortest path of
+            the same class. "corners" pulls every bend to the corner that it goes round: nearer to that shortest path
+            than "retraction" in its finest steps, with fewer checks. "shortcut" is a random cut that takes waypoints
+            as ends too and pulls them straight. "ompl" is OMPL's PathSimplifier.
+        seconds: Limit of wall time [s]. With one, random methods go on until nothing is gained any more; without one
+            they make a fixed number of tries, so that a seed always gives the same path.
+        checks: Most motions that are checked (tries, in random methods), a limit that always gives the same path: 100
+            take some milliseconds. None for no such limit; "ompl" and "fewest-moves" know no other than time.
+        seed: Of the random methods.
+        one_joint: Keep a path of single-joint moves one: fewer moves first, length second. None: "auto" does.
+        rules: What the path, of single-joint moves, keeps to and has to keep to: joints that must not move or move
+            last, the smallest move, costs. Its last moves, of the joints that move last, stay as they are.
+        on_better: Called with every better path in between; these have not yet passed the second check.
+        stop: Called from time to time; True ends the work, and the best so far is returned.
+        clearance: What the new motions keep from every obstacle on top of its margin [m]. None: 1 mm, or what the ends
+            of the path have; with "fewest-moves" 1 cm where that costs no move.
+
+    Under path constraints "auto", "random" and "shortcut" walk along them from one place of the path to another.
+
+    Returns:
+        A path with the same ends, and with its proof. If the input is proven free so is the result, with the clearance
+        if the input has it: what is not gets a detour, or else only proven motions are used; if that does not help,
+        the input is returned. It is not longer than the input (:func:`rrtik_ompl.weighted` where joints have weights),
+        and where one joint moves at a time it has no more moves.
+
+    Raises:
+        UnknownNameError: If there is no such method.
+        InputError: If the path is not valid for the problem, does not keep to the rules or has one waypoint, a limit
+            is not positive, the seed is negative, the method cannot do it, or an end of the path cannot keep the
+            clearance.
+
+    Example:
+        >>> problem = rrtik.load_problem("planar3_boxes")
+        >>> found = rrtik.plan(problem, "RRTConnect", seed=1)
+        >>> rrtik.shorten(found.path, problem).length < found.path.length
+        True
+    """
+    require(path, JointPath, "path to shorten", "a plan has one if plan.found")
+    require(rules, MoveRules | None, "rules of a path to shorten")
+    require(one_joint, bool | None, "one_joint")
+    require(method, str, "shortening method", "such as 'auto'")
+    if on_better is not None:
+        called(on_better, "on_better", "a path")
+    if stop is not None:
+        called(stop, "stop")
+    single = _single(path, method, one_joint) or rules is not None
+    chosen = _checked(path, problem, method, seconds, checks, seed, single, clearance)
+    head, tail = _parts(path.waypoints, rules)
+    if len(head) < 2:
+        return path
+    if chosen.keeps_moves and not path.one_joint_at_a_time:
+        remedy = "use auto, or one_joint_moves(path, problem) first"
+        message = f"shortening method '{method}' is for single-joint moves, so the path stays as it is: {remedy}"
+        warnings.warn(PathWarning(message), stacklevel=2)
+        return _with_proof(path, problem)
+    given: dict[str, Any] = {"checks": np.inf if checks is None else checks, "seed": seed, "one_joint": single}
+    given |= {"rules": rules, "clearance": clearance, "stop": stop}
+    if on_better is not None:
+        given["on_better"] = lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail])))
+    end = time.monotonic() + (np.inf if seconds is None else float(seconds))
+    for each in _SINGLE_JOINT if chosen.chooses and single else (chosen,):
+        found = _shortened(path, problem, each, (head, tail), given, end)
+        if not chosen.chooses or found.length <= path.length:
+            return found
+    return _with_proof(path, problem)
+
+
+def _with_proof(path: JointPath, problem: Problem) -> JointPath:
+    """The path with what is proven of it."""
+    return path if path.proven_in(problem.world) else path.proved(problem.world)
+
+
+def _shortened(
+    path: JointPath,
+    problem: Problem,
+    chosen: Method,
+    parts: tuple[Matrix, Matrix],
+    given: Mapping[str, Any],
+    end: float,
+) -> JointPath:
+    """The path after a method, in the first form of the problem in which that leads to one that is accepted."""
+    head, tail = parts
+    rules, single = given["rules"], given["one_joint"] or chosen.keeps_moves
+    traits = {"leaves_room": chosen.leaves_room, "samples": chosen.samples}
+    acceptance = Acceptance(path, problem, given["clearance"], one_joint=single, seed=given["seed"], **traits)
+    for form in acceptance.forms():
+        limited = {**given, "seconds": form.share * (end - time.monotonic())}
+        task, found = _run(chosen, form, head, limited, single)
+        rows = np.vstack([found, tail])
+        if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
+            continue
+        shorter = acceptance.accepted(path.with_waypoints(rows))
+        counted = 1.0 if single else weights_of(problem.robot)
+        before, after = (task.rank(each.waypoints * counted) for each in (path, shorter or path))
+        if shorter is None or (not chosen.keeps_moves and after > before):
+            continue
+        return shorter
+    return acceptance.input
+
+
+def _run(chosen: Method, form: Form, route: Matrix, given: Mapping[str, Any], single: bool) -> tuple[Task, Matrix]:
+    """What a method makes of a route, in coordinates in which lengths are weighted where joints have weights."""
+    if single or not has_weights(form.problem):
+        task = Task(form.motions, **given)
+        return task, chosen.run(route, task, form.problem)
+    weighted, on_better = WeightedProblem(form.problem, form.motions), given.get("on_better")
+    if on_better is not None:
+        given = {**given, "on_better": lambda rows: on_better(weighted.back(rows, route[[0, -1]]))}
+    task = Task(weighted.problem.world, **given)
+    return task, weighted.back(chosen.run(weighted.there(route), task, weighted.problem), route[[0, -1]])
+
+
+def _single(path: JointPath, method: ShorteningMethod, one_joint: bool | None) -> bool:
+    """Whether the moves of a path have to stay single-joint moves."""
+    return one_joint if one_joint is not None else method == "auto" and path.one_joint_at_a_time
+
+
+def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
+    """A route up to where the joints that move last begin, and the rest."""
+    if rules is None:
+        return route, route[:0]
+    if not rules.kept_by(route):
+        raise InputError("path to shorten: it does not keep to the rules that it is to keep to")
+    return route[: rules.head(route)], route[rules.head(route) :]
+
+
+def _method(name: ShorteningMethod, problem: Problem, one_joint: bool) -> Method:
+    """The method of a name, or what takes its place under path constraints."""
+    chosen = METHODS[one_of(METHODS, name, "shortening method")]
+    return _HELD if problem.constraints and name in _CUTS and not one_joint else chosen
+
+
+def _checked(
+    path: JointPath,
+    problem: Problem,
+    method: ShorteningMethod,
+    seconds: float | None,
+    checks: int | None,
+    seed: int,
+    one_joint: bool,
+    clearance: float | None,
+) -> Method:
+    """The method, if the request makes sense."""
+    require(problem, Problem, "problem of a path to shorten")
+    chosen = _method(method, problem, one_joint)
+    if seconds is not None:
+        positive(seconds, "seconds")
+    if checks is not None and whole_number(checks, "checks") < 1:
+        raise InputError("checks must be 1 or more, got 0")
+    whole_number(seed, "seed")
+    if len(path.waypoints) < 2:
+        raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
+    faults = () if path.proven_in(problem.world) else path.violations(problem.world)
+    if faults:
+        raise InputError(f"path to shorten: motion {faults[0].edge + 1} is not valid: {faults[0].reason}")
+    check_route_clearance(problem.world, clearance, path.waypoints)
+    if one_joint and not path.one_joint_at_a_time:
+        raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
+    if one_joint and not chosen.can_keep_moves:
+        raise InputError(f"shortening method '{method}' cannot keep one joint at a time; use axis or auto")
+    return chosen

@@ -1,0 +1,124 @@
+"""Which shortened paths may be returned: proven ones with the clearance, or what is no worse than the input in that."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rrtik_ompl.planning.moves.clearance_levels import roomiest
+from rrtik_ompl.world.detours import with_detours
+from rrtik_ompl.world.kept_clearance import keeping, room_between
+from rrtik_ompl.world.motion_queries import MotionQueries
+from rrtik_ompl.world.path import JointPath, proved_as_clear
+from rrtik_ompl.world.problem import Problem, densely_checked
+from rrtik_ompl.world.proven_motions import proven_motions
+from rrtik_ompl.world.world import World
+
+SPARE = 2.5e-4  # [m] beyond the clearance that searches keep if the ends have it: chords of timed motions need 0.1 mm
+
+
+class Form(NamedTuple):
+    """A form of the problem in which to shorten.
+
+    Attributes:
+        problem: With a world that checks what methods check themselves.
+        motions: What the others ask.
+        share: Of the time left.
+    """
+
+    problem: Problem
+    motions: MotionQueries
+    share: float
+
+
+class Acceptance:
+    """The second check of shortened paths.
+
+    Attributes:
+        input: The given path, with what is proven of it.
+
+    Args:
+        path: Given, valid.
+        problem: What it solves.
+        clearance: To be kept [m]; None for a millimetre, or what the ends of the path have.
+        one_joint: Whether its moves of one joint have to stay such, so that there are no detours.
+        seed: Of the detours.
+        leaves_room: Whether the method keeps a clearance itself, where that costs no move.
+        samples: Whether the method checks motions in steps, by the problem's world alone.
+    """
+
+    def __init__(
+        self,
+        path: JointPath,
+        problem: Problem,
+        clearance: float | None,
+        *,
+        one_joint: bool,
+        seed: int,
+        leaves_room: bool = False,
+        samples: bool = False,
+    ) -> None:
+        self._leaves_room, self._samples = leaves_room, samples
+        self._problem, self._one_joint, self._seed = problem, one_joint, seed
+        room = roomiest if leaves_room else room_between
+        self._room = room(problem.world, path.waypoints[[0, -1]], clearance)
+        known = path.proven_in(problem.world) and self._keeps(path)
+        self.input = path if known else self._proved(path)
+        self._input_keeps = self._keeps(self.input)
+
+    def forms(self) -> list[Form]:
+        """The problem in the forms in which to shorten, one after the other.
+
+        What is as short as can be touches what it goes round, so motions must be proven to count as free. Methods that
+        ask the world alone check as densely as the second check, with room to spare; then with proofs too. Where the
+        input does not keep the clearance, neither may help.
+        """
+        dense = densely_checked(self._problem)
+        if self._leaves_room:
+            return [Form(dense, dense.world, 1.0)]
+        found = []
+        wider = 0.0 if self._room is None else min(self._room.searched, self._room.kept + SPARE)
+        if self._room is not None and self._samples:
+            roomy = keeping(dense.world, wider)
+            proving = keeping(dense.world, wider, proven=self._room.kept)
+            found = [self._sampled(dense, roomy, 0.7), self._sampled(dense, proving, self._last)]
+        elif self._room is not None:
+            found = [Form(dense, proven_motions(dense.world, wider, self.input.waypoints), self._last)]
+        if not self._input_keeps:
+            found.append(Form(dense, dense.world, 1.0))
+        return found
+
+    @property
+    def _last(self) -> float:
+        """The share of the last form that leaves room."""
+        return 1.0 if self._input_keeps else 0.5
+
+    def _sampled(self, dense: Problem, world: World, share: float) -> Form:
+        return Form(dense.with_world(world), world, share)
+
+    def accepted(self, shorter: JointPath) -> JointPath | None:
+        """The path, with what is proven of it and with detours where it needs them, or None."""
+        proved = self._proved(shorter)
+        if self._keeps(proved):
+            return proved
+        if self._room is not None and not self._one_joint:
+            rng = np.random.default_rng(self._seed)
+            rows = with_detours(self._problem.world, shorter.waypoints, clearance=self._room.kept, rng=rng)
+            if rows is not None:
+                return self._proved(shorter.with_waypoints(rows))
+        if self._leaves_room and proved.proven:
+            return proved
+        if self._input_keeps or (self.input.proven and not proved.proven):
+            return None
+        return None if shorter.violations(self._problem.world) else proved
+
+    def _proved(self, path: JointPath) -> JointPath:
+        """The path with a proof of the clearance, or of less."""
+        kept = 0.0 if self._room is None else self._room.kept
+        return proved_as_clear(path, self._problem.world, kept)
+
+    def _keeps(self, proved: JointPath) -> bool:
+        """Whether a path is proven to keep the clearance."""
+        proof = proved.proof
+        return self._room is not None and proof is not None and proof.proven and proof.clearance >= self._room.kept

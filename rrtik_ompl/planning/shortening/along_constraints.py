@@ -1,0 +1,58 @@
+"""Shortcuts under path constraints: a walk along the regions from one waypoint straight towards a later one.
+
+Source: the shortcuts of [17, section 5] for paths of CBiRRT2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.ik.held_tables import held_tables
+from rrtik_ompl.kernels.search.constrained.search import ConstrainedSearch
+from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.planning.shortening.task import Task
+from rrtik_ompl.world.motion_queries import HoldingQueries, decider, keeps_constraints
+from rrtik_ompl.world.problem import Problem
+
+TRIES = 200  # where there is no end to the time
+PATIENCE = 40  # tries without gain that end the work
+SHORTER = 1e-6  # [rad or m] by which a way must be
+
+
+def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
+    """Random shortcuts of a route, shape (k, n), each a walk along the constraints of a problem.
+
+    The whole way is tried first. Where the world has no kernels the route stays as it is.
+    """
+    world = problem.world
+    if not keeps_constraints(world) or (motions := world.free_motions) is None:
+        return route
+    tables = held_tables(world.robot, world.constraints)
+    if tables is None:
+        return route
+    lower, upper = _box(world, route)
+    search = ConstrainedSearch(motions, tables.address, lower, upper, shortest=tables.shortest)
+    ask = decider(world, world.motion_valid_batch)
+    rng, failures = np.random.default_rng(task.seed), 0
+    pair = (0, len(route) - 1)
+    for _ in range(TRIES):
+        if failures >= PATIENCE or len(route) < 3 or task.expired():
+            break
+        i, j = pair
+        way = search.connect(route[i], route[j], ask=ask) if j > i + 1 else None
+        task.asked += int(search.statistics()["motions"])
+        failures += 1
+        if way is not None and route_length(way) < route_length(route[i : j + 1]) - SHORTER:
+            route, failures = np.vstack([route[:i], way, route[j + 1 :]]), 0
+            task.report(route)
+        first, second = rng.integers(len(route), size=2)
+        pair = int(min(first, second)), int(max(first, second))
+    return route
+
+
+def _box(world: HoldingQueries, route: Matrix) -> tuple[Vector, Vector]:
+    """Finite bounds around a route, within the limits, shapes (n,)."""
+    lower = np.maximum(world.robot.lower, route.min(axis=0) - np.pi)
+    upper = np.minimum(world.robot.upper, route.max(axis=0) + np.pi)
+    return lower, upper

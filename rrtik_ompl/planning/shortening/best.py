@@ -1,0 +1,92 @@
+"""The best that several methods find together: a few starts, each pulled taut, then rounds of shortcuts and pulling.
+
+Few bends are pulled taut in a few dozen checks, so every start is first cut to a handful of waypoints. Where a route is
+taut only new bends can make it shorter: random shortcuts make them. All of it counts checks, not time.
+"""
+
+from __future__ import annotations
+
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.kernels.search.taut import layout
+from rrtik_ompl.kernels.search.taut.tightening import Tightening
+from rrtik_ompl.model.transitions import length_of, route_length
+from rrtik_ompl.planning.moves.axis_cut_rounds import axis_cut_rounds
+from rrtik_ompl.planning.shortening.random_cut import PULLS, WAYPOINTS, kernel_search, random_cut, run
+from rrtik_ompl.planning.shortening.retraction import STEPS, retract
+from rrtik_ompl.planning.shortening.sequential import sequential_cut
+from rrtik_ompl.planning.shortening.task import Task
+from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels
+
+STARTS = 3  # random shortcuts end in different classes of routes
+START_TRIES = 20  # shortcuts of a start
+START_CHECKS = 60  # motions that are checked to pull a start taut, as far as that goes
+ROUND_TRIES = 60  # shortcuts of a round
+ROUND_CHECKS = 60  # motions that are checked to pull it taut, at most
+ROUNDS_WITHOUT_LIMIT = 4  # where there is no end to time or checks
+LEAST_GAIN = 1e-4  # of the length, or a round gained nothing
+IDLE_ROUNDS = 6  # without gain end the work
+FINEST = 16  # times finer than usual are the steps of the last retraction where there are no kernels
+
+
+def best_in_time(route: Matrix, task: Task) -> Matrix:
+    """Shorten a route, shape (k, n), by whatever helps."""
+    if task.one_joint:
+        return task.better(route, axis_cut_rounds(route, task.free_batch, seed=task.seed, stop=task.expired))
+    world = task.kernel_world
+    if len(route) < 3 or world is None or not has_kernels(world, layout.KERNELS):
+        return _without_kernels(route, task)
+    best = _best_start(route, task, world)
+    rounds = idle = 0
+    while not task.expired() and idle < IDLE_ROUNDS and (task.bounded or rounds < ROUNDS_WITHOUT_LIMIT):
+        seed = STARTS + rounds
+        found = _taut(_cut(best, task, seed, ROUND_TRIES, PULLS), task, world, seed, ROUND_CHECKS)
+        rounds += 1
+        idle = idle + 1 if length_of(found) > (1.0 - LEAST_GAIN) * length_of(best) else 0
+        best = task.better(best, found)
+        task.report(best)
+    return best
+
+
+def _best_start(route: Matrix, task: Task, world: KernelWorld) -> Matrix:
+    """The best of several starts: the published cut from waypoint to waypoint, and random shortcuts."""
+    first = sequential_cut(route, task)
+    best = task.better(route, _taut(first, task, world, 0, ROUND_CHECKS))
+    task.report(best)
+    for start in range(1, STARTS):
+        if task.expired():
+            break
+        best = task.better(best, _taut(_cut(route, task, start, START_TRIES, 0.0), task, world, start, START_CHECKS))
+        task.report(best)
+    return best
+
+
+def _cut(route: Matrix, task: Task, seed: int, tries: int, pull: float) -> Matrix:
+    """The route after some random shortcuts."""
+    search = kernel_search(route, task, seed=_seed(task, seed), share=WAYPOINTS, pull=pull, asking=False)
+    run(search, task, tries)
+    return search.waypoints
+
+
+def _taut(route: Matrix, task: Task, world: KernelWorld, seed: int, checks: int) -> Matrix:
+    """The route pulled taut, as far as a number of checks goes."""
+    work, before = Tightening(world.motions, route, seed=_seed(task, seed)), task.asked
+
+    def stop() -> bool:
+        task.asked = before + work.checks
+        return task.expired()
+
+    work.run(int(min(checks, task.checks_left)), stop=stop)
+    task.asked = before + work.checks
+    return work.waypoints
+
+
+def _seed(task: Task, number: int) -> int:
+    return 1000 * task.seed + number
+
+
+def _without_kernels(route: Matrix, task: Task) -> Matrix:
+    """Retraction of a sequential cut or a random cut, whichever is better, and retraction of that in small steps."""
+    cut = sequential_cut(route, task)
+    found = task.better(cut, retract(cut, task))
+    found = task.better(found, random_cut(route, task))
+    return task.better(found, retract(found, task, step=route_length(found) / (STEPS * FINEST)))

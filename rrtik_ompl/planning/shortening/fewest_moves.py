@@ -1,0 +1,216 @@
+"""Fewest single-joint moves: make a route better, and say how good it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, positive
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.transitions import lower_bound, merge_moves, single_joint, transitions
+from rrtik_ompl.planning.moves.clearance_levels import Level, clearance_levels
+from rrtik_ompl.planning.moves.fine_grids import FineGrids, rounds_before
+from rrtik_ompl.planning.moves.lattice import MoveLattice
+from rrtik_ompl.planning.moves.lower_bounds import remembered, sharper_bound
+from rrtik_ompl.planning.moves.reach_bound import reach_bound
+from rrtik_ompl.planning.moves.rules import MoveRules
+from rrtik_ompl.planning.moves.search import MoveSearch, Proof
+from rrtik_ompl.world.motion_queries import Stop, no_stop
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
+
+MAX_IMPROVEMENT_ROUNDS = 10
+MAX_CELLS = 2_000_000  # of a grid
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovesFound:
+    """A route of single-joint moves, and how good it is.
+
+    Attributes:
+        route: Shape (k, n), start first.
+        moves: Its moves.
+        bound: No route between its ends has fewer.
+    """
+
+    route: Matrix
+    moves: int
+    bound: int
+
+    @property
+    def gap(self) -> int:
+        """How many moves it may have too many; 0 if it is proven that there are none."""
+        return self.moves - self.bound
+
+
+def fewest_moves(
+    waypoints: Matrix,
+    world: World,
+    *,
+    rounds: int = MAX_IMPROVEMENT_ROUNDS,
+    seed: int = 0,
+    stop: Stop = no_stop,
+    rules: MoveRules | None = None,
+    clearance: float | None = None,
+) -> MovesFound:
+    """Look for a route with fewer moves, or with as many and less travel.
+
+    It keeps a clearance where that costs no move, and its motions are proven free.
+
+    Args:
+        waypoints: A free route, shape (k, n), every edge of which moves one joint.
+        world: Checks motions.
+        rounds: Of improvement at most, after the first; the work ends earlier if it is proven that no route has fewer
+            moves. The same number and seed give the same route.
+        seed: Of all random choices.
+        stop: Called often; True ends the work, and the best so far is returned.
+        rules: Kept by the route and by what comes out. Joints that move last stay where they are.
+        clearance: Wanted from obstacles, on top of their margins [m]; None for a centimetre. Less is kept where more
+            moves would be needed, or where the ends have less.
+
+    Returns:
+        A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, and
+        more where that has been refuted (:mod:`rrtik_ompl.planning.moves.lower_bounds`), never with more than 12 such joints.
+
+    Raises:
+        InputError: If an edge moves several joints or ``rounds`` is negative.
+    """
+    rows = finite_array(waypoints, (None, world.robot.dof), "waypoints")
+    if len(rows) > 1 and not single_joint(rows[np.append(True, (np.diff(rows, axis=0) != 0.0).any(axis=1))]):
+        raise InputError(
+            "path to shorten: an edge moves several joints at once; use one_joint_moves(path, problem) first"
+        )
+    if rounds < 0:
+        raise InputError(f"rounds: expected at least 0, got {rounds}")
+    kept = MoveRules.of_robot(world.robot) if rules is None else rules
+    work = _Work(rows, world, kept, rounds, seed, stop)
+    best, bound, taken = rows, lower_bound(rows[0], rows[-1]), False
+    levels = clearance_levels(world, rows[[0, -1]], clearance)
+    for level in levels:
+        if taken and (transitions(best) == bound or stop()):
+            break
+        search = work.improved(level, best)
+        bound = max(bound, search.bound)
+        if search.route is not None and transitions(search.route) <= transitions(best) - taken:
+            best, taken = search.route, True
+    if transitions(best) > bound and rounds > 0 and not stop():
+        best, bound = work.finer(levels, best, bound)
+    return MovesFound(best, transitions(best), bound)
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What is asked of :func:`fewest_moves`."""
+
+    rows: Matrix
+    world: World
+    rules: MoveRules
+    rounds: int
+    seed: int
+    stop: Stop
+
+    @property
+    def joints(self) -> list[int]:
+        """Those that may move."""
+        resting = [*self.rules.frozen_joints, *self.rules.last_joints]
+        return [joint for joint in range(self.world.robot.dof) if joint not in resting]
+
+    @cached_property
+    def prove(self) -> Proof:
+        """A sharper bound, the same on all levels."""
+        return remembered(self.world, self.joints)
+
+    def improved(self, level: Level, offered: Matrix) -> MoveSearch:
+        """A search on a level of clearance that starts from a route, if that keeps it."""
+        search = MoveSearch(
+            self.rows[:1],
+            self.rows[-1:],
+            *turning_limits(self.world.robot, self.rows),
+            level.proving.motion_valid_batch,
+            seed=self.seed,
+            costs=self.rules.joint_costs,
+            frozen=[*self.rules.frozen_joints, *self.rules.last_joints],
+            smallest_move=self.rules.smallest_move,
+            prove=self.prove,
+            all_free=self.world.motion_valid_batch,
+        )
+        if _free(level, offered):
+            search.offer(offered)
+        search.try_corner_routes(self.stop)
+        search.improve(rounds_before(self.rounds, self.joints), self.stop)
+        return search
+
+    def finer(self, levels: list[Level], best: Matrix, bound: int) -> tuple[Matrix, int]:
+        """A better bound of the best route, and what fine grids add to it."""
+        ends, limits = (self.rows[0], self.rows[-1]), turning_limits(self.world.robot, self.rows)
+        bound = max(bound, reach_bound(self.world, self.joints, *ends, transitions(best), self.stop))
+        grids = FineGrids(self.joints, *limits, self.rules.joint_costs, self.rules.smallest_move, levels)
+        found = grids.route([ends], merge_moves(best, tolerance=0.0), bound, self.seed, self.stop)
+        if found is None:
+            return best, bound
+        search = self.improved(levels[found[1]], found[0])
+        return (best if search.route is None else search.route), max(bound, search.bound)
+
+
+def _free(level: Level, route: Matrix) -> bool:
+    """Whether a route keeps a level."""
+    return bool(level.proving.motion_valid_batch(route[:-1], route[1:]).all())
+
+
+def least_moves(problem: Problem) -> int:
+    """A lower bound of the number of single-joint moves that solve a problem whose goal is a configuration.
+
+    Raises:
+        InputError: If the goal is of another kind.
+    """
+    world, ends = problem.world, _ends(problem, "least_moves")
+    search = MoveSearch(ends[:1], ends[1:], *turning_limits(world.robot, ends), world.motion_valid_batch)
+    search.try_corner_routes()
+    if search.proven or search.bound == lower_bound(ends[0], ends[1]):  # met, or too many corners
+        return search.bound
+    return sharper_bound(world, range(world.robot.dof), ends[0], ends[1], no_stop)
+
+
+def grid_route(problem: Problem, step: float) -> Matrix | None:
+    """The route with the fewest moves on a regular grid, least travel second: the oracle of [1, ch. 6.3].
+
+    Args:
+        problem: Of at most 3 joints, its goal a configuration.
+        step: Of the grid [rad or m]; the values of start and goal are added to it.
+
+    Returns:
+        Shape (moves + 1, n); None if the grid has no route.
+
+    Raises:
+        InputError: If there are more joints, the goal is of another kind, or the grid would be too large.
+    """
+    world, ends = problem.world, _ends(problem, "grid_route")
+    if world.robot.dof > 3:
+        raise InputError(f"grid_route: expected at most 3 joints, got {world.robot.dof}")
+    positive(step, "grid_route: step")
+    lower, upper = turning_limits(world.robot, ends)
+    size = float(np.prod((upper - lower) / step + 2.0))
+    if size > MAX_CELLS:
+        raise InputError(f"grid_route: {size:.1e} cells are too many (at most {MAX_CELLS:.0e}); use a larger step")
+    limits = zip(lower, upper, ends.T, strict=True)
+    values = [np.union1d(np.linspace(low, high, int((high - low) / step) + 1), both) for low, high, both in limits]
+    lattice = MoveLattice(values, world.motion_valid_batch, np.ones(world.robot.dof))
+    return lattice.best_route(ends[0], ends[1], range(world.robot.dof))
+
+
+def _ends(problem: Problem, what: str) -> Matrix:
+    """Start and goal of a problem, shape (2, n)."""
+    if not isinstance(problem.goal, JointGoal):
+        raise InputError(f"{what}: expected a goal in joint values, got a {type(problem.goal).__name__}")
+    return np.array([problem.start, problem.goal.q])
+
+
+def turning_limits(robot: Robot, rows: Matrix) -> tuple[Vector, Vector]:
+    """Limits of the joints, shapes (n,); of those that turn for ever, one turn more than rows, shape (k, n), go."""
+    lower = np.where(np.isfinite(robot.lower), robot.lower, rows.min(axis=0) - TAU)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, rows.max(axis=0) + TAU)
+    return lower, upper

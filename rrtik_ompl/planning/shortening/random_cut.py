@@ -1,0 +1,115 @@
+"""Random cut: straight from one random place of the route to another. Source: [1, ch. 5.3, method 2].
+
+Where the world has kernels the whole loop runs in one (:mod:`rrtik_ompl.kernels.search.shortcut`): first without the
+shortcuts that the kernels cannot decide, for those take a hundred times as long, then with them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT
+from rrtik_ompl.kernels.search.shortcut import ShortcutSearch
+from rrtik_ompl.model.transitions import without_repeats
+from rrtik_ompl.planning.shortening.task import Task
+from rrtik_ompl.world.motion_queries import decider
+
+TRIES = 400  # where there is no end to the time
+PATIENCE = 2000  # tries without gain that end the search where there is one
+TRIES_PER_CALL = 64  # of the kernel, until the task may end it
+WAYPOINTS, PULLS = 0.5, 0.3  # what shortcuts do beyond the published random cut: see the kernel
+
+
+def random_cut(route: Matrix, task: Task, *, tries: int = TRIES) -> Matrix:
+    """The published random cut of a route, shape (k, n): both ends of a cut are uniform in arc length."""
+    return _cut(route, task, tries, share=0.0, pull=0.0)
+
+
+def shortcut(route: Matrix, task: Task, *, tries: int = TRIES) -> Matrix:
+    """Random cuts whose ends may be waypoints too, and (in a kernel) pulls of single waypoints."""
+    return _cut(route, task, tries, share=WAYPOINTS, pull=PULLS)
+
+
+def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) -> Matrix:
+    limit = NO_LIMIT if task.bounded else tries
+    if task.kernel_world is None or len(route) < 3:
+        return _plain(route, task, limit, share)
+    for asking in (False, True):
+        search = kernel_search(route, task, seed=2 * task.seed + asking, share=share, pull=pull, asking=asking)
+        run(search, task, limit)
+        route = task.better(route, without_repeats(search.waypoints))
+    return route
+
+
+def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: float, asking: bool) -> ShortcutSearch:
+    """A search in the kernels of a task's world, which must have them; it asks where the world decides anything."""
+    world = task.kernel_world
+    assert world is not None
+    return ShortcutSearch(
+        world.motions,
+        route,
+        seed=seed,
+        share=share,
+        pull=pull,
+        asking=asking and decider(world, task.free_batch) is not None,
+    )
+
+
+def run(search: ShortcutSearch, task: Task, tries: int, patience: int = PATIENCE) -> None:
+    """Let a search work until its tries, its patience or the time is up."""
+    before, known = task.asked, task.listened
+
+    def stop() -> bool:
+        task.asked = before + search.tries
+        if known:
+            task.report(search.waypoints)
+        return task.expired()
+
+    tries = int(min(tries, task.checks_left))
+    search.run(tries, patience=patience, ask=task.free_batch, stop=stop, chunk=TRIES_PER_CALL)
+    task.asked = before + search.tries
+
+
+def _plain(route: Matrix, task: Task, tries: int, share: float) -> Matrix:
+    """The loop without kernels."""
+    rng, failures = np.random.default_rng(task.seed), 0
+    route = without_repeats(route)
+    for _ in range(tries):
+        if task.expired() or failures >= PATIENCE or len(route) < 3:
+            break
+        shorter = _one_cut(route, task, rng, share)
+        failures = failures + 1 if shorter is None else 0
+        if shorter is not None:
+            route = shorter
+            task.report(route)
+    return route
+
+
+def _one_cut(route: Matrix, task: Task, rng: np.random.Generator, share: float) -> Matrix | None:
+    """The route after a random cut, or None if that gains nothing or is not free."""
+    places = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(route, axis=0), axis=1)))
+    first, second = sorted(_place(places, rng, share) for _ in range(2))
+    i, j = (min(int(np.searchsorted(places, p, side="right")) - 1, len(route) - 2) for p in (first, second))
+    if i == j:
+        return None
+    a, b = _point(route, places, i, first), _point(route, places, j, second)
+    cut = np.vstack([a[None], task.moves(a, b)])
+    new = without_repeats(np.vstack([route[: i + 1], cut, route[j + 1 :]]))
+    if task.rank(new) >= task.rank(route) or not task.free_batch(cut[:-1], cut[1:]).all():
+        return None
+    return new if task.confirmed(new, route) else None
+
+
+def _place(places: Vector, rng: np.random.Generator, share: float) -> float:
+    """A random place on a route, by its distance from the start."""
+    at_waypoint = share > 0.0 and rng.random() < share
+    return float(rng.choice(places)) if at_waypoint else float(rng.uniform(0.0, places[-1]))
+
+
+def _point(route: Matrix, places: Vector, edge: int, place: float) -> Vector:
+    """The configuration at a place on an edge, never outside the box between its ends."""
+    share = (place - places[edge]) / (places[edge + 1] - places[edge])
+    a, b = route[edge], route[edge + 1]
+    point: Vector = np.clip((1.0 - share) * a + share * b, np.minimum(a, b), np.maximum(a, b))
+    return point

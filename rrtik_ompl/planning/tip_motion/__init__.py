@@ -1,0 +1,276 @@
+"""Motions of the tip along straight lines, arcs and screws: joints that follow them without jumps and collisions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import Matrix, dimensions, not_negative, positive, whole_number
+from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.base.units import DEGREE
+from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.model.goal import PoseGoal
+from rrtik_ompl.planning.tip_motion.attempts import Way, farthest, path_of
+from rrtik_ompl.planning.tip_motion.rails import Rail, arc_rail, screw_rail, straight_rail
+from rrtik_ompl.planning.tip_motion.values import Tolerance
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import usable_configuration
+from rrtik_ompl.world.world import World
+
+DEVIATION = 1e-4  # [m]
+TURN_DEVIATION = 0.1 * DEGREE  # [rad]
+BRANCHES = 16  # configurations of a pose from which it is tried
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StraightResult:
+    """How far the tip came.
+
+    Attributes:
+        path: Its configurations, every motion of it proven free; None if the fraction is 0.
+        fraction: Share of the way that it covers, from 0 to 1.
+        reason: Why it ends there: the limit of a joint, a singular posture, the pair in contact; "" if it is whole.
+
+    Example:
+        >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+        >>> far = rrtik.straight(world, q, world.robot.fk(q).translation + [2.0, 0.0, 0.0])
+        >>> 0.0 < far.fraction < 1.0, far.reason != ""
+        (True, True)
+    """
+
+    path: JointPath | None
+    fraction: float
+    reason: str
+
+
+def straight(
+    world: World,
+    q: ArrayLike | str | pin.SE3,
+    T_world_goal: ArrayLike | pin.SE3,
+    *,
+    deviation: float = DEVIATION,
+    turn_deviation: float = TURN_DEVIATION,
+    clearance: float | None = None,
+    seed: int = 0,
+) -> StraightResult:
+    """Move the tip in a straight line, its axes turning about one axis, as far as the arm can and nothing is touched.
+
+    The tip stays within the deviations at every point of the motions between the waypoints, not only at these: that is
+    bounded by the derivatives of the kinematics. Joints move without jumps, at most 0.25 rad or m between waypoints.
+    All motions are proven free (:meth:`World.prove`). A redundant arm uses its freedom to stay away from its limits
+    [60], and tries other ways to use it if it is stopped.
+
+    Args:
+        world: Robot and scene.
+        q: Where to begin: a configuration, shape (dof,), the name of a posture, or a pose of the tip as ``SE3`` or
+            matrix, shape (4, 4). Of the configurations at a pose that is taken from which the tip comes farthest.
+        T_world_goal: Pose of the tip at the end, see :func:`rrtik_ompl.base.poses.rigid`. A position alone, [x, y, z],
+            keeps the orientation of the beginning.
+        deviation: Of the tip from the line at most [m].
+        turn_deviation: Of its orientation at most [rad].
+        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
+        seed: Of the random numbers with which a redundant arm tries other ways.
+
+    Raises:
+        ProblemError: If q is in collision or outside the limits.
+        InputError: If an argument makes no sense.
+        UnknownNameError: If there is no posture of that name.
+
+    Example:
+        >>> import rrtik_ompl as rrtik
+        >>> world = rrtik.World(rrtik.load_robot("ur5"))
+        >>> lift = rrtik.straight(world, [0.0, -1.6, 1.8, -0.2, 1.6, 0.0], [0.45, 0.11, 0.6])
+        >>> lift.fraction, lift.path.proven
+        (1.0, True)
+    """
+
+    def rails(begin: pin.SE3) -> list[Rail]:
+        return [straight_rail(begin, _goal(T_world_goal, begin, "T_world_goal"))]
+
+    return _moved(world, q, rails, deviation, turn_deviation, clearance, seed)
+
+
+def arc(
+    world: World,
+    q: ArrayLike | str | pin.SE3,
+    T_world_goal: ArrayLike | pin.SE3,
+    through: ArrayLike,
+    *,
+    deviation: float = DEVIATION,
+    turn_deviation: float = TURN_DEVIATION,
+    clearance: float | None = None,
+    seed: int = 0,
+) -> StraightResult:
+    """Move the tip on the circle that leads through a point to a goal; all else is as for :func:`straight`.
+
+    Args:
+        world: Robot and scene.
+        q: Where to begin, see :func:`straight`.
+        T_world_goal: Pose of the tip at the end, see :func:`straight`.
+        through: Point of the world that the tip passes [m], shape (3,).
+        deviation: Of the tip from the line at most [m].
+        turn_deviation: Of its orientation at most [rad].
+        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
+        seed: Of the random numbers with which a redundant arm tries other ways.
+
+    Raises:
+        ProblemError: See :func:`straight`.
+        UnknownNameError: See there.
+        InputError: See there; also if the three points lie on a line.
+
+    Example:
+        >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+        >>> here = world.robot.fk(q).translation
+        >>> rrtik.arc(world, q, here + [0.0, 0.1, 0.0], through=here + [0.0, 0.05, 0.05]).fraction
+        1.0
+    """
+
+    def rails(begin: pin.SE3) -> list[Rail]:
+        return [arc_rail(begin, _goal(T_world_goal, begin, "T_world_goal"), through)]
+
+    return _moved(world, q, rails, deviation, turn_deviation, clearance, seed)
+
+
+def screw(
+    world: World,
+    q: ArrayLike | str | pin.SE3,
+    T_world_goal: ArrayLike | pin.SE3,
+    *,
+    turns: int = 0,
+    deviation: float = DEVIATION,
+    turn_deviation: float = TURN_DEVIATION,
+    clearance: float | None = None,
+    seed: int = 0,
+) -> StraightResult:
+    """Move the tip about and along one line of the world at once, as a screw, a door or a valve goes.
+
+    Args:
+        world: Robot and scene.
+        q: Where to begin, see :func:`straight`.
+        T_world_goal: Pose of the tip at the end, see :func:`straight`.
+        turns: Whole turns on top of the shortest way to the goal; a negative number turns the other way.
+        deviation: Of the tip from the line at most [m].
+        turn_deviation: Of its orientation at most [rad].
+        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
+        seed: Of the random numbers with which a redundant arm tries other ways.
+
+    Raises:
+        ProblemError: See :func:`straight`.
+        UnknownNameError: See there.
+        InputError: See there; also if turns are wanted of a goal that is not turned.
+
+    Example:
+        >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+        >>> valve = world.robot.fk(q)
+        >>> valve.rotation = valve.rotation @ np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        >>> rrtik.screw(world, q, valve).fraction  # a quarter turn about the tip's z axis
+        1.0
+    """
+
+    def rails(begin: pin.SE3) -> list[Rail]:
+        return [screw_rail(begin, _goal(T_world_goal, begin, "T_world_goal"), turns)]
+
+    return _moved(world, q, rails, deviation, turn_deviation, clearance, seed)
+
+
+def linear(
+    world: World,
+    q: ArrayLike | str | pin.SE3,
+    poses: Sequence[ArrayLike | pin.SE3],
+    *,
+    deviation: float = DEVIATION,
+    turn_deviation: float = TURN_DEVIATION,
+    clearance: float | None = None,
+    seed: int = 0,
+) -> StraightResult:
+    """Move the tip in straight lines from pose to pose; all else is as for :func:`straight`.
+
+    Args:
+        world: Robot and scene.
+        q: Where to begin, see :func:`straight`.
+        poses: Poses of the tip one after the other, each as ``T_world_goal`` of :func:`straight`.
+        deviation: Of the tip from the line at most [m].
+        turn_deviation: Of its orientation at most [rad].
+        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
+        seed: Of the random numbers with which a redundant arm tries other ways.
+
+    Raises:
+        ProblemError: See :func:`straight`.
+        InputError: See there; also if there is no pose.
+        UnknownNameError: See there.
+
+    Example:
+        >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+        >>> here = world.robot.fk(q).translation
+        >>> rrtik.linear(world, q, [here + [0.0, 0.0, 0.1], here + [0.0, 0.1, 0.1]]).fraction
+        1.0
+    """
+
+    def rails(begin: pin.SE3) -> list[Rail]:
+        stations = [begin]
+        for k, each in enumerate(listed(poses, "poses")):
+            stations.append(_goal(each, stations[-1], f"poses[{k}]"))
+        if len(stations) < 2:
+            raise InputError("poses: a motion of the tip needs at least one pose to go to")
+        return [straight_rail(a, b) for a, b in pairwise(stations)]
+
+    return _moved(world, q, rails, deviation, turn_deviation, clearance, seed)
+
+
+def _goal(value: ArrayLike | pin.SE3, begin: pin.SE3, what: str) -> pin.SE3:
+    """A pose (SE3); a position alone keeps the orientation of the beginning."""
+    goal = rigid(value, what)
+    if not isinstance(value, pin.SE3) and np.shape(value) == (3,):
+        return pin.SE3(begin.rotation, goal.translation)
+    return goal
+
+
+def _moved(
+    world: World,
+    q: ArrayLike | str | pin.SE3,
+    rails: Callable[[pin.SE3], list[Rail]],
+    deviation: float,
+    turn_deviation: float,
+    clearance: float | None,
+    seed: int,
+) -> StraightResult:
+    """Follow the rails that begin where the tip is."""
+    tolerance = Tolerance(positive(deviation, "deviation"), positive(turn_deviation, "turn_deviation"))
+    if tolerance.turn > 1.0:
+        raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
+    number = whole_number(seed, "seed")
+    require(world, World, "world", "use World(robot, scene)")
+    room = None if clearance is None else max(not_negative(clearance, "clearance"), world.settings.kept)
+    begin, starts = _begin(world, q, number)
+    way = Way(tuple(rails(begin)), tolerance, room)
+    if way.leads_nowhere(world.robot):
+        raise InputError("the tip is at the goal already: there is no line to follow")
+    made = farthest(world, way, starts, number)
+    return StraightResult(path_of(world, made), made.fraction, made.reason)
+
+
+def _begin(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> tuple[pin.SE3, Matrix]:
+    """Where the tip begins (SE3), and configurations from which it may, shape (k, dof): that given, or those of a pose.
+
+    Raises:
+        ProblemError: If it is in collision or outside the limits.
+        InputError: If no configuration is at the pose, or q is neither.
+        UnknownNameError: If there is no posture of that name.
+    """
+    robot = world.robot
+    if isinstance(q, str):
+        q = robot.posture(q)
+    if not isinstance(q, pin.SE3) and dimensions(q) < 2:
+        start = usable_configuration(world, q, "start")
+        return robot.fk(start), start[None]
+    begin = rigid(q, "start")
+    found = solve_ik(robot, PoseGoal(begin), all=True, world=world, seed=seed)
+    if not found.found:
+        raise InputError(f"start: no configuration of robot '{robot.name}' is at this pose: {found.detail}")
+    return begin, found.solutions[:BRANCHES]

@@ -1,0 +1,123 @@
+"""Intrinsics of a camera from photographs of a board, with the uncertainty of every number; its tone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.markers.alignment import Look, look_of
+from rrtik_ompl.sensing.markers.chessboard import Chessboard
+from rrtik_ompl.sensing.markers.detection import charuco_corners, dictionary_of, find_markers
+from rrtik_ompl.sensing.sight import as_gray
+
+Board = cv2.aruco.CharucoBoard | Chessboard
+
+MIN_CORNERS, MIN_VIEWS = 8, 5
+TONE_VIEWS, TONE_LOOKS = 3, 12  # photographs in which the tone is looked at; markers, or pieces, that are enough
+MIN_TONE_SIDE = 20.0  # [pixels] of a marker, of a piece of a chessboard
+MAX_VIEW_ERROR = 1.0  # [pixels]; a view with a larger error is blurred, bent or mismatched
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """A calibrated camera and how good it is.
+
+    Attributes:
+        camera: The camera.
+        sigmas: Standard deviations of fx, fy, cx, cy [pixels]; the camera has them, too. Shape (4,).
+        error: Root mean square reprojection error over all views [pixels].
+        view_errors: Of each photograph; NaN where it was not used. Shape (m,).
+        unused: For each photograph, why it was not used; empty if it was.
+    """
+
+    camera: Camera
+    sigmas: Vector
+    error: float
+    view_errors: Vector
+    unused: tuple[str, ...]
+
+
+def board_corners(gray: NDArray[np.uint8], board: Board) -> tuple[Matrix, Matrix]:
+    """Corners of a board in a grey picture: on the board [m], shape (k, 3), and their pixels, shape (k, 2)."""
+    return board.corners(gray) if isinstance(board, Chessboard) else charuco_corners(gray, board)
+
+
+def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board) -> Calibration:
+    """Calibrate from photographs of one board (`detection.charuco_board`, `Chessboard`) under different angles.
+
+    The third radial coefficient stays 0: with it the second one is not stable. The camera's tone is the median of
+    those with which the board's markers, or pieces of a chessboard, are most like the photographs.
+
+    Raises:
+        InputError: If the photographs differ in size, or fewer than five show the board well enough.
+    """
+    grays = [as_gray(picture) for picture in pictures]
+    if len({gray.shape for gray in grays}) > 1:
+        raise InputError("the photographs differ in size; take all of them with the same camera and settings")
+    found = [board_corners(gray, board) for gray in grays]
+    unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
+    used = [k for k, reason in enumerate(unused) if not reason]
+    result = None
+    while len(used) >= MIN_VIEWS:
+        result = _solve([found[k] for k in used], grays[0].shape)
+        errors = np.ravel(result[7])
+        worst = int(errors.argmax())
+        if errors[worst] <= MAX_VIEW_ERROR:
+            break
+        unused[used.pop(worst)] = f"corners lie {errors[worst]:.1f} pixels off: blurred, or the board is bent"
+        result = None
+    if result is None:
+        reasons = "; ".join(sorted({reason for reason in unused if reason})) or "there are no more"
+        raise InputError(
+            f"{len(used)} of {len(grays)} photographs show the board well, at least {MIN_VIEWS} must ({reasons}); "
+            "take more, the board filling a third of the picture or more, sharp, under different angles; a chessboard "
+            "is another kind of board, and has to be in view as a whole"
+        )
+    error, matrix, distortion, _, _, sigmas, _, each = result
+    view_errors = np.full(len(grays), np.nan)
+    view_errors[used] = np.ravel(each)
+    height, width = grays[0].shape
+    doubts = np.ravel(sigmas)[:9]
+    tone = _tone([(grays[k], found[k][1]) for k in used[:TONE_VIEWS]], board)
+    camera = Camera(matrix, width, height, np.ravel(distortion)[:5], sigmas=doubts, tone=tone)
+    return Calibration(camera, frozen(doubts[:4]), float(error), frozen(view_errors), tuple(unused))
+
+
+def _solve(views: Sequence[tuple[Any, Any]], shape: tuple[int, ...]) -> Any:
+    points = [np.ascontiguousarray(p, dtype=np.float32) for p, _ in views]
+    pixels = [np.ascontiguousarray(q, dtype=np.float32) for _, q in views]
+    solve: Any = cv2.calibrateCameraExtended  # its type requires first guesses where None is allowed
+    return solve(points, pixels, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3)
+
+
+def _too_few(count: int) -> str:
+    return f"{count} corners of the board seen, {MIN_CORNERS} are needed: too small, blurred, or another board"
+
+
+def _tone(views: Sequence[tuple[NDArray[np.uint8], Matrix]], board: Board) -> float | None:
+    """Median tone of a board's markers or pieces; None where too few are large and clear enough.
+
+    Args:
+        views: Photographs, and where the board's corners are in them.
+        board: The board.
+    """
+    if isinstance(board, Chessboard):
+        pieces = [(gray, *piece) for gray, pixels in views for piece in board.pieces(gray, pixels)]
+        looks = [look_of(*each) for each in pieces if np.ptp(each[1], axis=0).max() >= MIN_TONE_SIDE]
+    else:
+        looks = _looks_of_markers([gray for gray, _ in views], dictionary_of(board))
+    tones = [each.tone for each in looks if each is not None]
+    return round(float(np.median(tones)), 3) if len(tones) >= TONE_LOOKS else None
+
+
+def _looks_of_markers(grays: Sequence[NDArray[np.uint8]], dictionary: str | None) -> list[Look | None]:
+    seen = [] if dictionary is None else [marker for gray in grays for marker in find_markers(gray, dictionary)]
+    return [each.look for each in seen if each.side >= MIN_TONE_SIDE]

@@ -1,0 +1,312 @@
+"""A path of configurations that measures itself, checks itself against a world, and is saved and read again."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import (
+    MOST_ROWS,
+    Mask,
+    Matrix,
+    Vector,
+    finite_array,
+    frozen,
+    positive,
+    truths,
+    usable_waypoints,
+)
+from rrtik_ompl.base.copies import as_value, in_notebook
+from rrtik_ompl.base.errors import InputError, in_file, listed, name_of, require
+from rrtik_ompl.base.units import joint_units
+from rrtik_ompl.files.tables import FORMATS, dumps, loads
+from rrtik_ompl.files.text import known_ending, read_text, write_text
+from rrtik_ompl.model.robot import Robot, require_joints, unnamed_joints
+from rrtik_ompl.model.transitions import (
+    SAME,
+    merge_moves,
+    moved,
+    part_counts,
+    route_length,
+    single_joint,
+    subdivided,
+    transitions,
+)
+from rrtik_ompl.model.transitions import Move as Move
+from rrtik_ompl.world.kept_clearance import CLEARANCE
+from rrtik_ompl.world.route_check import VERIFICATION_DENSITY as VERIFICATION_DENSITY
+from rrtik_ompl.world.route_check import Violation, route_violations, verification_resolution
+from rrtik_ompl.world.world import Proof, World
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointPath:
+    """Waypoints joined by straight lines in configuration space.
+
+    Attributes:
+        waypoints: Shape (k, n), read-only, rad (m for prismatic joints), start first.
+        joint_names: Names of the n joints.
+        prismatic: Which joints slide, shape (n,).
+        robot_name: Name of the robot it is for, or "".
+        continuous: Which joints turn without limits, shape (n,).
+        proof: What is proven of it, see :meth:`proved`; None if that was not asked, as in a path with other waypoints.
+    """
+
+    waypoints: Matrix
+    joint_names: tuple[str, ...]
+    prismatic: Mask
+    robot_name: str
+    continuous: Mask
+    proof: Proof | None
+
+    __reduce__, _repr_html_ = as_value, in_notebook
+
+    def __init__(
+        self,
+        waypoints: ArrayLike,
+        joint_names: Iterable[str] | None = None,
+        prismatic: ArrayLike | None = None,
+        robot_name: str = "",
+        continuous: ArrayLike | None = None,
+    ) -> None:
+        rows = usable_waypoints(finite_array(waypoints, (None, None), "path waypoints"))
+        count = rows.shape[1]
+        joint_names = unnamed_joints(count) if joint_names is None else joint_names
+        names = tuple(name_of(name, "a joint of a path") for name in listed(joint_names, "joint names of a path"))
+        given = (np.zeros(count) if mask is None else mask for mask in (prismatic, continuous))
+        sliding, endless = (truths(mask, "mask of a path's joints") for mask in given)
+        if not len(names) == count == sliding.size == endless.size:
+            raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
+        _fill(self, frozen(rows), names, frozen(sliding, bool), robot_name, frozen(endless, bool))
+
+    def __repr__(self) -> str:
+        k, n = self.waypoints.shape
+        size = f"{k} waypoints of {n} joints, {self.transitions} transitions"
+        return f"JointPath({size}, length {self.length:.3g} {self.unit})"
+
+    @classmethod
+    def of(cls, robot: Robot, waypoints: ArrayLike) -> JointPath:
+        """A path of this robot through ``waypoints``, shape (k, dof); :meth:`rrtik_ompl.Robot.onto_limits` applies.
+
+        Raises:
+            InputError: If the rows do not have one value per joint of the robot.
+        """
+        require(robot, Robot, "robot of a path")
+        rows: Matrix = waypoints if isinstance(waypoints, np.ndarray) else np.empty(0)
+        if rows.dtype != np.float64 or rows.shape[1:] != (robot.dof,) or not np.isfinite(rows[:MOST_ROWS]).all():
+            rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
+        kinds = frozen(robot.prismatic, bool), frozen(robot.continuous, bool)
+        rows = frozen(usable_waypoints(robot.onto_limits(rows)))
+        return _fill(object.__new__(cls), rows, robot.joint_names, kinds[0], robot.name, kinds[1])
+
+    def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
+        """The same joints, other waypoints."""
+        return JointPath(waypoints, self.joint_names, self.prismatic, self.robot_name, self.continuous)
+
+    @property
+    def start(self) -> Vector:
+        """First waypoint, shape (n,)."""
+        return np.asarray(self.waypoints[0])
+
+    @property
+    def end(self) -> Vector:
+        """Last waypoint, shape (n,)."""
+        return np.asarray(self.waypoints[-1])
+
+    @property
+    def length(self) -> float:
+        """Sum of the Euclidean lengths of the edges [rad, metres counted alike]."""
+        return route_length(self.waypoints)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the length: rad, m, or "rad, m" for a path of both kinds of joints."""
+        return ", ".join(name for name, some in (("rad", ~self.prismatic), ("m", self.prismatic)) if some.any())
+
+    @property
+    def transitions(self) -> int:
+        """Number of moves after joining consecutive moves of the same joint (C-RDT's measure)."""
+        return transitions(self.waypoints)
+
+    @property
+    def one_joint_at_a_time(self) -> bool:
+        """Whether every edge moves exactly one joint, so that :meth:`moves` can list them."""
+        return single_joint(merge_moves(self.waypoints), SAME)
+
+    def moves(self) -> tuple[Move, ...]:
+        """The list of single-joint moves that the path consists of; consecutive moves of the same joint are one.
+
+        Raises:
+            InputError: If an edge moves several joints at once; :func:`rrtik_ompl.planning.moves.staircase.one_joint_moves`
+                makes a path of single-joint moves from any path.
+        """
+        rows = merge_moves(self.waypoints)
+        changes = moved(rows[:-1], rows[1:])
+        several = np.flatnonzero(changes.sum(axis=1) != 1)
+        if len(several) and len(rows) > 1:
+            together = ", ".join(np.array(self.joint_names)[changes[several[0]]])
+            edge = int((moved(self.waypoints[:-1], self.waypoints[1:]).sum(axis=1) > 1).argmax())
+            raise InputError(
+                f"path: motion {edge + 1} moves several joints at once ({together}); it is no list of moves: "
+                "convert it with one_joint_moves(path, problem)"
+            )
+        joints, units = changes.argmax(axis=1), joint_units(self.prismatic)
+        return tuple(
+            Move(self.joint_names[j], float(rows[i, j]), float(rows[i + 1, j]), units[j], bool(self.continuous[j]))
+            for i, j in enumerate(joints)
+        )
+
+    def resample(self, step: float) -> JointPath:
+        """The same path with further waypoints, none farther than ``step`` [rad] from the next; all old ones stay."""
+        counts = part_counts(self.waypoints, positive(step, "resample step"))
+        return self.with_waypoints(subdivided(self.waypoints, counts)[0])
+
+    def violations(self, world: World, *, resolution: float | None = None) -> tuple[Violation, ...]:
+        """Check the path again, independently of the planner that made it.
+
+        An edge that is proven free for its whole length (:meth:`World.prove`) needs no more. Every other one is checked
+        in steps in which no point of the arm moves more than half of the world's motion resolution (or ``resolution``
+        [m], if given), by :meth:`World.certify`.
+
+        Returns:
+            The first violation of every edge that has one; empty for a valid path.
+
+        Raises:
+            InputError: If the path moves other joints than the world's robot, or these in another order, is too long
+                for its checks, or ``resolution`` is not positive.
+        """
+        require(world, World, "world of a path's check")
+        require_joints(world.robot, self.joint_names, "path")
+        rows = self.waypoints
+        fine = verification_resolution(world) if resolution is None else resolution
+        rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
+        return route_violations(world, rows, positive(fine, "resolution", "give metres"))
+
+    def proved(self, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
+        """The same path with what is proven of its motions, see :meth:`World.prove`.
+
+        Raises:
+            InputError: If the path is another robot's, there is no world, or the clearance is negative or infinite.
+        """
+        require(world, World, "world of a path's proof")
+        require_joints(world.robot, self.joint_names, "path")
+        return self.with_proof(world.prove(self.waypoints, clearance=clearance, seconds=seconds))
+
+    def with_proof(self, proof: Proof) -> JointPath:
+        """The same path with what somebody else has proven of its motions."""
+        known = self.waypoints, self.joint_names, self.prismatic, self.robot_name, self.continuous
+        return _fill(object.__new__(type(self)), *known, proof)
+
+    @property
+    def proven(self) -> bool:
+        """Whether its proof covers every motion; False without a proof."""
+        return self.proof is not None and self.proof.proven
+
+    def proven_in(self, world: World) -> bool:
+        """Whether its proof covers every motion, keeps what the world keeps, and was made by a form of the world."""
+        proof = self.proof
+        return (
+            proof is not None and proof.proven and proof.clearance >= world.settings.kept and world.prover.made(proof)
+        )
+
+    def save(self, path: str | os.PathLike[str], *, proof: bool = False) -> None:
+        """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
+
+        The file is written whole or not at all.
+
+        Args:
+            path: Of the file.
+            proof: Whether a .json file shall hold what proves the path too, its certificate, for ``rrtik check``.
+
+        Raises:
+            InputError: If the ending is another one, the file cannot be written, or a proof is asked for and the path
+                has none that covers it.
+
+        Example:
+            >>> path = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1).path
+            >>> path.save("path.json", proof=True)
+            >>> rrtik.load_certificate("path.json").clearance
+            0.001
+        """
+        require(proof, bool, "proof")
+        document, ending = self.document(), known_ending(path, FORMATS, "path")
+        if proof:
+            known_ending(path, FORMATS[:1], "path with its proof")
+            from rrtik_ompl.world.certificates.write import certificate_by
+
+            document["certificate"] = certificate_by(self.proof, self.waypoints).document()
+        write_text(path, dumps(document, ending))
+
+    def document(self) -> dict[str, Any]:
+        """What a .json file of the path holds."""
+        return {
+            "version": 1,
+            "kind": "joint_path",
+            "robot": self.robot_name,
+            "joint_names": list(self.joint_names),
+            "units": joint_units(self.prismatic),
+            "continuous": [name for name, endless in zip(self.joint_names, self.continuous, strict=True) if endless],
+            "length": self.length,
+            "transitions": self.transitions,
+            "waypoints": (self.waypoints + 0.0).tolist(),  # a person reads 0.0, not -0.0
+        }
+
+
+def _fill(path: JointPath, *values: object) -> JointPath:
+    """A path with the values of its attributes, in their order; nothing is checked, and there may be no proof."""
+    for name, value in zip(_ATTRIBUTES, (*values, None), strict=False):
+        object.__setattr__(path, name, value)
+    return path
+
+
+_ATTRIBUTES = tuple(each.name for each in fields(JointPath))
+
+
+def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:
+    """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
+    proved = path.proved(world, clearance=clearance)
+    least = world.settings.kept
+    for kept in sorted({max(min(clearance, CLEARANCE), least), least} - {clearance}, reverse=True):
+        if proved.proven:
+            break
+        proved = path.proved(world, clearance=kept)
+    return proved
+
+
+def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:
+    """Read a path written by :meth:`JointPath.save` or by OMPL (``printAsMatrix``).
+
+    Args:
+        path: A .json, .csv or .txt file.
+        robot: If given, the path must fit it, and takes its joint names.
+
+    Raises:
+        InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
+    """
+    require(robot, Robot | None, "robot of a path", "use load_robot(name)")
+    ending = known_ending(path, FORMATS, "path")
+    try:
+        document = loads(read_text(path), ending)
+        names, name = document.get("joint_names"), str(document.get("robot", ""))
+        units, endless = document.get("units"), document.get("continuous")
+        sliding = None if units is None else [unit == "m" for unit in units]
+        turning = None if names is None or endless is None else [joint in endless for joint in names]
+        found = JointPath(document["waypoints"], names, sliding, name, turning)
+        return found if robot is None else fitted(found, robot)
+    except InputError as error:
+        raise in_file(path, error) from None
+
+
+def fitted(path: JointPath, robot: Robot) -> JointPath:
+    """A path as one of a robot, onto whose limits it is put.
+
+    Raises:
+        InputError: If it moves other joints, or names them in another order; names that nobody gave do not count.
+    """
+    require_joints(robot, path.joint_names, "path")
+    return JointPath.of(robot, path.waypoints)

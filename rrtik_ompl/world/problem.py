@@ -1,0 +1,229 @@
+"""A well-posed problem: a world, a start and a goal. That a `Problem` exists proves that its start is usable."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import TAU, Vector, dimensions, frozen
+from rrtik_ompl.base.choices import Accuracy
+from rrtik_ompl.base.copies import as_value, in_notebook, shallow_copy
+from rrtik_ompl.base.errors import InputError, ProblemError, Renamed, listed, require
+from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.constraints.contradiction import contradiction
+from rrtik_ompl.constraints.goal_regions import goal_regions
+from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
+from rrtik_ompl.model.goal import Goal, JointGoal, MultiGoal, PoseGoal, parts_of
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.shapes import PointCloud
+from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.world.route_check import verification_resolution
+from rrtik_ompl.world.world import World
+
+
+class Problem:
+    """A planning problem.
+
+    Values up to 1e-5 outside a limit are moved onto it. For continuous joints the goal is turned to the equivalent
+    value nearest to the start, so that the straight motion goes the short way round.
+
+    Attributes:
+        world: Robot, scene and collision checks.
+        start: Shape (dof,), read-only.
+        goal: What to reach; a :class:`JointGoal` has been checked to be free.
+        name: For messages and files.
+        planner: Name of the planner that :func:`rrtik_ompl.plan` uses where none is named, or None.
+        constraints: Regions that a frame must not leave on the whole path, those ``from_start`` placed in the world.
+            In the world only motions that keep them are free then. Those that the given world has are among them.
+
+    Args:
+        world: Robot and scene.
+        start: Configuration, shape (dof,), rad or m, or the name of a posture.
+        goal: A goal, a configuration, the name of a posture, or a pose (``pinocchio.SE3`` or shape (4, 4)).
+        name: For messages and files.
+        planner: Name of one of :func:`rrtik_ompl.list_planners`; it is looked up when it is used.
+
+    Raises:
+        ProblemError: If start or goal is in collision, within an obstacle's margin, outside the limits or outside the
+            region of a constraint; pair, margin, joint, limit, or constraint and amount are named.
+        InputError: If start or goal has the wrong number of joints or is not finite.
+        UnknownNameError: If there is no posture of a name.
+
+    Example:
+        >>> world = rrtik.World(rrtik.load_robot("panda"))
+        >>> rrtik.Problem(world, "default", rrtik.PositionGoal([0.3, 0.5, 0.4])).start.shape
+        (7,)
+    """
+
+    def __init__(
+        self,
+        world: World,
+        start: ArrayLike | str,
+        goal: Goal | ArrayLike | pin.SE3 | str,
+        *,
+        name: str = "problem",
+        planner: str | None = None,
+        constraints: Iterable[TaskRegion] = (),
+    ) -> None:
+        require(world, World, "world of a problem", "use World(robot, scene)")
+        require(planner, str | None, "planner of a problem", "use a name of list_planners()")
+        self.world = world
+        self.name = name
+        self.planner = planner
+        start = world.robot.posture(start) if isinstance(start, str) else start
+        goal = world.robot.posture(goal) if isinstance(goal, str) else goal
+        wanted = _goal_of(goal)
+        joints = {"goal": wanted.q} if isinstance(wanted, JointGoal) else {}
+        ends = usable_configurations(world, {"start": start, **joints})
+        self.start: Vector = frozen(ends["start"])
+        known = world.settings.constraints
+        fresh = [each for each in listed(constraints, "path constraints") if each not in known]
+        held = held_regions(world.robot, world.scene, (*known, *fresh), self.start)
+        self.constraints = tuple(each.region for each in held.regions)
+        if held.regions:
+            self.world = world = world.with_settings(constraints=self.constraints)
+            _keep(world.robot, held, self.start, "start")
+        if isinstance(wanted, JointGoal):
+            _keep(world.robot, held, ends["goal"], "goal")
+            wanted = JointGoal(_nearest_turn(world, self.start, ends["goal"]), wanted.tolerance)
+        elif any(_of_a_path(part) for part in parts_of(wanted) if isinstance(part, TaskRegion)):
+            raise InputError(
+                "goal region: frame, from_start and allowances are for path constraints; a goal is of the tip"
+            )
+        if isinstance(wanted, MultiGoal):
+            goal_regions(world.robot, world.scene, wanted)  # refuses links that do not exist
+        self.goal: Goal = wanted
+
+    __copy__, __reduce__, _repr_html_ = shallow_copy, as_value, in_notebook
+
+    def __repr__(self) -> str:
+        return f"Problem('{self.name}', {self.world}, to a {type(self.goal).__name__})"
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the world."""
+        return self.world.robot
+
+    def with_resolution(self, motion_resolution: float) -> Problem:
+        """The same problem, its motions checked in steps of another size [m] (:meth:`World.with_resolution`)."""
+        return self.with_world(self.world.with_resolution(motion_resolution))
+
+    refined = Renamed("with_resolution")
+
+    def with_accuracy(self, accuracy: Accuracy) -> Problem:
+        """The same problem, its world "exact" or "conservative" (see :meth:`rrtik_ompl.World.with_accuracy`)."""
+        return self.with_world(self.world.with_accuracy(accuracy))
+
+    def with_world(self, world: World) -> Problem:
+        """The same start and goal in another form of the same world; neither is checked again."""
+        other = copy.copy(self)
+        other.world = world
+        return other
+
+    def reached(self, q: ArrayLike) -> bool:
+        """Whether a configuration, shape (dof,), satisfies the goal."""
+        return bool(self.goal.satisfied(self.world.robot, self.world.robot.configuration(q)[None])[0])
+
+
+def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Problem:
+    """A problem whose start, shape (dof,), and goal somebody has checked already; no joint may be continuous."""
+    problem: Problem = object.__new__(Problem)
+    problem.world, problem.name, problem.planner, problem.constraints = world, "problem", None, ()
+    problem.start, problem.goal = frozen(start), goal if isinstance(goal, JointGoal) else JointGoal(goal)
+    return problem
+
+
+def densely_checked(problem: Problem) -> Problem:
+    """The same problem, its motions checked as densely as by the second check of a path."""
+    return problem.with_resolution(verification_resolution(problem.world))
+
+
+def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:
+    """One of :func:`usable_configurations`, shape (dof,)."""
+    return usable_configurations(world, {what: values})[what]
+
+
+def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[str, Vector]:
+    """Configurations given by a user that can be start and goal, by what they are: finite, inside the limits, free.
+
+    Raises:
+        ProblemError: If one is in collision, within an obstacle's margin or outside the limits.
+        InputError: If one has the wrong number of joints or is not finite.
+    """
+    robot, found = world.robot, {}
+    for what, values in ends.items():
+        q = robot.configuration(values, what)
+        if fault := robot.limit_fault(q):
+            raise ProblemError(f"{what}: {fault}", part=what)
+        found[what] = robot.onto_limits(q)
+    rows = np.array(list(found.values()))
+    world = world.unheld
+    # both opinions must agree, for the path through them will be certified by the second one
+    for opinion in (world.valid_batch, world.certify):
+        for (what, q), free in zip(found.items(), opinion(rows).tolist(), strict=True):
+            if not free:
+                raise _in_the_way(world, q, what)
+    return found
+
+
+def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
+    """Says what a start or a goal touches, or is too near to."""
+    touching = world.contacts(q)
+    if not touching:
+        return _not_touching(world, q, what)
+    pairs = [(c.first, c.second) for c in touching]
+    still = {body.name for body in world.bodies if body.joint == 0}
+    fixed = [c for c in touching if {c.first, c.second} <= still]
+    if fixed:
+        remedy = "no joint moves either; move the obstacle or the base, or allow the pair"
+        return ProblemError(f"{what} is in collision: {fixed[0]}; {remedy}", pairs, part=what)
+    if touching and all(c.distance > 0.0 for c in touching):
+        thick = any(body.padding for body in world.bodies)
+        lower = "lower the margin" + (" or the padding" if thick else "")
+        remedy = f"move it or {lower}" + (", or allow the pair" if world.self_margin or thick else "")
+        return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
+    clouds = {each.name for each in world.scene.obstacles if isinstance(each.shape, PointCloud)}
+    own = ", take the arm's own points out by without_robot()," if any(clouds & set(pair) for pair in pairs) else ""
+    return ProblemError(f"{what} is in collision: {world.explain(q)}; move it{own} or allow the pair", pairs, part=what)
+
+
+def _not_touching(world: World, q: Vector, what: str) -> ProblemError:
+    """Says why a start or a goal is not free where nothing touches."""
+    pairs = [(c.first, c.second) for c in world.too_near(q)]
+    if pairs:
+        remedy = "move it, lower the clearance or allow the pair"
+        return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
+    nearest = world.closest(q, known_free=True)
+    pairs = [] if nearest is None else [(nearest.first, nearest.second)]
+    remedy = 'move it, or use accuracy="exact"' if world.accuracy == "conservative" else "move it"
+    return ProblemError(f"{what} is not proven free: {world.explain(q)}; {remedy}", pairs, part=what)
+
+
+def _of_a_path(region: TaskRegion) -> bool:
+    """Whether a region says what only path constraints can."""
+    return bool(region.frame or region.from_start or region.position_allowance or region.orientation_allowance)
+
+
+def _keep(robot: Robot, held: HeldRegions, q: Vector, what: str) -> None:
+    if fault := held.explain(q):
+        remedy = contradiction(robot, held) or "move it, or widen the tolerance"
+        raise ProblemError(f"{what} breaks {fault}; {remedy}", part=what)
+
+
+def _goal_of(goal: Goal | ArrayLike | pin.SE3) -> Goal:
+    """A goal as it is given; a pose (``pinocchio.SE3`` or shape (4, 4)) of the tip, or a configuration, as one."""
+    if isinstance(goal, Goal):
+        return goal
+    pose = isinstance(goal, pin.SE3) or dimensions(goal) == 2
+    return PoseGoal(rigid(goal, "goal")) if pose else JointGoal(goal)
+
+
+def _nearest_turn(world: World, start: Vector, q: Vector) -> Vector:
+    """The goal with its continuous joints turned by whole turns to lie nearest to the start; no turn, no rounding."""
+    turns = np.where(world.robot.continuous, np.round((start - q) / TAU), 0.0)
+    nearest: Vector = q + turns * TAU
+    return nearest

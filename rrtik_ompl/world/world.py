@@ -1,0 +1,450 @@
+"""A robot in a scene: which configurations and motions are free, how far from contact, and what touches."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from collections.abc import Iterable
+from dataclasses import fields, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import MOST_NUMBERS, Mask, Matrix, finite_array, in_blocks, not_negative, positive
+from rrtik_ompl.base.choices import Accuracy
+from rrtik_ompl.base.copies import Items, KeptHere, in_notebook, shallow_copy
+from rrtik_ompl.base.errors import InputError, MeshWarning, Renamed, UnknownNameError
+from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
+from rrtik_ompl.geometry.collision.bodies import Body, by_motion, colliding_pairs, in_contact, link_bodies, scene_bodies
+from rrtik_ompl.geometry.collision.certificate import Certificate, fixed_contact
+from rrtik_ompl.geometry.collision.contacts import Contact as Contact
+from rrtik_ompl.geometry.collision.contacts import inside, measured
+from rrtik_ompl.geometry.collision.motion_bound import displacement_weights
+from rrtik_ompl.kernels import FastWorld
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.world.exact_checks import ExactChecker, one_way
+from rrtik_ompl.world.holding_prover import HoldingProver
+from rrtik_ompl.world.proof import Gap as Gap
+from rrtik_ompl.world.proof import Proof as Proof
+from rrtik_ompl.world.proof import Prover
+from rrtik_ompl.world.rebuild import Rebuilt, hollow_solids, with_room
+from rrtik_ompl.world.settings import ACCURACIES as ACCURACIES
+from rrtik_ompl.world.settings import FINEST_RESOLUTION as FINEST_RESOLUTION
+from rrtik_ompl.world.settings import MOTION_RESOLUTION, WorldSettings
+
+SETTINGS = tuple(each.name for each in fields(WorldSettings))
+# What of a world is made anew when one of these changes is said in World._in; any other change makes all of it anew.
+SHARING = {"accuracy", "motion_resolution", "clearance", "proving", "inflation", "constraints"}
+
+
+class World(Rebuilt):
+    """Exact collision checks of a robot in a scene; several threads may ask one world, each in memory of its own.
+
+    Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
+    (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal and refuses what they cannot prove.
+
+    Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
+    no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
+    in both directions.
+
+    What moves of the arm has to stay farther from an obstacle than its margin, and from the arm's other bodies than
+    ``self_margin``; the base, which no posture moves, must only not touch an obstacle.
+
+    All of it is made from :attr:`settings`. The other forms of a world (``with_...``, :meth:`proving`, :meth:`moved`,
+    copies) have the same settings but for what they are asked to change.
+
+    Attributes:
+        settings: The arguments, checked; ``robot``, ``scene``, ``motion_resolution``, ``accuracy`` and ``self_margin``
+            are also attributes of the world.
+        bodies: The solids of the robot and the scene.
+        pairs: Numbers of the bodies that must not touch.
+        prover: Proves motions free; where there are path constraints, free and held.
+        constraints: What is held (:class:`~rrtik_ompl.constraints.held_regions.HeldRegions`); None if nothing is.
+        weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
+
+    Args:
+        robot: The arm.
+        scene: Its surroundings; empty if None. Moving obstacles are where they are at time 0.
+        motion_resolution: Largest step of any point of the arm between two checked configurations [m].
+        accuracy: "exact" or "conservative".
+        self_margin: How far links, and what they hold, must stay from each other where they must not touch [m].
+        clearance: What is kept from obstacles on top of their margins [m]; see :meth:`with_clearance`.
+        proving: Motions must be proven too, with this clearance [m]; None if they need not be. See :meth:`proving`.
+        inflation: What checks keep on top of the clearance, for searches that leave room [m]; no other answer does.
+        constraints: Regions, placed in the world, that a frame must not leave. Only what keeps them is then free; a
+            :class:`rrtik_ompl.Problem` says where those begin that are ``from_start``.
+
+    Raises:
+        InputError: If the scene names links that do not exist, a length makes no sense, or a region cannot be held.
+        UnknownNameError: If there is no such accuracy.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        scene: Scene | None = None,
+        *,
+        motion_resolution: float = MOTION_RESOLUTION,
+        accuracy: Accuracy = "exact",
+        self_margin: float = 0.0,
+        clearance: float = 0.0,
+        proving: float | None = None,
+        inflation: float = 0.0,
+        constraints: Iterable[TaskRegion] = (),
+    ) -> None:
+        settings = WorldSettings(
+            robot,
+            Scene() if scene is None else scene,
+            accuracy=accuracy,
+            motion_resolution=motion_resolution,
+            self_margin=self_margin,
+            clearance=clearance,
+            proving=proving,
+            inflation=inflation,
+            constraints=constraints,  # type: ignore[arg-type]  # made a tuple there
+        )
+        self._settings = settings
+        self._obstacles = Items(settings.scene.obstacles)
+        for doubt in hollow_solids(robot, settings.scene):
+            warnings.warn(doubt, MeshWarning, stacklevel=2)
+        own = settings.self_margin
+        solids = link_bodies(robot, own) + scene_bodies(robot, settings.scene.at(0.0), own)
+        self._bodies = Items(in_contact(robot, settings.scene, solids))
+        self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
+        self.pairs = pairs = colliding_pairs(robot, settings.scene, self.bodies)
+        moving, standing = by_motion(self.bodies, pairs)
+        self._certificate = self._second_checker()
+        self._motions = KeptHere()
+        conservative = settings.accuracy == "conservative"
+        self._checks = ExactChecker(robot, self._searched_bodies(), moving, conservative=conservative)
+        self._always_colliding = always = fixed_contact(robot, self.bodies, standing) is not None
+        self.prover = Prover(robot, self._bodies, moving, self_margin=own, always_colliding=always)
+        self.constraints: HeldRegions | None = None
+        self._hold(settings.constraints)
+
+    resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
+
+    def __repr__(self) -> str:
+        return f"World({', '.join([self.robot.name, str(self.scene), *self._settings.unusual()])})"
+
+    @property
+    def fast(self) -> FastWorld | None:
+        """The world's tables, for planners that run in kernels; None without kernels or where these do not suffice.
+
+        They do not where motions have to be proven or held, nor where something is in contact: they know nothing of it.
+        """
+        tables, settings = self._checks.fast, self._settings
+        enough = settings.proving is None and self.constraints is None and not settings.scene.contacts
+        return tables if tables.address and enough and not self._always_colliding else None
+
+    @property
+    def motions(self) -> FastMotions | None:
+        """How motions are checked, for searches in kernels: one table for all of them. None where ``fast`` is."""
+        return motions_of(self, self._motions)
+
+    @property
+    def free_motions(self) -> FastMotions | None:
+        """How kernels check motions for collisions alone, whatever else they must be; None where they cannot.
+
+        Pairs that are in contact are left out: how deep they overlap is proven of what is found.
+        """
+        free = self.with_settings(proving=None, constraints=())
+        scene = free.scene
+        if not scene.contacts:
+            return motions_of(free, self._motions)
+        pairs = (*scene.allowed_collisions, *(contact.names for contact in scene.contacts))
+        return motions_of(free.with_scene(replace(scene, contacts=(), allowed_collisions=pairs)), KeptHere())
+
+    @property
+    def unheld(self) -> World:
+        """The same world without path constraints."""
+        return self.with_settings(constraints=())
+
+    def with_settings(self, **changes: Any) -> World:
+        """The same world but for some of its settings; it shares what does not depend on them.
+
+        Args:
+            **changes: Values by the names of :class:`~rrtik_ompl.world.settings.WorldSettings`.
+
+        Raises:
+            InputError: If a value makes no sense.
+            UnknownNameError: If there is no setting of a name.
+
+        Example:
+            >>> world = rrtik.World(rrtik.load_robot("planar3")).with_settings(clearance=0.05, self_margin=0.01)
+            >>> world
+            World(planar3, Scene(empty), self_margin=0.01 m, clearance=0.05 m)
+        """
+        for name in changes:
+            if name not in SETTINGS:
+                raise UnknownNameError("setting of a world", name, SETTINGS)
+        settings = replace(self._settings, **changes)
+        if "scene" in changes:
+            return World.of(settings)
+        changed = {name for name in changes if getattr(settings, name) != getattr(self._settings, name)}
+        if changed <= SHARING:
+            return self._in(settings, changed) if changed else self
+        return World.of(replace(settings, scene=self.scene))
+
+    def _in(self, settings: WorldSettings, changed: set[str]) -> World:
+        """The same robot and scene with other settings."""
+        other = copy.copy(self)
+        other._settings = settings
+        if changed & {"clearance", "inflation"}:
+            other._checks = self._checks.with_bodies(other._searched_bodies())
+        if "clearance" in changed:
+            other._certificate = other._second_checker()
+        if "accuracy" in changed:
+            other._checks = other._checks.as_conservative(settings.accuracy == "conservative")
+        if changed & {"clearance", "inflation", "motion_resolution"}:
+            other._motions = KeptHere()
+        if "constraints" in changed:
+            other._hold(settings.constraints)
+        return other
+
+    def with_scene(self, scene: Scene) -> World:
+        """A world of the same robot in another scene, made anew with the same settings.
+
+        Raises:
+            InputError: If it is no scene, or does not fit the robot or the path constraints.
+        """
+        return self.with_settings(scene=scene)
+
+    def with_accuracy(self, accuracy: Accuracy) -> World:
+        """The same world, "exact" or "conservative"; shares everything else.
+
+        Raises:
+            UnknownNameError: If there is no such accuracy.
+        """
+        return self.with_settings(accuracy=accuracy)
+
+    def with_resolution(self, motion_resolution: float) -> World:
+        """The same world, its motions checked in steps of another size [m]; shares everything else.
+
+        Raises:
+            InputError: If the size is none, or less than 0.01 mm.
+        """
+        return self.with_settings(motion_resolution=motion_resolution)
+
+    refined = Renamed("with_resolution")
+    __copy__, _repr_html_ = shallow_copy, in_notebook
+
+    def with_clearance(self, clearance: float) -> World:
+        """The same world, where a distance [m] is kept from obstacles on top of their margins.
+
+        It takes the place of an earlier one; 0 takes it away. Checks, proofs and whatever moves in it keep it;
+        :meth:`contacts` and :meth:`clearance` tell of margins alone.
+
+        Raises:
+            InputError: If the clearance is negative or infinite.
+        """
+        return self.with_settings(clearance=clearance)
+
+    def proving(self, clearance: float | None = 0.0) -> World:
+        """The same world, where motions have to be proven too, with a clearance [m]; searches in kernels cannot.
+
+        It takes the place of an earlier one; None takes it away.
+
+        Raises:
+            InputError: If the clearance is negative or infinite.
+        """
+        return self.with_settings(proving=clearance)
+
+    def _searched_bodies(self) -> Items[Body]:
+        """The bodies, obstacles with all that checks keep on top of their margins."""
+        return with_room(self._bodies, self._settings.clearance + self._settings.inflation)
+
+    def _hold(self, regions: tuple[TaskRegion, ...]) -> None:
+        """Keep path constraints, and no others."""
+        prover = self.prover
+        free = prover.free if isinstance(prover, HoldingProver) else prover
+        if not regions:
+            self.constraints, self.prover = None, free
+            return
+        self.constraints = held_regions(self.robot, self._settings.scene, regions, None)
+        self.prover = HoldingProver(free, self.constraints)
+
+    def valid(self, q: ArrayLike) -> bool:
+        """Whether q, shape (dof,), is inside the limits and free of collision.
+
+        Raises:
+            InputError: If q has the wrong length or a value that is not finite.
+        """
+        return bool(self._free(self._rows(q, 1))[0])
+
+    def valid_batch(self, Q: ArrayLike) -> Mask:
+        """Which rows of Q, shape (m, dof), are inside the limits and free of collision. Shape (m,).
+
+        Raises:
+            InputError: If Q has the wrong shape or a value that is not finite.
+        """
+        return in_blocks(self._free, self._rows(Q, 2))
+
+    def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
+        """Whether the straight motion from a to b, shape (dof,) each, is valid; the same answer from b to a."""
+        return bool(self._motions_free(self._rows(a, 1), self._rows(b, 1))[0])
+
+    def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
+        """Which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
+        return in_blocks(self._motions_free, *self._both_ends(A, B))
+
+    def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
+        """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
+        kept = self._settings.kept
+        return bool(self.prover.proven(self._rows(a, 1), self._rows(b, 1), clearance=kept)[0])
+
+    def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float | None = None) -> Mask:
+        """Which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole. Shape (m,).
+
+        ``clearance`` [m] is kept from every obstacle on top of its margin, by default what the world keeps. What grazes
+        an obstacle cannot be proven.
+        """
+        kept = self._proven_clearance(clearance)
+        return in_blocks(partial(self.prover.proven, clearance=kept), *self._both_ends(A, B))
+
+    def prove(
+        self,
+        waypoints: ArrayLike,
+        *,
+        clearance: float | None = None,
+        slack: float = 0.0,
+        seconds: float | None = None,
+    ) -> Proof:
+        """Prove the straight motions between waypoints, shape (k, dof), free for their whole length; after [16].
+
+        Args:
+            waypoints: See above; a single one counts as a motion that stands still.
+            clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None.
+            slack: To be kept between all bodies on top of that [m]: how far a point may leave the straight motions.
+            seconds: When to stop; what was not looked at by then is not proven.
+
+        Raises:
+            InputError: If there are no waypoints, one is no finite row of ``dof`` numbers, or a number is out of range.
+        """
+        kept = self._proven_clearance(clearance)
+        spare = not_negative(slack, "slack")
+        limit = None if seconds is None else positive(seconds, "seconds")
+        return self.prover.route(self._rows(waypoints, 2), clearance=kept, slack=spare, seconds=limit)
+
+    def _proven_clearance(self, asked: float | None) -> float:
+        return self._settings.kept if asked is None else not_negative(asked, "clearance")
+
+    def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
+        """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
+        size = self.motion_resolution if resolution is None else positive(resolution, "resolution", "give metres")
+        return int(step_counts(self._rows(a, 1), self._rows(b, 1), self.weights, size)[0])
+
+    def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
+        """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
+        rows = self._rows(q, 1)
+        kept = self._checks.contacts_of_meshes_kept(rows)
+        pairs = tuple(pair for pair in self.pairs if pair not in kept) if kept else self.pairs
+        found = list(measured(self.bodies, pairs, self.robot.joint_frames(rows)[0], near_only=True))
+        if not found:
+            shared = not kept and self._settings.clearance == 0.0
+            certificate = self._certificate() if shared else Certificate(self.robot, self.bodies, pairs)
+            found = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
+        return tuple(sorted(found, key=lambda c: c.clearance))
+
+    def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
+        """The pair of bodies that is nearest to contact or to its margin at q, or deepest in it; None if there is none.
+
+        ``known_free`` leaves out the check for contacts, where they were ruled out before.
+        """
+        if known_free is not True and (touching := self.contacts(q)):
+            return touching[0]
+        found = measured(self.bodies, self.pairs, self.robot.joint_frames(self._rows(q, 1))[0], near_only=False)
+        return min(found, key=lambda c: c.clearance, default=None)
+
+    def clearance(self, q: ArrayLike) -> float:
+        """Smallest signed distance less its margin at q [m]: negative in collision, +inf if nothing can collide."""
+        nearest = self.closest(q)
+        return float("inf") if nearest is None else nearest.clearance
+
+    def too_near(self, q: ArrayLike) -> tuple[Contact, ...]:
+        """Every pair that keeps its margin at q, and not the clearance on top of it, nearest first; see ``settings``.
+
+        The ``margin`` of such a contact is that of the obstacle and the clearance together.
+        """
+        if self._settings.clearance == 0.0:
+            return ()
+        frames = self.robot.joint_frames(self._rows(q, 1))[0]
+        roomy = with_room(self._bodies, self._settings.clearance).whole
+        near = measured(roomy, self.pairs, frames, near_only=True)
+        kept = (c for c in near if c.clearance + self._settings.clearance > 0.0)
+        return tuple(sorted(kept, key=lambda c: c.clearance))
+
+    def explain(self, q: ArrayLike) -> str:
+        """A line that says why q is not valid; "" if it is.
+
+        It names the joint outside its limit, the pair in collision, nearer than its margin or than the clearance, or
+        the path constraint that q does not keep.
+        """
+        row = self._rows(q, 1)[0]
+        if fault := self.robot.limit_fault(row):
+            return fault
+        if touching := self.contacts(row):
+            return f"{touching[0]}{_and_more(touching)}"
+        if near := self.too_near(row):
+            wanted = f"nearer than the clearance of {1e3 * self._settings.clearance:.4g} mm asked for"
+            apart = f"'{near[0].first}' and '{near[0].second}' are {1e3 * near[0].distance:.4g} mm apart"
+            return f"{apart}, {wanted}{_and_more(near)}"
+        if self.constraints is not None and (breach := self.constraints.explain(row)):
+            return breach
+        if self.valid(row):
+            return ""
+        nearest = self.closest(row, known_free=True)
+        return "it is not proven free" if nearest is None else f"{nearest}, too near to be told free"
+
+    def certify(self, Q: ArrayLike) -> Mask:
+        """A second opinion on rows of Q, (m, dof) -> (m,), not by the checks of planners: proofs first, then coal."""
+        mask = self.robot.within_limits(rows := self._rows(Q, 2))
+        open_ = mask & ~self.prover.still_proven(rows, clearance=self._settings.clearance)
+        mask[open_] = self._certificate().free(rows[open_])
+        return mask if self.constraints is None else mask & self.constraints.held(rows)
+
+    def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:
+        starts, ends = self._rows(A, 2), self._rows(B, 2)
+        if len(starts) != len(ends):
+            raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
+        return starts, ends
+
+    def _rows(self, Q: ArrayLike, dimensions: int) -> Matrix:
+        """Checked configurations as rows, shape (m, dof)."""
+        rows = Q if isinstance(Q, np.ndarray) and Q.dtype == np.float64 and Q.size <= MOST_NUMBERS else None
+        if rows is None or rows.ndim != dimensions or rows.shape[-1] != self.robot.dof or not np.isfinite(rows).all():
+            what = f"configurations of robot '{self.robot.name}'"
+            rows = self.robot.configuration(Q) if dimensions == 1 else finite_array(Q, (None, self.robot.dof), what)
+        return np.atleast_2d(rows)
+
+    def _free(self, rows: Matrix) -> Mask:
+        mask = self.robot.within_limits(rows) & (not self._always_colliding)
+        if mask.all():
+            mask = self._checks.free(rows)
+        else:
+            mask[mask] = self._checks.free(rows[mask])
+        if self.constraints is not None:
+            mask[mask] = self.constraints.held(rows[mask])
+        return mask
+
+    def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
+        mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
+        A, B = one_way(starts[mask], ends[mask])
+        counts = step_counts(A, B, self.weights, self.motion_resolution)
+        clearance = self._settings.proving
+        mask[mask] = free = self._checks.motions_free(A, B, counts, to_be_proven=clearance is not None)
+        if clearance is not None:
+            mask[mask] = self.prover.proven(A[free], B[free], clearance=clearance)
+        elif self.constraints is not None:  # a prover says that too
+            mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
+        return mask
+
+
+def _and_more(contacts: tuple[Contact, ...]) -> str:
+    more = len(contacts) - 1
+    return f" (and {more} more pair{'s' * (more > 1)})" if more else ""

@@ -1,0 +1,174 @@
+"""The motion table of a world: one rule of steps for Python and kernels, one table for all searches in the world."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.kernels import FREE
+from rrtik_ompl.kernels.search.motions.motion_kernels import check_motion, configuration_free, resolves, step_count
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, step_counts
+from rrtik_ompl.kernels.search.motions.row_kernels import row_at
+from rrtik_ompl.kernels.simd.compiled import entry
+from rrtik_ompl.kernels.simd.lanes import set_int
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Sphere
+from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.world import World
+
+pytestmark = pytest.mark.kernels
+
+MOTIONS = 1_000_000
+
+
+@entry
+def write_steps(motions: int, dof: int, starts: int, ends: int, count: int, sink: int) -> int:
+    for k in range(count):
+        set_int(sink, k, step_count(motions, row_at(starts, dof, k), row_at(ends, dof, k)))
+    return count
+
+
+@entry
+def write_answers(motions: int, dof: int, starts: int, ends: int, count: int, sink: int) -> int:
+    for k in range(count):
+        answer = check_motion(motions, row_at(starts, dof, k), row_at(ends, dof, k), resolves(motions))
+        set_int(sink, k, answer)
+    return count
+
+
+@entry
+def write_free(motions: int, dof: int, rows: int, count: int, sink: int) -> int:
+    for k in range(count):
+        set_int(sink, k, 1 if configuration_free(motions, row_at(rows, dof, k)) else 0)
+    return count
+
+
+def steps_in_kernels(motions: FastMotions, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    found = np.zeros(len(starts), dtype=np.int32)
+    places = starts.ctypes.data, ends.ctypes.data, len(starts), found.ctypes.data
+    write_steps(motions.address, motions.dof, *places)
+    return found
+
+
+def ball(x: float) -> Obstacle:
+    return Obstacle("ball", Sphere(0.2), pin.SE3(np.eye(3), np.array([x, 0.3, 0.5])))
+
+
+def arm_world(name: str = "ur5", **options: float | str) -> World:
+    return World(load_robot(name), Scene((ball(0.5),)), **options)
+
+
+def motions_within(world: World, count: int, share: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    rng, (low, high) = np.random.default_rng(seed), world.robot.finite_range()
+    starts = rng.uniform(low, high, (count, len(low)))
+    return starts, starts + share * rng.uniform(0.0, 1.0, (count, 1)) * (rng.uniform(low, high, starts.shape) - starts)
+
+
+def test_python_and_kernels_divide_a_million_motions_alike() -> None:
+    each = MOTIONS // 4
+    for name, share in (("ur5", 0.5), ("titan4", 1e-3), ("planar3", 1.0), ("puma560", 0.05)):
+        world = arm_world(name, motion_resolution=0.013)
+        starts, ends = motions_within(world, each, share)
+        expected = step_counts(starts, ends, world.weights, world.motion_resolution)
+        np.testing.assert_array_equal(steps_in_kernels(world.motions, starts, ends), expected)
+        assert expected.max() > expected.min() == 1
+        for k in range(0, each, each // 10):
+            assert world.steps(starts[k], ends[k]) == world.steps(ends[k], starts[k]) == expected[k]
+
+
+def test_a_motion_of_a_whole_number_of_steps_takes_that_number_wherever_it_is() -> None:
+    world = arm_world("ur5")
+    rng, counts = np.random.default_rng(1), np.arange(1, 2001)
+    starts = rng.uniform(-3.0, 3.0, (len(counts), 6))
+    ends = starts.copy()
+    ends[:, 0] += counts * world.motion_resolution / world.weights[0]
+    np.testing.assert_array_equal(step_counts(starts, ends, world.weights, world.motion_resolution), counts)
+    np.testing.assert_array_equal(steps_in_kernels(world.motions, starts, ends), counts)
+
+
+def test_steps_by_length_are_taken_where_they_are_more() -> None:
+    world = arm_world("ur5")
+    chain, starts, ends = world.robot.chain, *motions_within(world, 1000, 0.3)
+    rule = {"weights": world.weights, "resolution": world.motion_resolution}
+    motions = FastMotions(world.fast, chain.gain, chain.offset, **rule, steps_per_unit=100.0)
+    by_length = np.ceil(100.0 * np.linalg.norm(ends - starts, axis=1) - 1e-9)
+    expected = np.maximum(step_counts(starts, ends, **rule), by_length)
+    np.testing.assert_array_equal(steps_in_kernels(motions, starts, ends), expected)
+
+
+@pytest.mark.parametrize("accuracy", ["exact", "conservative"])
+def test_a_motion_is_checked_in_kernels_as_by_the_world(accuracy: str) -> None:
+    world = arm_world("titan4").with_accuracy(accuracy)
+    starts, ends = motions_within(world, 400, 0.3)
+    found = np.zeros(len(starts), dtype=np.int32)
+    for a, b in ((starts, ends), (ends, starts)):
+        write_answers(world.motions.address, 6, a.ctypes.data, b.ctypes.data, len(a), found.ctypes.data)
+        sides = world.robot.joint_values(a), world.robot.joint_values(b)
+        steps = step_counts(a, b, world.weights, world.motion_resolution)
+        forward = np.array([tuple(p) <= tuple(q) for p, q in zip(a, b, strict=True)])
+        first, second = (np.where(forward[:, None], *pair) for pair in (sides, sides[::-1]))
+        answers = world.fast.classify_edges(first, second, steps)
+        np.testing.assert_array_equal(found, answers)
+    assert 0 < (found == FREE).sum() < len(found)
+    assert world.motions.resolve
+
+
+def test_a_configuration_is_proven_free_in_kernels_as_by_the_world() -> None:
+    world = arm_world("titan4")
+    rows, _ = motions_within(world, 500, 0.0)
+    found = np.zeros(len(rows), dtype=np.int32)
+    write_free(world.motions.address, 6, rows.ctypes.data, len(rows), found.ctypes.data)
+    answers = world.fast.classify(world.robot.joint_values(rows), resolve=False)
+    np.testing.assert_array_equal(found != 0, answers == FREE)
+
+
+def test_a_world_keeps_its_motion_table_and_makes_another_for_other_rules() -> None:
+    world = arm_world()
+    motions = world.motions
+    assert world.motions is motions
+    careful = world.with_accuracy("conservative")
+    assert careful.motions is motions  # it differs in what is asked of coal alone
+    finer = world.with_resolution(0.5 * world.motion_resolution)
+    assert finer.motions.resolution == 0.5 * motions.resolution
+    assert finer.motions.fast is motions.fast
+
+
+def test_the_motion_table_of_a_moving_world_stays_when_obstacles_move() -> None:
+    world = MovingWorld(arm_world())
+    motions, (starts, ends) = world.motions, motions_within(arm_world(), 300, 0.2)
+    found = []
+    for x in (0.5, -0.4):
+        world.move(Scene((ball(x),)))
+        assert world.motions is motions
+        assert not motions.resolve
+        answers = np.zeros(len(starts), dtype=np.int32)
+        write_answers(motions.address, 6, starts.ctypes.data, ends.ctypes.data, len(starts), answers.ctypes.data)
+        within = world.robot.within_limits(starts) & world.robot.within_limits(ends)
+        found.append(answers == FREE)
+        np.testing.assert_array_equal(found[-1] & within, world.motion_valid_batch(starts, ends))
+    assert (found[0] != found[1]).any()
+
+
+def test_a_world_in_which_nothing_is_free_has_no_motion_table() -> None:
+    around_the_base = Obstacle("block", Box([1.0, 1.0, 1.0]))
+    assert World(load_robot("ur5"), Scene((around_the_base,))).motions is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"resolution": 0.0}, "resolution"),
+        ({"weights": np.ones(5)}, "weights"),
+        ({"gain": np.eye(6)[:5], "offset": np.zeros(5)}, "gain"),
+        ({"offset": np.zeros(5)}, "offset"),
+    ],
+)
+def test_a_rule_that_makes_no_sense_is_refused(wrong: dict[str, object], words: str) -> None:
+    world = arm_world()
+    chain = world.robot.chain
+    rule = {"gain": chain.gain, "offset": chain.offset, "weights": world.weights, "resolution": 0.01}
+    with pytest.raises(InputError, match=words):
+        FastMotions(world.fast, **{**rule, **wrong})

@@ -1,0 +1,72 @@
+"""The kernels for timing give what their twins in numpy give, and write nowhere else."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.tables.memory import table
+from rrtik_ompl.kernels.timing import layout, reference
+from rrtik_ompl.kernels.timing.reference import Rows
+
+pytestmark = pytest.mark.kernels
+seeds = st.integers(0, 2**32 - 1)
+
+
+def random_curve(rng, n, count):
+    vertices = np.cumsum(rng.normal(size=(count, n)), axis=0)
+    edges = np.diff(vertices, axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    radii = np.concatenate([[0.0], rng.uniform(0.01, 2.0, count - 2), [0.0]])
+    return vertices, along, edges / lengths[:, None], radii
+
+
+@settings(max_examples=30)
+@given(seeds, st.integers(1, 8), st.integers(2, 9))
+def test_places_on_a_curve(seed, n, count):
+    rng = np.random.default_rng(seed)
+    curve = random_curve(rng, n, count)
+    at = np.sort(np.append(rng.uniform(0.0, curve[1][-1], 50), curve[1]))
+    task = table(
+        dict(zip((layout.VERTICES, layout.ALONG, layout.DIRECTIONS, layout.RADII), curve, strict=True))
+        | {layout.AT: at, layout.VALUES: np.empty((len(at), 3 * n)), layout.WIDEST: np.array([curve[3].max()])}
+        | {layout.DOF: n, layout.COUNT: count, layout.PLACES: len(at)}
+    )
+    library(layout.KERNELS).sample_curve(task.address)
+    assert task.intact()
+    wanted = reference.sample_curve(*curve, at)
+    assert np.allclose(task[layout.VALUES].reshape(wanted.shape), wanted, rtol=1e-9, atol=1e-9)
+
+
+@settings(max_examples=30)
+@given(seeds, st.integers(1, 7), st.integers(0, 4))
+def test_the_fastest_motion(seed, n, extra):
+    rng = np.random.default_rng(seed)
+    curve = random_curve(rng, n, 4)
+    grid = np.linspace(0.0, curve[1][-1], 60)
+    shape = reference.sample_curve(*curve, grid)
+    first, second = rng.normal(size=(2, 60, extra))
+    rows = Rows(first, second, -rng.uniform(0.5, 2.0, (60, extra)), rng.uniform(0.5, 2.0, (60, extra)))
+    velocity, acceleration = rng.uniform(0.5, 3.0, (2, n))
+    cap = rng.uniform(0.5, 5.0, 60)
+    task = table(
+        {layout.SHAPE: shape, layout.VELOCITY: velocity, layout.ACCELERATION: acceleration}
+        | dict(zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), rows, strict=True))
+        | {layout.CAP: cap, layout.GRID: grid, layout.SQUARES: np.zeros(60), layout.REACHED: np.zeros(60)}
+        | {layout.LINES: np.zeros(layout.LINE * layout.line_count(n, extra))}
+        | {layout.JOINTS: n, layout.ROWS: extra, layout.POINTS: 60}
+    )
+    library(layout.KERNELS).find_squares(task.address)
+    assert task.intact()
+    squares = task[layout.SQUARES]
+    every, most = reference.all_rows(shape, velocity, acceleration, rows, cap)
+    assert np.allclose(squares, reference.find_squares(every, most, grid), rtol=1e-6, atol=1e-8)
+    u = 0.5 * np.diff(squares) / np.diff(grid)
+    for at, x in ((slice(None, -1), squares[:-1]), (slice(1, None), squares[1:])):
+        value = every.first[at] * u[:, None] + every.second[at] * x[:, None]
+        assert (value <= every.high[at] + 1e-6).all()
+        assert (value >= every.low[at] - 1e-6).all()
+    assert (squares <= most * (1 + 1e-9)).all()
+    assert squares[0] == squares[-1] == 0.0

@@ -1,0 +1,183 @@
+"""What leaves the library: samples, messages, files, the report, the plot, the page."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import yaml
+
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, load_trajectory, motion_report, time_parameterize
+from rrtik_ompl.viewer import view
+from rrtik_ompl.viewer.plots.joints import plot_joints
+from rrtik_ompl.world.path import JointPath
+
+LIMITS = RateLimits([1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [20.0, 20.0, 20.0])
+ODD = RateLimits([1.07] * 3, [2.3] * 3, [19.0] * 3)  # with them phases of a motion end between two ticks of a drive
+ROWS = [[0.0, 0.0, 0.0], [0.97, -0.53, 0.21], [0.3, 0.4, 0.0]]
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot("planar3")
+
+
+@pytest.fixture(scope="module")
+def motion(robot):
+    return time_parameterize(JointPath.of(robot, [[0.0, 0.0, 0.0], [1.0, -0.5, 0.2]]), LIMITS)
+
+
+def test_samples_come_at_the_control_rate_and_end_at_the_end(motion):
+    clock, state = motion.sampled(125.0)
+    assert np.allclose(np.diff(clock)[:-1], 0.008)
+    assert 0.0 < clock[-1] - clock[-2] <= 0.008 * (1 + 1e-6)
+    assert clock[-1] == motion.duration
+    assert (state.positions == motion(clock).positions).all()
+    for rate in (0.0, -1.0, np.nan, "fast"):
+        with pytest.raises(InputError, match="control rate"):
+            motion.sampled(rate)
+
+
+@pytest.mark.parametrize(("ending", "accelerations"), [("yaml", True), ("yaml", False), ("ros.json", True)])
+def test_yaml_and_ros_json_are_the_message_of_ros_and_nothing_else(tmp_path, robot, motion, ending, accelerations):
+    file = tmp_path / f"motion.{ending}"
+    motion.save(file, rate=100.0, accelerations=accelerations)
+    document = yaml.safe_load(file.read_text())
+    assert list(document) == ["header", "joint_names", "points"]
+    fields = {"positions", "velocities", "time_from_start"} | ({"accelerations"} if accelerations else set())
+    for point in document["points"]:
+        assert set(point) == fields
+        assert set(point["time_from_start"]) == {"sec", "nanosec"}
+        assert all(type(value) is int for value in point["time_from_start"].values())
+        assert 0 <= point["time_from_start"]["nanosec"] < 10**9
+    again = load_trajectory(file, robot)
+    clock = np.linspace(0.0, motion.duration, 500)
+    assert np.abs(again(clock).positions - motion(clock).positions).max() < 1e-5
+    assert not re.search(r"-0\.0[,\]]", file.read_text())
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("a: [1", "line"), ("- 1", "points"), ("points: [{positions: [0]}]", "velocities"), ("{}", "points")],
+)
+def test_yaml_that_is_no_trajectory_is_refused_in_one_line(tmp_path, text, words):
+    file = tmp_path / "a.yaml"
+    file.write_text(text)
+    with pytest.raises(InputError, match=words) as caught:
+        load_trajectory(file)
+    assert "\n" not in str(caught.value)
+
+
+def test_mcap_holds_joint_states_at_their_times(tmp_path, motion):
+    reader = pytest.importorskip("mcap.reader")
+    file = tmp_path / "motion.mcap"
+    motion.save(file, rate=50.0)
+    clock, state = motion.sampled(50.0)
+    with file.open("rb") as source:
+        messages = [(m.log_time, json.loads(m.data)) for _, _, m in reader.make_reader(source).iter_messages()]
+    assert [stamp for stamp, _ in messages] == [round(t * 1e9) for t in clock]
+    assert np.allclose([found["position"] for _, found in messages], state.positions)
+    assert messages[0][1]["name"] == list(motion.joint_names)
+
+
+def test_the_report_names_peaks_switches_and_jumps(motion):
+    found = motion_report(motion, LIMITS)
+    assert found.kept
+    assert found.velocity.max() == pytest.approx(1.0)
+    assert (found.switches * motion.duration == 1).all()  # once from pushing to braking
+    assert (found.jump == 0.0).all()
+    assert "within all limits" in str(found)
+    brisk = time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 2.0))
+    shown = motion_report(brisk, RateLimits(0.5, 2.0))
+    assert shown.jump == pytest.approx([2.0])
+    assert not shown.kept
+    assert "exceeds" in str(shown)
+    assert "jumps by" in str(shown)
+    with pytest.raises(InputError, match="limits for 3"):
+        motion_report(brisk, LIMITS)
+
+
+def test_the_plot_draws_limits_and_marks_jumps(tmp_path):
+    brisk = time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 2.0))
+    files = [tmp_path / name for name in ("plain.svg", "limits.svg")]
+    plot_joints(brisk, files[0])
+    plot_joints(brisk, files[1], limits=RateLimits(1.0, 2.0))
+    texts = [file.read_text() for file in files]
+    assert len(texts[1]) > len(texts[0])
+    smooth = time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 2.0, 10.0))
+    plot_joints(smooth, files[1])
+    assert files[1].read_text().count("<use") < texts[0].count("<use")  # four triangles less
+    with pytest.raises(InputError, match="limits for 2"):
+        plot_joints(brisk, files[0], limits=RateLimits([1.0, 1.0], 1.0))
+
+
+def test_a_timed_motion_is_played_in_real_time(tmp_path, robot, motion):
+    file = view(robot, motion, html=tmp_path / "page.html")
+    text = file.read_text()
+    story = json.loads(text[text.index('{"title"') :].partition("</script>")[0].rstrip().rstrip(";"))
+    assert story["timed"] is True
+    assert story["times"][-1] == pytest.approx(motion.duration)
+    assert np.allclose(story["waypoints"], motion(story["times"]).positions, atol=1e-6)
+    with pytest.raises(InputError, match="planar3"):
+        view(robot, Trajectory([0.0, 1.0], [[0.0], [0.0]], [[0.0], [0.0]]), html=file)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, np.nan, 1e300, 1e-300, "slow", None])
+def test_a_factor_that_is_none_is_refused(factor):
+    with pytest.raises(InputError, match="factor of a trajectory"):
+        Trajectory([0.0, 1.0], [[0.0], [1.0]], [[0.0], [0.0]]).slowed(factor)
+
+
+@pytest.mark.parametrize("rate", [50.0, 125.0, 300.0, 1000.0])
+@pytest.mark.parametrize("ending", [".json", ".csv", ".yaml", ".ros.json"])
+def test_set_points_stay_what_they_are_and_keep_the_limits_of_their_motion(tmp_path, robot, ending, rate):
+    motion = time_parameterize(JointPath.of(robot, ROWS), ODD)
+    file, again = tmp_path / f"motion{ending}", tmp_path / f"again{ending}"
+    motion.save(file, rate=rate)
+    found = load_trajectory(file, robot)
+    clock, state = motion.sampled(rate)
+    at = found.set_points
+    np.testing.assert_allclose(found.times[at], clock, rtol=0.0, atol=1e-9)
+    for rows, wanted in zip((found.positions, found.velocities, found.accelerations), state, strict=True):
+        np.testing.assert_array_equal(rows[at], wanted)
+    np.testing.assert_allclose(found(clock).positions, state.positions, rtol=0.0, atol=2e-9)
+    dense = np.linspace(0.0, motion.duration, 5000)
+    assert np.abs(found(dense).positions - motion(dense).positions).max() < 20.0 / rate**3
+    report = motion_report(found, ODD)
+    assert report.kept
+    assert not report.jump.any()
+    assert not motion_report(found, RateLimits(ODD.velocity, ODD.acceleration, 0.9 * ODD.jerk)).kept
+    found.save(again)
+    assert again.read_text() == file.read_text()
+    assert found.slowed(2.0).peaks().velocity == pytest.approx(0.5 * found.peaks().velocity)
+
+
+def test_points_that_are_far_from_each_other_are_no_set_points(tmp_path, robot):
+    motion = time_parameterize(JointPath.of(robot, ROWS), ODD)
+    motion.save(tmp_path / "sparse.json", rate=10.0)
+    sparse = load_trajectory(tmp_path / "sparse.json")
+    clock, state = motion.sampled(10.0)
+    assert sparse.set_points is None
+    for found, wanted in zip(sparse(clock), state, strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-9)
+    assert not sparse.jumps().max() > 1e-6
+    assert not motion_report(sparse, ODD).kept
+
+
+def test_set_points_of_a_motion_that_jumps_exceed_a_jerk_limit(tmp_path, robot):
+    hard = time_parameterize(JointPath.of(robot, ROWS), RateLimits(1.07, 2.3))
+    hard.save(tmp_path / "hard.csv", rate=100.0)
+    found = load_trajectory(tmp_path / "hard.csv")
+    assert found.set_points is not None
+    assert motion_report(found, RateLimits(1.07, 2.3)).kept
+    assert not motion_report(found, ODD).kept
+
+
+def test_a_tick_just_before_the_end_is_the_end(tmp_path, robot):
+    motion = time_parameterize(JointPath.of(robot, ROWS), LIMITS)
+    assert 3.1 < motion.duration < 3.1 + 1e-9
+    assert np.diff(motion.sampled(1000.0)[0]).min() > 0.9e-3
+    motion.save(tmp_path / "motion.yaml", rate=1000.0)
+    assert load_trajectory(tmp_path / "motion.yaml").duration == pytest.approx(3.1)

@@ -1,0 +1,164 @@
+"""Files of certificates: written and read without loss, and refused in one line where they are broken."""
+
+import json
+import pickle
+import re
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.files.text import MAX_BYTES
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.world.certificates.certificate import Certificate, MotionEntries, from_document, load_certificate
+from rrtik_ompl.world.proof import Proof
+from rrtik_ompl.world.world import World
+
+
+def certificate():
+    """Of two motions, one of them without entries."""
+    solids = np.array([[3, 0, 5, 1], [3, 0, 5, 1]])
+    entries = MotionEntries(solids, np.array([[1, 0], [1, 1]]), np.array([[0.6, 0.8, 0.0], [0.0, 0.0, 0.0]]))
+    none = MotionEntries(np.zeros((0, 4), int), np.zeros((0, 2), int), np.zeros((0, 3)))
+    rows = np.array([[0.1, -0.0], [1.0 / 3.0, 2e-300], [np.pi, -1e6]])
+    return Certificate("arm", "0123", "4567", 0.001, 0.002, rows, (entries, none))
+
+
+def test_a_certificate_is_read_as_it_was_written(tmp_path):
+    file = tmp_path / "c.json"
+    certificate().save(file)
+    again = load_certificate(file)
+    assert again.document() == certificate().document()
+    assert again.waypoints.tobytes() == certificate().waypoints.tobytes()
+    assert [len(motion.solids) for motion in again.motions] == [2, 0]
+    assert not again.waypoints.flags.writeable
+
+
+def _with(field, value):
+    return lambda document: document | {field: value}
+
+
+def _without(field):
+    return lambda document: {name: value for name, value in document.items() if name != field}
+
+
+def _entry(row):
+    return lambda document: document | {"motions": [[[3, 0, 5, 1, 0, 0], row], []]}
+
+
+NAN, INFINITE = float("nan"), float("inf")
+BROKEN = {
+    "no motions": (_without("motions"), "motions"),
+    "no waypoints": (_without("waypoints"), "waypoints"),
+    "unknown field": (_with("colour", "red"), "colour"),
+    "future version": (_with("version", 2), "version"),
+    "true for a version": (_with("version", True), "version"),
+    "version of a fraction": (_with("version", 1.0), "version"),
+    "another kind": (_with("kind", "joint_path"), "kind"),
+    "number for a name": (_with("robot", 7), "robot"),
+    "list for a digest": (_with("scene_digest", []), "scene_digest"),
+    "text for a clearance": (_with("clearance", "0.001"), "clearance"),
+    "true for a clearance": (_with("clearance", True), "clearance"),
+    "text for a self margin": (_with("self_margin", "0.001"), "self_margin"),
+    "negative self margin": (_with("self_margin", -1.0), "self_margin"),
+    "nan for a clearance": (_with("clearance", NAN), "clearance"),
+    "endless clearance": (_with("clearance", INFINITE), "clearance"),
+    "negative clearance": (_with("clearance", -1.0), "clearance"),
+    "text for waypoints": (_with("waypoints", "none"), "waypoints"),
+    "text in waypoints": (_with("waypoints", [["0", "1"]] * 3), "waypoints"),
+    "nan in waypoints": (_with("waypoints", [[0.0, NAN]] * 3), "waypoints"),
+    "huge number in waypoints": (_with("waypoints", [[0, 10**400]] * 3), "waypoints"),
+    "ragged waypoints": (_with("waypoints", [[0.0, 1.0], [0.0], [0.0, 1.0]]), "waypoints"),
+    "empty waypoints": (_with("waypoints", []), "waypoints"),
+    "too few motions": (_with("motions", [[]]), "motions"),
+    "no list of motions": (_with("motions", {"0": []}), "motions"),
+    "no list of entries": (_with("motions", [[], 4]), "motions[1]"),
+    "short entry": (_entry([3, 0, 5, 1, 0]), "motions[0][1]"),
+    "entry of seven": (_entry([3, 0, 5, 1, 0, 0, 1.0]), "motions[0][1]"),
+    "no entry": (_entry(None), "motions[0][1]"),
+    "negative body": (_entry([-3, 0, 5, 1, 0, 0]), "motions[0][1]"),
+    "body of a fraction": (_entry([3.0, 0, 5, 1, 0, 0]), "motions[0][1]"),
+    "true for a part": (_entry([3, True, 5, 1, 0, 0]), "motions[0][1]"),
+    "huge body": (_entry([10**30, 0, 5, 1, 0, 0]), "motions[0][1]"),
+    "deep level": (_entry([3, 0, 5, 1, 31, 0]), "motions[0][1]"),
+    "number beyond its level": (_entry([3, 0, 5, 1, 2, 4]), "motions[0][1]"),
+    "nan in a normal": (_entry([3, 0, 5, 1, 0, 0, NAN, 0.0, 1.0]), "motions[0][1]"),
+    "endless normal": (_entry([3, 0, 5, 1, 0, 0, INFINITE, 0.0, 1.0]), "motions[0][1]"),
+    "no normal": (_entry([3, 0, 5, 1, 0, 0, 0.0, 0.0, 0]), "motions[0][1]"),
+    "text in a normal": (_entry([3, 0, 5, 1, 0, 0, "1", 0.0, 0.0]), "motions[0][1]"),
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_a_broken_certificate_is_refused_in_one_line_with_file_and_field(what, tmp_path):
+    change, field = BROKEN[what]
+    file = tmp_path / "c.json"
+    file.write_text(json.dumps(change(certificate().document())))
+    with pytest.raises(InputError, match=re.escape(field)) as caught:
+        load_certificate(file)
+    assert str(caught.value).startswith(str(file))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "not JSON"),
+        (b"[1, 2]", "expected an object"),
+        (b"{", "not JSON"),
+        (b"\x7fELF\xff\xfe", "not a text file"),
+        (b"[" * 100_000, "nested"),
+    ],
+)
+def test_a_file_that_is_no_json_object_is_refused(data, words, tmp_path):
+    file = tmp_path / "c.json"
+    file.write_bytes(data)
+    with pytest.raises(InputError, match=words):
+        load_certificate(file)
+
+
+def test_a_file_that_is_too_large_or_is_not_there_is_refused(tmp_path):
+    with open(tmp_path / "large.json", "wb") as file:
+        file.truncate(MAX_BYTES + 1)
+    for name, words in (("large.json", "larger than 64 MiB"), ("none.json", "no such file"), ("c.yaml", "ending")):
+        with pytest.raises(InputError, match=words):
+            load_certificate(tmp_path / name)
+    with pytest.raises(InputError, match="ending"):
+        certificate().save(tmp_path / "c.txt")
+
+
+def test_every_cut_of_a_document_is_refused_or_read(tmp_path):
+    text = json.dumps(certificate().document())
+    for end in range(0, len(text), 7):
+        (tmp_path / "c.json").write_text(text[:end])
+        with pytest.raises(InputError):
+            load_certificate(tmp_path / "c.json")
+    assert from_document(json.loads(text)).robot == "arm"
+
+
+# --- digests -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.kernels
+def test_a_proof_names_what_it_is_about():
+    robot = rrtik.load_robot("planar3", radius=0.02)
+
+    def digest(x, margin=0.0):
+        wall = Obstacle("wall", Box([0.1, 0.1, 1.0]), rrtik.pose([x, 2.0, 0.0]), margin=margin)
+        proof = World(robot, Scene([wall])).prove(np.zeros((2, 3)))
+        assert pickle.loads(pickle.dumps(proof)) == proof
+        assert pickle.loads(pickle.dumps(proof)).digest == proof.digest
+        return proof.digest
+
+    other = World(rrtik.load_robot("planar3", radius=0.03)).prove(np.zeros((2, 3))).digest
+    found = [digest(1.0), digest(1.0 + 1e-9), digest(1.0, margin=0.001), other]
+    assert len(set(found)) == 4
+    assert all(re.fullmatch("[0-9a-f]{32}", text) for text in found)
+    assert digest(1.0) == found[0]
+    assert found[0][:16] == found[1][:16] != other[:16]
+
+
+def test_a_proof_made_by_hand_has_no_digest():
+    assert Proof(0, 0.0, ()).digest == ""
