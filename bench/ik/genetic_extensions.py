@@ -159,7 +159,7 @@ def poses(report: Report, count: int) -> None:
     report.table("Poses: 60 along a line in joint space, tolerances 1 mm and 0.01 rad", head, rows)
 
 
-def _line(robot: rrtik.robot.Robot, seed: int) -> np.ndarray:
+def _line(robot: rrtik.Robot, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     lower, upper = robot.finite_range()
     begin = rng.uniform(lower, upper)

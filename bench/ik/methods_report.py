@@ -32,7 +32,7 @@ HEAD = [
 ]
 
 
-def goals(robot: rrtik.robot.Robot, count: int, points: bool) -> list[rrtik.PoseGoal | rrtik.PositionGoal]:
+def goals(robot: rrtik.Robot, count: int, points: bool) -> list[rrtik.PoseGoal | rrtik.PositionGoal]:
     rng = np.random.default_rng(0)
     tips = [robot.fk(rng.uniform(*robot.finite_range())) for _ in range(count)]
     return [rrtik.PositionGoal(tip.translation) if points else rrtik.PoseGoal(tip) for tip in tips]

@@ -194,8 +194,9 @@ def write(report: Report, results: dict[str, list[Scene]], options: argparse.Nam
     for arm, found in results.items():
         tables(report, arm, found)
     text = (
-        f"Scenes of `rrtik_ompl.planning.generated_problems`, families in turns, seeds 0, 1, ...; every one has a path, found "
-        f"by RRT-Connect or BiCRDT, but neither a free straight motion nor a free order of moving every joint once. "
+        f"Scenes of `rrtik_ompl.planning.generated_problems`, families in turns, seeds 0, 1, ...; every one has a "
+        f"path, found by RRT-Connect or BiCRDT, but neither a free straight motion nor a free order of moving every "
+        f"joint once. "
         f"Limits: {LIMIT:g} s for every planner, {MAKE_FEWER:g} s for fewest-moves as a way to shorten; times are wall "
         f"clock and include all stages; {options.jobs} at a time."
     )

@@ -151,10 +151,10 @@ def _judged(own: list[Judged]) -> list[str]:
 
 HEADS = ["paths", "proven", "deepest cut of these [um]", "of the others [um]", "clearance kept, median [mm]"]
 GENERATED = (
-    "Scenes of `rrtik_ompl.planning.generated_problems` with up to six plates of 0.1 mm and needles of 0.2 mm radius about the "
-    "straight way; planners by turns: fastrrtconnect, bicrdt, OMPL's RRTConnect. The judge samples every path at 1/50 "
-    "of the motion resolution with the discrete checks, every 100th sample with coal and numpy alone, and measures "
-    "with coal how deep it is in."
+    "Scenes of `rrtik_ompl.planning.generated_problems` with up to six plates of 0.1 mm and needles of 0.2 mm radius "
+    "about the straight way; planners by turns: fastrrtconnect, bicrdt, OMPL's RRTConnect. The judge samples every "
+    "path at 1/50 of the motion resolution with the discrete checks, every 100th sample with coal and numpy alone, and "
+    "measures with coal how deep it is in."
 )
 SHORTENED = (
     "The same scenes and judge. Before: the same method with the same seed, motions checked in steps half as long as "

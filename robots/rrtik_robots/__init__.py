@@ -1,1 +1,1 @@
-"""Robots and problems that ship with the toolkit; found by name through entry points, see ``rrtik_ompl.description.catalog``."""
+"""Robots and problems that ship with the toolkit; ``rrtik_ompl.description.catalog`` finds them by entry points."""

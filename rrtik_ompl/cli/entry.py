@@ -34,7 +34,7 @@ def _end(code: int, *, everything_else: bool) -> None:
         watched = sys.gettrace() is not None or sys.getprofile() is not None  # by who wants to see the end
         if watched or any(not t.daemon and t is not threading.main_thread() for t in threading.enumerate()):
             sys.exit(code)
-        atexit._run_exitfuncs()
+        atexit._run_exitfuncs()  # noqa: SLF001 - as the interpreter would at its end
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):  # the reader may have gone
             stream.flush()

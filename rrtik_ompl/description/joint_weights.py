@@ -23,6 +23,11 @@ def given_weights(robot: Robot) -> list[float]:
     return [robot.joint_weights.get(joint, 1.0) for joint in robot.joint_names]
 
 
+def weights_as_costs(robot: Robot) -> dict[str, list[float]]:
+    """The option ``joint_costs`` that the weights of a robot's joints make; nothing if it has none."""
+    return {"joint_costs": given_weights(robot)} if robot.joint_weights else {}
+
+
 def weighted_difference(robot: Robot, Q: Matrix, q: Vector) -> Matrix:
     """``Q - q`` per joint, the short way round, multiplied by the weights. Shape of Q, (..., dof)."""
     away = joint_difference(robot, Q, q)

@@ -44,7 +44,7 @@ def source_entry(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
-    """A base pose in any form that `rrtik_ompl.base.poses.rigid` takes, or as ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
+    """A base pose in any form of `rrtik_ompl.base.poses.rigid`, or as ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
 
     Raises:
         InputError: If it is neither, or a key or number in it makes no sense.

@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt from many starts in numpy: the reference implementation of :mod:`rrtik_ompl.kernels.ik.ik_kernels`.
+"""Levenberg-Marquardt from many starts in numpy: the reference of :mod:`rrtik_ompl.kernels.ik.ik_kernels`.
 
 Source: [22]: the damping is the residual itself plus a small constant, so that steps are short far
 from the target and in singular postures, and Newton's near the solution.

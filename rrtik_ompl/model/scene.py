@@ -318,7 +318,7 @@ class Scene:
             name: Of the obstacle.
             link: That holds it from now on.
             allow: Links and obstacles that it may touch beside that link.
-            pose: T_link_object, in any form that :func:`rrtik_ompl.base.poses.rigid` takes; the link's own frame if None.
+            pose: T_link_object, in any form of :func:`rrtik_ompl.base.poses.rigid`; the link's own frame if None.
             padding: What it keeps from all that it may not touch, beside its margin [m]; that of the link if None.
 
         Raises:

@@ -3,8 +3,8 @@
 What touches when it is attached may go on touching, a millimetre deeper than then at most, until the two are apart;
 from there on the pair is checked as any other. Before something is taken or set down it may touch, a millimetre deep at
 most, on the motion that leads there. Never may thin things be so deep in each other that they could pass through
-(:mod:`rrtik_ompl.geometry.collision.thickness`). All of it is a distance that a pair of things must keep, negative for a depth
-(:class:`rrtik_ompl.Touching`), so that proofs and certificates hold as they do for margins.
+(:mod:`rrtik_ompl.geometry.collision.thickness`). All of it is a distance that a pair of things must keep, negative for
+a depth (:class:`rrtik_ompl.Touching`), so that proofs and certificates hold as they do for margins.
 """
 
 from __future__ import annotations

@@ -142,8 +142,9 @@ class JointPath:
         """The list of single-joint moves that the path consists of; consecutive moves of the same joint are one.
 
         Raises:
-            InputError: If an edge moves several joints at once; :func:`rrtik_ompl.planning.moves.staircase.one_joint_moves`
-                makes a path of single-joint moves from any path.
+            InputError: If an edge moves several joints at once;
+                :func:`rrtik_ompl.planning.moves.staircase.one_joint_moves` makes a path of single-joint moves from any
+                path.
         """
         rows = merge_moves(self.waypoints)
         changes = moved(rows[:-1], rows[1:])

@@ -6,13 +6,12 @@ TESTS = ROOT / "tests"
 
 
 ROOMS = {file.parent.name for file in (ROOT / "rrtik_ompl").glob("*/__init__.py")}
-# Modules of the root are tested in the last two.
-OTHERS = {"bench", "docs", "helpers", "house", "planners", "robots", "planning", "spine"}
+OTHERS = {"bench", "docs", "helpers", "house", "planners", "robots"}
 
 
 def test_every_room_has_its_folder():
-    folders = {folder.parent.name for folder in TESTS.glob("*/test_*.py")} | {"fast", "helpers"}
-    assert folders == ROOMS - {"shapes"} | OTHERS  # shapes are tested by what they become, in collision
+    folders = {file.relative_to(TESTS).parts[0] for file in TESTS.rglob("test_*.py")} | {"helpers"}
+    assert folders == ROOMS | OTHERS
 
 
 def test_every_test_file_lies_in_a_folder():

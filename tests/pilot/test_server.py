@@ -8,7 +8,6 @@ import struct
 import time
 
 import pytest
-import tornado.httpclient
 import tornado.websocket
 
 from rrtik_ompl.base.errors import InputError

@@ -1,7 +1,7 @@
 """Balls around a solid (outer cover, contains it) and balls inside it (inner spheres), for any coal geometry.
 
-An outer cover is proven, not sampled: the solid is cut into convex elements without gaps (``geometry/covers/cells.py``), and
-every element lies wholly inside one ball (``geometry/covers/search.py`` finds the balls).
+An outer cover is proven, not sampled: the solid is cut into convex elements without gaps
+(``geometry/covers/cells.py``), and every element lies wholly inside one ball (``geometry/covers/search.py``).
 
 Spheres are float64 arrays of shape (n, 4): centre x, y, z and radius [m], in the frame of the geometry. Containment
 holds within 1e-9 of the size of the solid [m per m].
@@ -48,8 +48,8 @@ def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = 
 
     Args:
         geometry: A coal geometry. A mesh is taken with its interior: every point whose winding number is not 0 or,
-            if it is open, what it encloses (:mod:`rrtik_ompl.geometry.collision.enclosure`). A kind that is not known here gets
-            one ball (of infinite radius if the kind has no bounds).
+            if it is open, what it encloses (:mod:`rrtik_ompl.geometry.collision.enclosure`). A kind that is not known
+            here gets one ball (of infinite radius if the kind has no bounds).
         protrusion: How far a ball may reach beyond the solid [m]; if that takes too many balls or too fine a cut, the
             cover reaches farther (see ``protrusion_bound``). None: what a number of balls that suits the size of
             the solid allows.

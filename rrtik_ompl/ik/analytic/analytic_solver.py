@@ -52,8 +52,8 @@ class AnalyticSolver:
             inside the limits whenever it has a solution there. The number is the slack [m, sine]: a pose that near to
             a singular one is answered as if it were singular, off by at most about that.
         nearness: From Q, shape (m, dof), to the named singular cases: 0 at the singularity, in [0, 1] or metres.
-        kernel: The function of `rrtik_ompl.kernels.ik.branch_kernels` that gives the same for poses that are not singular,
-            "" if there is none; and the ``numbers`` that it takes.
+        kernel: The function of `rrtik_ompl.kernels.ik.branch_kernels` that gives the same for poses that are not
+            singular, "" if there is none; and the ``numbers`` that it takes.
     """
 
     frame: str

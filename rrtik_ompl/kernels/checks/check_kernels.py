@@ -2,7 +2,7 @@
 
 Configurations are FREE if the outer balls (a cover around every body) meet nothing, COLLIDING if the inner balls
 (inside them) do or the narrow phase proves it, UNDECIDED otherwise. The configurations checked along a motion are those
-of :class:`rrtik_ompl.world.world.World`. Python calls the functions marked ``@entry`` with addresses; other kernels call
+of :class:`rrtik_ompl.World`. Python calls the functions marked ``@entry`` with addresses; other kernels call
 :func:`check_part` and :func:`check_edge`.
 """
 

@@ -1,7 +1,7 @@
 """Kernels of one ball against one primitive: whether it meets the ball, and how far it is away, in all lanes at once.
 
-Which primitives are in reach of a ball at all: :mod:`rrtik_ompl.kernels.checks.broad_phase`. A set of lanes is an integer,
-one bit a lane. Primitives: see :mod:`rrtik_ompl.kernels.layout`; a primitive of an unknown kind counts as met
+Which primitives are in reach of a ball at all: :mod:`rrtik_ompl.kernels.checks.broad_phase`. A set of lanes is an
+integer, one bit a lane. Primitives: see :mod:`rrtik_ompl.kernels.layout`; a primitive of an unknown kind counts as met
 everywhere, and :func:`kinds_known` says so.
 """
 

@@ -1,8 +1,9 @@
 """Named access to memory in kernels: functions that read one number, or find one address, at a fixed place.
 
-``field``, ``int_at`` and their like in :mod:`rrtik_ompl.kernels.simd.lanes` take the place as a number. What is made here
-has the place built in, so that a kernel names what it reads, and Python gives it a type where it is named; see
-:mod:`rrtik_ompl.kernels.tables.accessors`. Each is compiled to the one load or sum that the number would be compiled to.
+``field``, ``int_at`` and their like in :mod:`rrtik_ompl.kernels.simd.lanes` take the place as a number. What is made
+here has the place built in, so that a kernel names what it reads, and Python gives it a type where it is named; see
+:mod:`rrtik_ompl.kernels.tables.accessors`. Each is compiled to the one load or sum that the number would be compiled
+to.
 """
 
 from __future__ import annotations

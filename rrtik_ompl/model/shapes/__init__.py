@@ -1,7 +1,8 @@
 """What obstacles and attached bodies are: frozen solids in their own frame, in metres (not how they collide).
 
 Here are those whose distance to a point has a short formula, and ``SHAPES``, which has every kind by its key in files.
-Whoever adds a kind to it and to ``rrtik_ompl.geometry.collision.shape_table``, before files are read, uses it like the others.
+Whoever adds a kind to it and to ``rrtik_ompl.geometry.collision.shape_table``, before files are read, uses it like the
+others.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, whole_number
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, listed, name_of, require
-from rrtik_ompl.description.joint_weights import given_weights
+from rrtik_ompl.description.joint_weights import weights_as_costs
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.transitions import merge_moves
 
@@ -98,11 +98,6 @@ class MoveRules:
         if len(route) == 0:
             raise InputError("route: needs at least one row")
         return route
-
-
-def weights_as_costs(robot: Robot) -> dict[str, Any]:
-    """The option ``joint_costs`` that the weights of a robot's joints make; nothing if it has none."""
-    return {"joint_costs": given_weights(robot)} if robot.joint_weights else {}
 
 
 def long_enough(route: Matrix, smallest_move: Vector) -> bool:

@@ -74,7 +74,8 @@ def fewest_moves(
 
     Returns:
         A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, and
-        more where that has been refuted (:mod:`rrtik_ompl.planning.moves.lower_bounds`), never with more than 12 such joints.
+        more where that has been refuted (:mod:`rrtik_ompl.planning.moves.lower_bounds`), never with more than 12
+        such joints.
 
     Raises:
         InputError: If an edge moves several joints or ``rounds`` is negative.

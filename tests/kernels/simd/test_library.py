@@ -337,7 +337,8 @@ def test_damaged_bitcode_of_the_package_is_passed_over(packaged, damage):
 def test_a_damaged_cache_of_numba_is_not_trusted(tmp_path):
     source, folder = tmp_path / "twice.py", tmp_path / "numba"
     source.write_text(
-        "from rrtik_ompl.kernels.simd.compiled import kernel\n@kernel\ndef twice(x):\n    return 2 * x\nprint(twice(21))"
+        "from rrtik_ompl.kernels.simd.compiled import kernel\n"
+        "@kernel\ndef twice(x):\n    return 2 * x\nprint(twice(21))"
     )
     for _ in range(2):
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}

@@ -21,7 +21,7 @@ COUNT, REGIONS, HELD_DOF, HELD_LOWER, HELD_UPPER, HELD_NUMBERS, COLUMNS, SQUARE,
 NODE = 11
 PER_METRE, PER_RADIAN, DAMPING, LARGEST_STEP = range(4)  # the numbers
 
-# Region: the joints that move its frame (LIMB) and memory for their frames (CALL), as of rrtik_ompl.kernels.ik.ik_layout;
+# Region: the joints that move its frame (LIMB) and memory for their frames (CALL), as of kernels.ik.ik_layout;
 # what it says of the orientation; its record
 LIMB, CALL, TURNING, RECORD = range(4)
 FREE_TURN, AXIS, BALL, RANGES = range(4)  # rrtik_ompl.constraints.held_region.Turning

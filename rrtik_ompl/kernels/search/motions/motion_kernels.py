@@ -1,6 +1,6 @@
 """Straight motions in kernels: joint values of configurations, steps of motions, and whether motions are free.
 
-The configurations that are checked are those of :class:`rrtik_ompl.world.world.World`, to the bit: a motion and its reverse
+The configurations that are checked are those of :class:`rrtik_ompl.World`, to the bit: a motion and its reverse
 are checked at the same ones.
 """
 
@@ -57,7 +57,7 @@ def whole_steps(steps: float) -> Any:
 
 @kernel
 def step_count(motions: MotionTable, start: Configuration, end: Configuration) -> Any:
-    """Number of steps in which a motion is checked; :func:`rrtik_ompl.kernels.search.motions.motion_table.step_counts`."""
+    """Number of steps in which a motion is checked, as :func:`~.motion_table.step_counts` gives it."""
     dof, weights, numbers = dof_of(motions), weights_of(motions), numbers_of(motions)
     travel, square = 0.0, 0.0
     for k in range(dof):

@@ -1,12 +1,14 @@
-"""What imports cost, and that what is imported is there; test_ladder holds who may import whom."""
+"""Who may import whom, what imports cost, and that what is imported is there."""
 
 import ast
 import inspect
+import re
 import subprocess
 import sys
 from importlib.util import find_spec
 
 import pytest
+from importlinter import api
 
 import rrtik_ompl
 from rrtik_tests.places import ROOT
@@ -23,6 +25,21 @@ PEERS = {
     "pyroboplan",
     "roboticstoolbox",
 }  # measured where they are installed
+
+
+def test_imports_keep_the_contracts_of_pyproject():
+    done = subprocess.run(
+        ["lint-imports", "--no-cache"], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stdout
+
+
+def test_every_room_of_the_ladder_has_a_row_in_the_architecture():
+    contracts = api.read_configuration(str(ROOT / "pyproject.toml"))["contracts_options"]
+    ladder = next(contract["layers"] for contract in contracts if contract["id"] == "ladder")
+    rooms = [room for floor in ladder for room in re.findall(r"\w+", floor)]
+    rows = re.findall(r"^\| `(\w+)/`", (ROOT / "ARCHITECTURE.md").read_text(), re.MULTILINE)
+    assert [room for room in rows if room in rooms] == rooms[::-1]
 
 
 @pytest.mark.parametrize(
