@@ -195,7 +195,7 @@ def in_notebook(thing: object) -> str | None:
 
     The page stands above all values; the package itself knows where.
     """
-    package: Any = sys.modules[__package__]
+    package: Any = sys.modules["rrtik_ompl"]
     drawn: str | None = package.html_of(thing)
     return drawn
 

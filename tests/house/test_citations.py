@@ -70,12 +70,7 @@ def without_number(text, pattern):
 
 
 def files(*folders):
-    return [
-        file
-        for folder in folders
-        for file in sorted((ROOT / folder).rglob("*"))
-        if file.suffix in KINDS
-    ]
+    return [file for folder in folders for file in sorted((ROOT / folder).rglob("*")) if file.suffix in KINDS]
 
 
 @pytest.fixture(scope="module")

@@ -34,7 +34,7 @@ from rrtik_ompl.pilot.overlay.surfaces import surface_of_shape
 from rrtik_ompl.problem_files.scene import load_scene, save_scene
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin, look_of_shape
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 L_SHAPE = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]]
 TETRAHEDRON = Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 PRIMITIVES = [Box([0.2, 0.3, 0.4]), Sphere(0.2), Cylinder(0.2, 0.5), Capsule(0.1, 0.5)]
