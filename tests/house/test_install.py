@@ -46,7 +46,7 @@ def test_the_floor_job_has_the_lowest_versions_that_are_admitted():
 
 
 def test_the_hook_that_makes_kernels_takes_the_same_numba():
-    hook = (ROOT / "rrtik_ompl" / "fast" / "simd" / "hatch_build.py").read_text()
+    hook = (ROOT / "rrtik_ompl" / "kernels" / "simd" / "hatch_build.py").read_text()
     assert f'"numba>={bounds()["numba"]}"' in hook
 
 

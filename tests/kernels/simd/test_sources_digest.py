@@ -54,9 +54,13 @@ def test_an_edit_of_covers_makes_nothing_anew(tmp_path):
         return subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
 
     before = keys().stdout
-    (copy / "covers" / "spheres.py").write_text("# changed\n" + (copy / "covers" / "spheres.py").read_text())
+    (copy / "geometry" / "covers" / "spheres.py").write_text(
+        "# changed\n" + (copy / "geometry" / "covers" / "spheres.py").read_text()
+    )
     assert keys().stdout == before
-    (copy / "fast" / "checks" / "gjk.py").write_text("# changed\n" + (copy / "fast" / "checks" / "gjk.py").read_text())
+    (copy / "kernels" / "checks" / "gjk.py").write_text(
+        "# changed\n" + (copy / "kernels" / "checks" / "gjk.py").read_text()
+    )
     assert keys().stdout != before
 
 
@@ -78,7 +82,7 @@ def test_the_sources_of_a_kernel_are_all_that_it_imports():
     for name in code_files.kernel_modules():
         code = f"import sys, rrtik_ompl.kernels.{name}; print(*sys.modules)"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        outside = {m for m in done.stdout.split() if m.startswith("rrtik_ompl.") and m.split(".")[1] != "fast"}
+        outside = {m for m in done.stdout.split() if m.startswith("rrtik_ompl.") and m.split(".")[1] != "kernels"}
         assert outside <= {
             "rrtik_ompl.files",
             *(f"rrtik_ompl.files.{name}" for name in ("cache", "digest", "notice")),
