@@ -32,7 +32,7 @@ LIBRARY = Path(rrtik.__file__).parent
 MARKER = "EXECUTED"
 RUNS = f"touch {MARKER}"
 OPENING = ("path", "file", "name_or_file", "name", "folder")  # first parameters of functions that open files
-NO_LOADERS = ("rrtik_ompl.kernels", "rrtik_ompl.ik")  # where load_ and read_ are of tables in memory
+NO_LOADERS = ("rrtik_ompl.kernels",)  # where load_ and read_ are of tables in memory
 ENDINGS = (
     ".yaml", ".yml", ".json", ".jsonl", ".csv", ".txt", ".xml", ".mjcf", ".urdf", ".xacro", ".srdf", ".stl", ".obj",
     ".dae", ".ply", ".pcd", ".npy", ".npz", ".bt", ".ot", ".png", ".jpg", ".pkl", ".pickle", ".ipynb", ".py", ".toml",

@@ -117,7 +117,7 @@ TOO_MANY = {
 
 GUARDED = """
 import resource, sys
-from tests.spine.test_what_is_a_number import TOO_MANY
+from tests.base.test_what_is_a_number import TOO_MANY
 import rrtik_ompl as rrtik
 most = 2 << 30
 soft = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize() + most
