@@ -20,6 +20,7 @@ from bench.constraints.runs import LIMIT, WALL
 from bench.peers.description import task_of
 from bench.peers.host import Host
 from bench.peers.task import Region, Rows
+from bench.shared.problems import goal_joints
 from rrtik_ompl.constraints.held_region import ANYWHERE
 from rrtik_ompl.ompl_bridge.attempt import quiet
 from rrtik_ompl.ompl_bridge.region_constraint import RegionConstraint
@@ -71,7 +72,7 @@ def others(python: str, name: str, kind: str, seed: int) -> Others:
     rrtik.plan(problem, "cbirrt", seconds=LIMIT, seed=seed)  # the tables of the world, which OMPL's checks use too
     first = _seen(problem, *projected(problem, seed), "")
     with TemporaryDirectory() as folder:
-        free = Problem(problem.world.unheld, problem.start, problem.goal)  # type: ignore[attr-defined]
+        free = Problem(problem.world.unheld, problem.start, problem.goal)
         task = replace(task_of(free, Path(folder), WALL * LIMIT), regions=[_region(problem)])
         answer = _host(python).ask(task, seed)
     return Others(first, _seen(problem, answer.rows, answer.cpu, answer.failed))
@@ -87,7 +88,7 @@ def _seen(problem: Problem, rows: Rows | None, seconds: float, failed: str) -> O
 
 def projected(problem: Problem, seed: int) -> tuple[Rows | None, float]:
     """RRTConnect in OMPL's ProjectedStateSpace, motions checked in our world; path, shape (k, dof), and time [s]."""
-    robot, world = problem.robot, problem.world.unheld  # type: ignore[attr-defined]
+    robot, world = problem.robot, problem.world.unheld
     with quiet():
         ou.RNG.setSeed(seed + 1)
         begin = time.process_time()
@@ -103,7 +104,7 @@ def projected(problem: Problem, seed: int) -> tuple[Rows | None, float]:
         setup = og.SimpleSetup(si)
         setup.setStateValidityChecker(lambda state: world.valid(np.array([state[k] for k in range(robot.dof)])))
         states = [si.allocState() for _ in range(2)]
-        for state, q in zip(states, (problem.start, problem.goal.q), strict=True):  # type: ignore[union-attr]
+        for state, q in zip(states, (problem.start, goal_joints(problem)), strict=True):
             state.copy(q)
         setup.setStartAndGoalStates(*states)
         setup.setPlanner(og.RRTConnect(si))

@@ -58,7 +58,7 @@ def generated(name: str, kind: str, seed: int, *, joined_ends: bool = True) -> G
 def _scene(robot: Robot, rng: np.random.Generator) -> rrtik.Scene:
     """5 to 20 boxes, balls and cylinders around an arm."""
     reach = 0.9 * float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum())
-    solids = []
+    solids: list[rrtik.Obstacle] = []
     while len(solids) < rng.integers(5, 21):
         place = rng.uniform([-reach, -reach, 0.0], [reach, reach, reach])
         if np.linalg.norm(place[:2]) < NEAR_BASE:
@@ -66,7 +66,7 @@ def _scene(robot: Robot, rng: np.random.Generator) -> rrtik.Scene:
         size = rng.uniform(0.04, 0.2, 3)
         shape = (rrtik.Box(size), rrtik.Sphere(0.5 * size[0]), rrtik.Cylinder(0.4 * size[0], size[1]))[len(solids) % 3]
         solids.append(rrtik.Obstacle(f"solid {len(solids)}", shape, pin.SE3(pin.exp3(rng.normal(size=3)), place)))
-    return rrtik.Scene(solids)
+    return rrtik.Scene(tuple(solids))
 
 
 def _span(robot: Robot) -> tuple[Vector, Vector]:

@@ -62,7 +62,8 @@ def sampled(scene: Scene, count: int) -> Matrix:
     chosen = rng.choice(len(areas), count, p=areas / areas.sum())
     u, v = np.sqrt(rng.uniform(size=count)), rng.uniform(size=count)
     shares = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
-    return np.einsum("nk,nki->ni", shares, triangles[chosen])
+    points: Matrix = np.einsum("nk,nki->ni", shares, triangles[chosen])
+    return points
 
 
 def seen_as_points(file: str, folder: str, count: int, judged: bool) -> Seen:
@@ -76,17 +77,17 @@ def seen_as_points(file: str, folder: str, count: int, judged: bool) -> Seen:
     rows = np.random.default_rng(2).uniform(*robot.finite_range(), (ROWS, robot.dof))
     world.valid_batch(rows)
     check = min(spent(partial(world.valid_batch, rows))[0] for _ in range(MADE)) / ROWS
-    times = {"build": 1e3 * min(builds), "world": 1e3 * made, "check": 1e6 * check}
+    cost = partial(Seen, build=1e3 * min(builds), world=1e3 * made, check=1e6 * check)
     try:
         asked = Problem(world, problem.start, problem.goal)
     except ProblemError:
-        return Seen("swallowed", **times)
+        return cost("swallowed")
     plan(asked, PLANNER, seed=2, seconds=BUSY)
     taken, found = spent(partial(plan, asked, PLANNER, seed=1, seconds=BUSY))
     if found.path is None:
-        return Seen("not found", **times, plan=1e3 * taken)
+        return cost("not found", plan=1e3 * taken)
     gap = nearest(robot, found.path.waypoints, cloud) if judged else float("nan")
-    return Seen("planned", **times, plan=1e3 * taken, proven=bool(found.proven), nearest=gap)
+    return cost("planned", plan=1e3 * taken, proven=bool(found.proven), nearest=gap)
 
 
 def nearest(robot: Robot, waypoints: Matrix, cloud: PointCloud) -> float:

@@ -11,6 +11,7 @@ import tempfile
 import time
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -44,10 +45,10 @@ def on_workers(workers: int) -> Measured:
     address, dask = f"tcp://127.0.0.1:{port}", [sys.executable, "-m", "dask"]
     own = ["--host", "127.0.0.1", "--no-dashboard"]
     with tempfile.TemporaryDirectory() as folder:
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
-        scheduler = subprocess.Popen([*dask, "scheduler", "--port", str(port), *own], **quiet)
+        start = partial(subprocess.Popen, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
+        scheduler = start([*dask, "scheduler", "--port", str(port), *own])
         each = [*dask, "worker", address, "--nthreads", "1", "--no-nanny", *own]
-        started = [scheduler, *(subprocess.Popen(each, **quiet) for _ in range(workers))]
+        started = [scheduler, *(start(each) for _ in range(workers))]
         try:
             with Client(address, timeout=120) as client:
                 client.wait_for_workers(workers, timeout=120)

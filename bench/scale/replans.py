@@ -62,7 +62,6 @@ def _walk(seed: int) -> Walk:
             continue
         if world.clearance(ends[0]) > 5.0 * BOUND / RATE:  # points, their radius and two ticks of the ball lie between
             break
-    options = {"rate": RATE, "step": STEP, "seconds": SECONDS, "speed_bound": BOUND, "seed": seed}
     camera: dict[float, float] = {}  # what making the clouds took, which a camera does elsewhere [s]
 
     def seen(t: float) -> Scene:
@@ -71,7 +70,9 @@ def _walk(seed: int) -> Walk:
         camera[t] = time.process_time() - begin
         return scene
 
-    run = replan(problem, seen, clock=time.process_time, **options)
+    run = replan(
+        problem, seen, clock=time.process_time, rate=RATE, step=STEP, seconds=SECONDS, speed_bound=BOUND, seed=seed
+    )
     times = [1e3 * (tick.seconds["all"] - camera[tick.time]) for tick in run.ticks if "all" in tick.seconds]
     proven = [tick.proven for tick in run.ticks if tick.proven is not None]
     contacts = sum(

@@ -7,15 +7,19 @@ import time
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from bench.scale.boxes import PLANNER
 from bench.scale.clouds import _panda
-from rrtik_ompl import plan_many, solve_ik_batch
+from bench.shared.problems import goal_joints
+from rrtik_ompl import JointPath, plan_many, solve_ik_batch
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
 ROUNDS = 5
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class Spread:
     load: float
 
 
-def _wall(work: partial[object]) -> tuple[float, object]:
+def _wall(work: partial[Made]) -> tuple[float, Made]:
     begin = time.perf_counter()
     made = work()
     return time.perf_counter() - begin, made
@@ -48,7 +52,7 @@ def plans_in_threads(folder: str, count: int) -> Spread:
     rows = rng.uniform(*problem.robot.finite_range(), (4 * count, problem.robot.dof))
     free = rows[problem.world.valid_batch(rows)]
     starts, goals = free[rng.integers(len(free), size=(2, count))]
-    starts[::2], goals[1::2] = problem.start, problem.goal.q
+    starts[::2], goals[1::2] = problem.start, goal_joints(problem)
     ask = partial(plan_many, problem.world, starts, goals, PLANNER, seed=1)
     ratios, rate, alike, found = [], 0.0, True, 0
     for _ in range(ROUNDS):
@@ -59,7 +63,7 @@ def plans_in_threads(folder: str, count: int) -> Spread:
     return Spread(count, ratios, rate, alike, found, os.getloadavg()[0])
 
 
-def _same(one: object, other: object) -> bool:
+def _same(one: JointPath | None, other: JointPath | None) -> bool:
     if one is None or other is None:
         return one is other
     return np.array_equal(one.waypoints, other.waypoints)

@@ -21,6 +21,7 @@ from bench.tip_motion.judge import Judge
 from rrtik_bench.report.machine import processes, processor
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.tasks.stages import Stage
 from rrtik_ompl.world.world import World
 
 SHAFT, PLAY = 0.06, 0.0005  # [m]: side of the square shaft, and room on each side of it
@@ -62,17 +63,17 @@ def scene_of(number: int) -> tuple[World, rrtik.Task]:
 
     hole, axis = SHAFT + 2.0 * PLAY, 0.5 * LONG + 0.5 * DEEP - 0.08
     aside = 0.5 * (hole + THICK)
-    obstacles = [
+    obstacles = (
         box("tool", [LONG, SHAFT, SHAFT], [0.0, 0.0, 0.0]),
         box("holder left", [DEEP, THICK, hole + 2.0 * THICK], [axis, aside, 0.0]),
         box("holder right", [DEEP, THICK, hole + 2.0 * THICK], [axis, -aside, 0.0]),
         box("holder top", [DEEP, hole, THICK], [axis, 0.0, aside]),
         box("holder bottom", [DEEP, hole, THICK], [axis, 0.0, -aside]),
         box("holder back", [0.04, 0.3, 0.3], [axis + 0.5 * DEEP + 0.02, 0.0, 0.0]),
-    ]
-    world = World(rrtik.load_robot("titan4"), rrtik.Scene(obstacles, allowed_collisions=[("gripper", "tool")]))
+    )
+    world = World(rrtik.load_robot("titan4"), rrtik.Scene(obstacles, allowed_collisions=(("gripper", "tool"),)))
     along = place.rotation[:, 0]
-    stages = [
+    stages: list[Stage] = [
         rrtik.MoveTo(place * pin.SE3(GRASP, np.array([-BACK, 0.0, 0.0]))),
         rrtik.Straight(by=REACHED * along),
         rrtik.Attach("tool", "gripper"),

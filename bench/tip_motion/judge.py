@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.world.world import World
 
 SAMPLES = 50  # of each motion
@@ -49,7 +50,7 @@ class Judge:
                 deepest = max(deepest, -result.getContact(0).penetration_depth, TOUCHES)
         return deepest
 
-    def place(self, body) -> coal.Transform3s:
+    def place(self, body: Body) -> coal.Transform3s:
         """Where a body is in the configuration that was looked at last."""
         pose = body.placement if body.joint == 0 else self.data.oMi[body.joint] * body.placement
         return coal.Transform3s(pose.rotation, pose.translation)
@@ -98,9 +99,10 @@ class Judge:
             share = k / POINTS
             goal = pin.SE3(begin.rotation @ pin.exp3(share * turn), begin.translation + share * way)
             after = self._newton(q if pull is None else q + pull(q) / POINTS, goal)
-            stopped = after is None or np.abs(after - q).max() > JUMP or not self._inside(after)
-            if stopped or (k % EVERY == 0 and self.depth(after) > 0.0):
-                return (k - 1 if stopped else k - EVERY) / POINTS
+            if after is None or np.abs(after - q).max() > JUMP or not self._inside(after):
+                return (k - 1) / POINTS
+            if k % EVERY == 0 and self.depth(after) > 0.0:
+                return (k - EVERY) / POINTS
             q = after
         return 1.0
 

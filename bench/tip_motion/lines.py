@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pinocchio as pin
@@ -48,7 +48,7 @@ def world_of(arm: str) -> World:
         place = rng.uniform(-0.7, 0.7, 3) * reach
         if np.linalg.norm(place[:2]) > 0.35 * reach:
             balls.append(rrtik.Obstacle(f"ball{len(balls)}", rrtik.Sphere(RADIUS), place))
-    return rrtik.World(robot, rrtik.Scene(balls))
+    return rrtik.World(robot, rrtik.Scene(tuple(balls)))
 
 
 def line_of(arm: str, number: int, brute: bool) -> Line:
@@ -96,5 +96,10 @@ def _brute(judge: Judge, q: Vector, begin: pin.SE3, end: pin.SE3, rng: np.random
         if best == 1.0:
             break
         toward = rng.uniform(*judge.robot.finite_range())
-        best = max(best, judge.farthest(q, begin, end, lambda now, toward=toward: PULL * (toward - now)))
+        best = max(best, judge.farthest(q, begin, end, partial(_pulled, toward=toward)))
     return best
+
+
+def _pulled(now: Vector, toward: Vector) -> Vector:
+    """A motion of the joints towards a configuration."""
+    return PULL * (toward - now)

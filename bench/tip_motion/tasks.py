@@ -12,6 +12,7 @@ import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from bench.tip_motion.judge import Judge
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.tasks.stages import Stage
 from rrtik_ompl.world.world import World
 
@@ -59,7 +60,7 @@ def panda_case(number: int) -> Case:
     spots = [np.array([rng.uniform(0.4, 0.6), rng.uniform(-0.35, -0.1), 0.25]) for _ in range(2)]
     things += list(_posts(rng, 3, [at, *spots], [0.3, -0.5, 0.2], [0.8, 0.5, 0.2], 0.25))
 
-    def grip(place: np.ndarray, yaw: float) -> pin.SE3:
+    def grip(place: Vector, yaw: float) -> pin.SE3:
         return pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ DOWN, place + np.array([0.0, 0.0, 0.02]))
 
     grasps = tuple(
@@ -75,7 +76,7 @@ def panda_case(number: int) -> Case:
     for to in spots:
         released = (rrtik.Detach("cup"), rrtik.Gripper("open"), rrtik.Straight(by=up))
         places.append((rrtik.MoveTo(grip(to + up, 0.0)), rrtik.Straight(by=-up), *released))
-    return Case(rrtik.World(robot, rrtik.Scene(things)), "ready", grasps, rrtik.Straight(by=up), tuple(places))
+    return Case(rrtik.World(robot, rrtik.Scene(tuple(things))), "ready", grasps, rrtik.Straight(by=up), tuple(places))
 
 
 def titan4_case(number: int) -> Case:
@@ -90,12 +91,12 @@ def titan4_case(number: int) -> Case:
     ]
     spots = [np.array([rng.uniform(1.25, 1.5), rng.uniform(-0.5, -0.2), 0.0]) for _ in range(2)]
     things += list(_posts(rng, 3, [at, *spots], [1.1, -0.8, -0.2], [1.8, 0.8, -0.2], 0.4))
-    scene = rrtik.Scene(things, allowed_collisions=[("gripper", "tool")])
+    scene = rrtik.Scene(tuple(things), allowed_collisions=(("gripper", "tool"),))
 
-    def grip(place: np.ndarray, yaw: float) -> pin.SE3:
+    def grip(place: Vector, yaw: float) -> pin.SE3:
         return pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ FORWARD, place + np.array([0.0, 0.0, 0.1]))
 
-    def back(yaw: float) -> np.ndarray:
+    def back(yaw: float) -> Vector:
         return -0.15 * np.array([np.cos(yaw), np.sin(yaw), 0.0])
 
     lift = np.array([0.0, 0.0, 0.1])
@@ -114,7 +115,9 @@ def titan4_case(number: int) -> Case:
 CASES = {"panda": panda_case, "titan4": titan4_case}
 
 
-def _posts(rng, count: int, away_from: list, low, high, tall: float) -> Iterator[rrtik.Obstacle]:
+def _posts(
+    rng: np.random.Generator, count: int, away_from: list[Vector], low: list[float], high: list[float], tall: float
+) -> Iterator[rrtik.Obstacle]:
     """Posts on the table, none within 15 cm of the object and of its places."""
     made = 0
     while made < count:

@@ -45,6 +45,8 @@ def calls(closed: Path) -> dict[str, tuple[Callable[[], object], float]]:
     walled, arm = load_problem(closed), load_problem("titan4_sdu")
     several = plan(arm, "fastrrtconnect", seed=1).path
     moves = plan(arm, "bicrdt", seed=1).path
+    assert several is not None
+    assert moves is not None
     found: dict[str, tuple[Callable[[], object], float]] = {
         f"plan(problem, '{name}')": (partial(plan, walled, name, seconds=60.0, seed=1), 0.3)
         for name in ("auto", "fastrrtconnect", "bicrdt", "roadmap", "RRTConnect", "RRTstar")

@@ -22,7 +22,18 @@ import numpy as np
 from ompl import util as ou
 
 import rrtik_ompl
-from rrtik_ompl import JointPath, Obstacle, Problem, ProblemError, Scene, World, load_problem, load_robot, plan
+from rrtik_ompl import (
+    JointGoal,
+    JointPath,
+    Obstacle,
+    Problem,
+    ProblemError,
+    Scene,
+    World,
+    load_problem,
+    load_robot,
+    plan,
+)
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder
@@ -96,8 +107,8 @@ def search_on_balls(file: str) -> dict[str, Any]:
 
 
 def _search(search: ConnectSearch, problem: Problem, seed: int, end: float) -> Any:
-    starts, goals = problem.start[None], problem.goal.q[None]  # type: ignore[attr-defined]
-    return search.solve(starts, goals, seed, stop=lambda: time.perf_counter() > end)
+    assert isinstance(problem.goal, JointGoal)
+    return search.solve(problem.start[None], problem.goal.q[None], seed, stop=lambda: time.perf_counter() > end)
 
 
 def _dense(rows: Any) -> Any:

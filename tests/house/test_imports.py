@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 from importlinter import api
@@ -50,6 +51,13 @@ def test_a_script_of_bench_imports_what_there_is(script):
     modules = {node.module for node in nodes if isinstance(node, ast.ImportFrom)}
     modules |= {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     assert not {name for name in modules if name.split(".")[0] not in PEERS and find_spec(name) is None}
+
+
+def test_mypy_checks_every_file_of_bench(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    sources, _ = pytest.importorskip("mypy.main").process_options([])  # of pyproject.toml; single modules have no path
+    checked = {Path(source.path or f"bench/{source.module}.py").resolve() for source in sources}
+    assert [file for file in sorted((ROOT / "bench").rglob("*.py")) if file.resolve() not in checked] == []
 
 
 def test_importing_the_package_imports_nothing_heavy():
