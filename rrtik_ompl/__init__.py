@@ -216,7 +216,7 @@ else:
 
     RENAMED = {"GoalRegion": "GoalSet", "Run": "ReplanRun", "Waypoints": "TimedPoses", "timed": "time_parameterize"}
 
-    def __getattr__(name: str) -> Any:
+    def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever has that name
         if name in RENAMED:  # Python would hide an AttributeError from ``from rrtik_ompl import``
             raise ImportError(f"rrtik_ompl.{name} is now rrtik_ompl.{RENAMED[name]}")
         if name not in _HOME_OF:

@@ -50,7 +50,7 @@ _MODULES = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever has that name
     if name not in _MODULES:
         raise AttributeError(f"module 'rrtik_planners' has no attribute '{name}'")
     return getattr(import_module(f"rrtik_planners.{_MODULES[name]}"), name)

@@ -55,7 +55,7 @@ def room(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
         raise InputError(f"the answer takes {size:.1f} GB, more than this machine has left; ask in parts") from None
 
 
-def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
+def frozen(values: ArrayLike, dtype: DTypeLike = np.float64) -> NDArray[Any]:
     """Return a read-only, contiguous private copy of ``values``."""
     array = np.array(values, dtype=dtype, order="C", copy=True)
     array.setflags(write=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import LARGEST, Mask, Matrix, Vector, bounded_array, dimensions, finite_array, frozen
 from rrtik_ompl.base.errors import InputError, at_most
+
+PoseLike: TypeAlias = pin.SE3 | ArrayLike  # a pose in any form that `rigid` takes
+Coordinate = TypeVar("Coordinate", float, Vector)
 
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
 LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # of every pose
@@ -20,7 +23,7 @@ ROUNDING = 1e-12  # the same of a rotation that stays as it is
 MOST_MOVING = 200  # joints with which Pinocchio computes: its memory grows with their cube, 32 GB at 1,000
 
 
-def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike | None = None, what: str = "pose") -> Any:
+def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike | None = None, what: str = "pose") -> pin.SE3:
     """Make a pose from a position [m] and a unit quaternion in the order x, y, z, w.
 
     Args:
@@ -49,13 +52,13 @@ def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike | None = None, w
     return pin.SE3(pin.Quaternion(w, x, y, z).matrix(), position)
 
 
-def pose_from_rpy(xyz: ArrayLike, rpy: ArrayLike, what: str = "pose") -> Any:
+def pose_from_rpy(xyz: ArrayLike, rpy: ArrayLike, what: str = "pose") -> pin.SE3:
     """Make a pose from a position [m] and fixed-axis roll, pitch, yaw [rad] (URDF's convention)."""
     roll, pitch, yaw = bounded_array(rpy, (3,), f"{what}: rpy")
     return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), bounded_array(xyz, (3,), f"{what}: xyz"))
 
 
-def quaternion_xyzw(placement: Any) -> Vector:
+def quaternion_xyzw(placement: pin.SE3) -> Vector:
     """Unit quaternion (x, y, z, w) of a pose, w not negative, so that equal rotations read equal. Shape (4,)."""
     quaternion: Vector = np.asarray(pin.Quaternion(placement.rotation).coeffs(), dtype=np.float64)
     return -quaternion if quaternion[3] < 0.0 else quaternion
@@ -91,7 +94,7 @@ def few_joints(model: pin.Model) -> None:
     at_most(int(model.nv), MOST_MOVING, f"robot '{model.name}': moving joints", "fix some; fk and jacobian take more")
 
 
-def rigid(T: Any, what: str) -> Any:
+def rigid(T: PoseLike, what: str) -> pin.SE3:
     """A copy (``pinocchio.SE3``) of a pose in any form that a person may give: every pose from outside passes here.
 
     What rounding has left of a rotation, up to ``NOT_RIGID``, is made one again.
@@ -130,7 +133,7 @@ def rigid(T: Any, what: str) -> Any:
     return pin.SE3(matrix)
 
 
-def _written_pose(numbers: ArrayLike, what: str) -> Any:
+def _written_pose(numbers: ArrayLike, what: str) -> pin.SE3:
     values = finite_array(numbers, (None,), what)
     if len(values) == 3:
         return pin.SE3(np.eye(3), bounded_array(values, (3,), what))
@@ -144,7 +147,7 @@ def _written_pose(numbers: ArrayLike, what: str) -> Any:
     )
 
 
-def left_handed(x: Any, y: Any, z: Any) -> Any:
+def left_handed(x: Sequence[Coordinate], y: Sequence[Coordinate], z: Sequence[Coordinate]) -> bool | Mask:
     """Whether the determinant of three vectors is negative; their coordinates are numbers or arrays of them."""
     return x[0] * (y[1] * z[2] - y[2] * z[1]) < x[1] * (y[0] * z[2] - y[2] * z[0]) - x[2] * (y[0] * z[1] - y[1] * z[0])
 

@@ -278,7 +278,7 @@ def run(arguments: list[str] | None = None) -> int:
     except RrtikError as error:
         return _fail(str(error))
     except UsageError as error:
-        return _usage(error, given)
+        return _usage(error.format_message(), getattr(error, "ctx", None), given)
     except (KeyboardInterrupt, typer.Abort):
         print("rrtik: interrupted; no file is half-written", file=sys.stderr)
         return INTERRUPTED
@@ -304,10 +304,8 @@ def _fail(message: str) -> int:
     return BAD_INPUT
 
 
-def _usage(error: Any, given: list[str]) -> int:
+def _usage(text: str, context: typer.Context | None, given: list[str]) -> int:
     """Say in one line what is wrong with a command."""
-    text = error.format_message()
-    context = getattr(error, "ctx", None)
     named = [word for word in given[:1] if not word.startswith("-")]  # an option with too few words has no context
     command = " ".join(["rrtik", *named]) if context is None else context.command_path
     return _fail(f"{' '.join(text.replace('Value error, ', '').split())} (see: {command} --help)")

@@ -18,6 +18,7 @@ from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
     from rrtik_ompl.world.path import JointPath
+    from rrtik_ompl.world.problem import Problem
 
 RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules
 
@@ -141,7 +142,14 @@ def _say_path(path: JointPath | None, written: tuple[Path | None, ...]) -> None:
 
 
 def _write(
-    problem: Any, path: Any, raw: Any, out: Path | None, html: Path | None, certificate: Path | None, *, still: bool
+    problem: Problem,
+    path: JointPath,
+    raw: JointPath | None,
+    out: Path | None,
+    html: Path | None,
+    certificate: Path | None,
+    *,
+    still: bool,
 ) -> str:
     """Write the files that were asked for; returns why there is no certificate, "" if nothing is missing."""
     if out is not None:
@@ -159,8 +167,13 @@ def _write(
 
 
 def _shortened(
-    path: Any, problem: Any, method: CommandShortening, seed: int, rules: dict[str, Any], clearance: float | None
-) -> tuple[Any, float]:
+    path: JointPath | None,
+    problem: Problem,
+    method: CommandShortening,
+    seed: int,
+    rules: dict[str, Any],
+    clearance: float | None,
+) -> tuple[JointPath | None, float]:
     """The path made shorter, by the rules of single-joint moves that the planner had; and the time [s]."""
     from rrtik_ompl.planning.shortening import MoveRules, shorten
     from rrtik_ompl.world.kept_clearance import possible_clearance

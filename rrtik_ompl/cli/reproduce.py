@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,9 @@ from rrtik_ompl.cli.published.kept import Kept
 from rrtik_ompl.cli.published.page import HEADS, Row, Table, cells, counted, page, plain
 from rrtik_ompl.cli.terminal import note, progress, say
 from rrtik_ompl.files.text import check_target, write_text
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
 
 NONE: Mapping[str, str] = MappingProxyType({})
 WIDTH = 60  # of a reading in a table for a person
@@ -142,7 +145,7 @@ def _seconds(table: Table, quick: bool) -> float:
     return float(table.quick_seconds if quick else table.seconds)
 
 
-def _list(tables: Iterable[Table]) -> Any:
+def _list(tables: Iterable[Table]) -> RichTable:
     from rich import box
     from rich.table import Table
 
@@ -153,7 +156,7 @@ def _list(tables: Iterable[Table]) -> Any:
     return shown
 
 
-def _table(rows: Sequence[Row]) -> Any:
+def _table(rows: Sequence[Row]) -> RichTable:
     from rich import box
     from rich.table import Table
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
@@ -11,7 +9,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Matrix, dimensions, finite_array, not_negative, number_rows, positive
 from rrtik_ompl.base.choices import FrameAxis
 from rrtik_ompl.base.errors import InputError, require
-from rrtik_ompl.base.poses import rigid, turned_z, unit_vector
+from rrtik_ompl.base.poses import PoseLike, rigid, turned_z, unit_vector
 from rrtik_ompl.constraints.held_region import ANYWHERE
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.task_region import TaskRegion
@@ -131,7 +129,7 @@ def on_line(
 
 
 def orientation_of(
-    pose: Any, tolerances_deg: ArrayLike = 1.0, *, frame: str | None = None, allowance_deg: float = 0.0
+    pose: PoseLike, tolerances_deg: ArrayLike = 1.0, *, frame: str | None = None, allowance_deg: float = 0.0
 ) -> TaskRegion:
     """Keep the orientation of a frame, its position free.
 
@@ -170,7 +168,7 @@ def orientation_of(
 
 
 def inside(
-    pose: Any, sides: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None, allowance: float = 0.0
+    pose: PoseLike, sides: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None, allowance: float = 0.0
 ) -> TaskRegion:
     """Keep the origin of a frame inside a box of the world, its orientation free.
 
@@ -203,7 +201,7 @@ def _anywhere() -> Matrix:
     return np.outer([ANYWHERE] * 3 + [np.pi] * 3, [-1.0, 1.0])
 
 
-def _tilt(degrees: Any, what: str) -> float:
+def _tilt(degrees: ArrayLike, what: str) -> float:
     """A largest angle [rad], given in degrees."""
     tilt = positive(degrees, what)
     if tilt > LARGEST_TILT_DEG:
@@ -211,7 +209,7 @@ def _tilt(degrees: Any, what: str) -> float:
     return float(np.radians(tilt))
 
 
-def _placed(point: ArrayLike, direction: ArrayLike, caller: str, what: str) -> Any:
+def _placed(point: ArrayLike, direction: ArrayLike, caller: str, what: str) -> pin.SE3:
     """A frame at a point, its z axis along a direction."""
     R = turned_z(unit_vector(direction, f"{caller}: {what}"))
     return pin.SE3(R, finite_array(point, (3,), f"{caller}: point"))

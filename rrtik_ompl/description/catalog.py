@@ -13,12 +13,12 @@ from __future__ import annotations
 import inspect
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -35,6 +35,9 @@ from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
 from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.robot import Robot
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint, EntryPoints
 
 # What an option of a robot can be: a name, a number, a file, a pose, or groups and lists of these.
 RobotOption: TypeAlias = (
@@ -64,13 +67,14 @@ def list_planners() -> tuple[str, ...]:
     return tuple(sorted(_offers("planners")))
 
 
-def find_planner(name: str) -> Any:
+def find_planner(name: str) -> type[Any]:
     """Planner class of a name.
 
     Raises:
         UnknownNameError: If no package offers it.
     """
-    return _load("planner", "planners", name)
+    found: type[Any] = _load("planner", "planners", name)
+    return found
 
 
 def find_workspace(robot: str) -> Callable[[], Any]:
@@ -204,7 +208,7 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
     if len(found) != 1:
         raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {', '.join(found) or 'none'}")
     kind = found[0]
-    options = {key: _resolved(key, value, folder) for key, value in entry.items() if key != kind}
+    options: dict[str, Any] = {key: _resolved(key, value, folder) for key, value in entry.items() if key != kind}
     if kind in PARAMETRIC:
         if not isinstance(entry[kind], Mapping):
             raise InputError(f"robot: {kind}: expected a group of keys such as {{radius: 0.1}}")
@@ -269,18 +273,19 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
 
 
 @cache
-def _offers(group: str) -> dict[str, Any]:
+def _offers(group: str) -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in _entry_points().select(group=f"rrtik_ompl.{group}")}
 
 
 @cache
-def _entry_points() -> Any:
+def _entry_points() -> EntryPoints:
     """Those of all groups: looking through the installed packages takes most of the time, loading this 2 MB."""
-    return import_module("importlib.metadata").entry_points()
+    found: EntryPoints = import_module("importlib.metadata").entry_points()
+    return found
 
 
 @cache
-def _load(what: str, group: str, name: str) -> Any:
+def _load(what: str, group: str, name: str) -> Any:  # noqa: ANN401 - what another package offers
     offers = _offers(group)
     if name not in offers:
         raise UnknownNameError(what, name, offers)
@@ -307,20 +312,24 @@ def _beside(path: str, folder: str | os.PathLike[str]) -> Path:
     return Path(folder) / path
 
 
-def _resolved(key: str, value: Any, folder: str | os.PathLike[str]) -> Any:
+def _resolved(key: str, value: object, folder: str | os.PathLike[str]) -> object:
     if key in FILE_OPTIONS and isinstance(value, str):
         return _beside(value, folder)
-    if key == "packages" and not isinstance(value, Mapping):
-        return [_beside(str(item), folder) for item in ([value] if isinstance(value, str) else value)]
+    if key == "packages" and isinstance(value, str):
+        return [_beside(value, folder)]
+    if key == "packages" and isinstance(value, Iterable) and not isinstance(value, Mapping):
+        return [_beside(str(item), folder) for item in value]
     return value
 
 
-def _absolute(key: str, value: Any) -> Any:
+def _absolute(key: str, value: object) -> object:
     """Files by their absolute path, so that the cache does not depend on the current folder."""
     if key in FILE_OPTIONS and isinstance(value, (str, os.PathLike)):
         return Path(value).absolute()
-    if key == "packages":
-        return [Path(item).absolute() for item in ([value] if isinstance(value, (str, os.PathLike)) else value)]
+    if key == "packages" and isinstance(value, (str, os.PathLike)):
+        return [Path(value).absolute()]
+    if key == "packages" and isinstance(value, Iterable):
+        return [Path(item).absolute() for item in value]
     return value
 
 

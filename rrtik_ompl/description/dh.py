@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import bounded_array, finite_array
+from rrtik_ompl.base.arrays import Vector, bounded_array, finite_array
 from rrtik_ompl.base.choices import DhConvention
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most
-from rrtik_ompl.base.poses import rigid, turned_z
+from rrtik_ompl.base.poses import PoseLike, rigid, turned_z
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
 from rrtik_ompl.description.tree import MOST_JOINTS, Joint, Link, Solid, Tree
 from rrtik_ompl.model.robot import Robot
@@ -67,7 +67,7 @@ def robot_from_dh(
     convention: DhConvention,
     radius: float | Sequence[float] = 0.05,
     floor_gap: float = 0.0,
-    tool: Any | None = None,
+    tool: PoseLike | None = None,
     tip: str = "tip",
     base_pose: BasePose = None,
     postures: Mapping[str, ArrayLike] | None = None,
@@ -177,7 +177,7 @@ def _x_part(row: DhRow) -> pin.SE3:
     return pin.SE3(pin.rpy.rpyToMatrix(row.alpha, 0.0, 0.0), np.array([row.a, 0.0, 0.0]))
 
 
-def _fixed_parts(table: Sequence[DhRow], convention: DhConvention, tool: Any) -> tuple[list[Any], Any]:
+def _fixed_parts(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3) -> tuple[list[pin.SE3], pin.SE3]:
     """What lies before each joint's own motion (a turn about z or a slide along it), and what lies after the last."""
     before, after = [], pin.SE3.Identity()
     for row in table:
@@ -186,7 +186,7 @@ def _fixed_parts(table: Sequence[DhRow], convention: DhConvention, tool: Any) ->
     return before, after * tool
 
 
-def _corners(table: Sequence[DhRow], convention: DhConvention, tool: Any) -> list[list[Any]]:
+def _corners(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3) -> list[list[Vector]]:
     """Corner points of each link, base first, in the frame of its joint: along d, then along the a that follows."""
     shift = 0 if convention == "standard" else 1
     corners = [[np.zeros(3)] + ([_x_part(table[0]).translation] if shift else [])]
@@ -201,7 +201,7 @@ def _corners(table: Sequence[DhRow], convention: DhConvention, tool: Any) -> lis
     return corners
 
 
-def _capsules(points: Sequence[Any], radius: float, colour: tuple[float, float, float, float]) -> tuple[Solid, ...]:
+def _capsules(points: Sequence[Vector], radius: float, colour: tuple[float, float, float, float]) -> tuple[Solid, ...]:
     solids = []
     for start, end in pairwise(points):
         length = float(np.linalg.norm(end - start))

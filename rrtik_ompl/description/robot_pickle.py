@@ -11,7 +11,7 @@ import threading
 from collections import OrderedDict
 from dataclasses import fields
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -22,6 +22,9 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.geometry.collision.solids import bvh, is_mesh, mesh_arrays
 from rrtik_ompl.model.robot import Robot
+
+if TYPE_CHECKING:
+    import coal
 
 LIMITS = tuple(f"{end}{what}Limit" for what in ("Position", "Velocity", "Effort") for end in ("lower", "upper"))
 MOST_ROBOTS = 16  # that arrived and are kept, so that the next copy of one is the same object
@@ -75,19 +78,19 @@ def _bytes_of(robot: Robot) -> bytes:
         ) from None
 
 
-def _without_limits(model: Any) -> tuple[Any, dict[str, Vector]]:
+def _without_limits(model: pin.Model) -> tuple[pin.Model, dict[str, Vector]]:
     """A copy of a model without its limits, and these: Pinocchio 4.0 does not read the infinite ones that it writes."""
     limits = {name: np.array(getattr(model, name)) for name in LIMITS}
     return _with_limits(model.copy(), {name: np.zeros_like(row) for name, row in limits.items()}), limits
 
 
-def _with_limits(model: Any, limits: dict[str, Vector]) -> Any:
+def _with_limits(model: pin.Model, limits: dict[str, Vector]) -> pin.Model:
     for name, row in limits.items():
         setattr(model, name, row)
     return model
 
 
-def _items(geometry: Any) -> list[tuple[Any, ...]]:
+def _items(geometry: pin.GeometryModel) -> list[tuple[Any, ...]]:
     """A geometry model as plain values: meshes as arrays, for coal's own text of a hierarchy is ten times as long."""
     return [
         (item.name, item.parentJoint, item.parentFrame, item.placement, *_shape(item.geometry), item.meshPath,
@@ -96,11 +99,11 @@ def _items(geometry: Any) -> list[tuple[Any, ...]]:
     ]  # fmt: skip
 
 
-def _shape(geometry: Any) -> tuple[Any, Any]:
+def _shape(geometry: coal.CollisionGeometry) -> tuple[Any, Any]:
     return mesh_arrays(geometry) if is_mesh(geometry) else (geometry, None)
 
 
-def _geometry(items: list[tuple[Any, ...]]) -> Any:
+def _geometry(items: list[tuple[Any, ...]]) -> pin.GeometryModel:
     model = pin.GeometryModel()
     for name, joint, frame, placement, shape, triangles, *look in items:
         geometry = shape if triangles is None else bvh(shape, triangles)

@@ -10,17 +10,16 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import finite_array
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.base.poses import pose, pose_from_rpy, quaternion_xyzw, rigid
+from rrtik_ompl.base.poses import PoseLike, pose, pose_from_rpy, quaternion_xyzw, rigid
 
-BasePose: TypeAlias = "pin.SE3 | ArrayLike | Mapping[str, Sequence[float]] | None"
+BasePose: TypeAlias = PoseLike | Mapping[str, Sequence[float]] | None
 POSE_KEYS = ("xyz", "quat_xyzw", "rpy_deg")
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> object:
     """The value with nothing but None, booleans, numbers, text, lists and dictionaries in it; paths become absolute."""
     if isinstance(value, pin.SE3):
         return {"xyz": value.translation.tolist(), "quat_xyzw": quaternion_xyzw(value).tolist()}

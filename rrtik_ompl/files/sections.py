@@ -31,7 +31,7 @@ Vector4 = Annotated[list[Number], Field(min_length=4, max_length=4)]
 Numbers = Annotated[list[Number], Field(min_length=1)]
 
 
-def _one(value: object) -> Any:
+def _one(value: object) -> object:
     if value is True:  # equal to 1 in Python, but not what a file should say
         raise PydanticCustomError("version", "must be 1, found true")
     return value
@@ -50,8 +50,10 @@ class Section(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _only_known_keys(cls, data: Any) -> Any:
-        for key in data if isinstance(data, dict) else ():
+    def _only_known_keys(cls, data: object) -> object:
+        if not isinstance(data, dict):
+            return data
+        for key, value in data.items():
             if key not in cls.model_fields and cls.model_config.get("extra") == "forbid":
                 near = get_close_matches(str(key), cls.model_fields, n=1)
                 raise PydanticCustomError(
@@ -63,7 +65,7 @@ class Section(BaseModel):
                         "allowed": ", ".join(cls.model_fields),
                     },
                 )
-            if data[key] is None:
+            if value is None:
                 message = "nothing stands after the colon; give a value or delete the key"
                 raise PydanticCustomError("empty_key", message, {"key": str(key)})
         return data
@@ -81,7 +83,7 @@ def told_apart_by(*keys: str, what: str, text: str | None = None) -> Discriminat
         text: Tag word of the member that is plain text, if there is one.
     """
 
-    def choose(data: Any) -> str | None:
+    def choose(data: object) -> str | None:
         if isinstance(data, BaseModel):
             return next((tag(key) for key in keys if key in type(data).model_fields), None)
         if text is not None and isinstance(data, str):
@@ -111,7 +113,7 @@ def exactly_one(section: BaseModel, keys: Iterable[str], what: str) -> str:
     raise PydanticCustomError("kind", f"{what} needs exactly one of {', '.join(wanted)}; found {found}")
 
 
-def parse(document: YamlDocument, model: type[Model], data: Any = None) -> Model:
+def parse(document: YamlDocument, model: type[Model], data: object = None) -> Model:
     """Check a document against a model.
 
     Args:
@@ -130,18 +132,20 @@ def parse(document: YamlDocument, model: type[Model], data: Any = None) -> Model
         raise document.error(_location(first), _message(first) + more) from None
 
 
-def without_null(schema: Any) -> Any:
+def without_null(schema: dict[str, Any]) -> dict[str, Any]:
     """A JSON schema in which an absent key is absent, never null (pydantic writes ``anyOf: [.., null]``)."""
-    if isinstance(schema, list):
-        return [without_null(item) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    cleaned = {k: without_null(v) for k, v in schema.items() if not (k == "default" and v is None)}
+    cleaned: dict[str, Any] = {k: _without_null(v) for k, v in schema.items() if not (k == "default" and v is None)}
     choices = [choice for choice in cleaned.get("anyOf", ()) if choice != {"type": "null"}]
     if len(choices) == 1:
         del cleaned["anyOf"]
         return {**choices[0], **cleaned}
     return cleaned | ({"anyOf": choices} if choices else {})
+
+
+def _without_null(part: object) -> object:
+    if isinstance(part, list):
+        return [_without_null(item) for item in part]
+    return without_null(part) if isinstance(part, dict) else part
 
 
 def _location(error: ErrorDetails) -> Location:

@@ -37,7 +37,7 @@ def key_path(location: Location) -> str:
     return text.removeprefix(".")
 
 
-def plain_value(text: str) -> Any:
+def plain_value(text: str) -> bool | float | str | None:
     """Value of an unquoted scalar: nothing, true/false, whole number, number, else text."""
     if text in _WORDS:
         return _WORDS[text]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.model.robot import Robot
 
 Numbers = NDArray[np.float64]
+Entry: TypeAlias = Numbers | float  # of matrices for many configurations at once: a number where all have the same
 ROUNDING = 1e-15  # entries of rotations this near to -1, 0, 1 are meant to be that
 
 
@@ -77,7 +78,7 @@ def frame_columns(robot: Robot, joint: int, placement: Numbers) -> TipColumns:
     return TipColumns(chain.gain[rows], chain.offset[rows], np.array(fixed), chain.prismatic[rows])
 
 
-def _moved(pose: list[list[Any]], fixed: Numbers) -> list[list[Any]]:
+def _moved(pose: list[list[Entry]], fixed: Numbers) -> list[list[Entry]]:
     """The pose followed by a fixed transform; terms with a factor 0 are left out."""
     return [
         [_sum([(pose[i][axis], fixed[i, j]) for i in range(3)] + [(pose[3][axis], fixed[3, j])]) for axis in range(3)]
@@ -85,8 +86,8 @@ def _moved(pose: list[list[Any]], fixed: Numbers) -> list[list[Any]]:
     ]
 
 
-def _sum(terms: list[tuple[Any, float]]) -> Any:
-    total: Any = 0.0
+def _sum(terms: list[tuple[Entry, float]]) -> Entry:
+    total: Entry = 0.0
     for value, factor in terms:
         if factor == 0.0:
             continue

@@ -285,7 +285,7 @@ def tip_errors(goal: TipGoal, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vecto
     return position, angle
 
 
-def pose_errors(tips: NDArray[np.float64], target: Any) -> tuple[Vector, Vector]:
+def pose_errors(tips: NDArray[np.float64], target: pin.SE3) -> tuple[Vector, Vector]:
     """Distance [m] and rotation angle [rad] between poses, shape (m, 4, 4), and one target pose."""
     away = tips[:, :3, 3] - target.translation
     position: Vector = np.hypot.reduce(away, axis=1)

@@ -120,7 +120,7 @@ class Robot:
         """Names of all links (bodies), base first."""
         return _link_names(self)
 
-    def link_of(self, geometry: Any) -> str:
+    def link_of(self, geometry: pin.GeometryObject) -> str:
         """Name of the link of a geometry object of Pinocchio, such as one of ``collision.geometryObjects``."""
         require(geometry, pin.GeometryObject, "geometry of a link", "take it from robot.collision.geometryObjects")
         return str(self.model.frames[geometry.parentFrame].name)
@@ -328,6 +328,6 @@ def _places_of(robot: Robot) -> tuple[NDArray[np.int64], ...]:
 
 
 @lru_cache(maxsize=64)
-def _data_of(robot: Robot, _thread: int) -> Any:
+def _data_of(robot: Robot, _thread: int) -> pin.Data:
     """Pinocchio's working memory for a robot, of one thread's own."""
     return robot.model.createData()

@@ -29,7 +29,7 @@ from rrtik_ompl.base.arrays import (
 )
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, name_of, require
-from rrtik_ompl.base.poses import rigid, rotation_angles, rpy_matrices, turned_z, unit_vector
+from rrtik_ompl.base.poses import PoseLike, rigid, rotation_angles, rpy_matrices, turned_z, unit_vector
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.tip_distance import metres_per_radian
 
@@ -134,7 +134,7 @@ class TaskRegion(WithinTolerances):
     @classmethod
     def about_axis(
         cls,
-        T_world_tip: Any,
+        T_world_tip: PoseLike,
         axis: ArrayLike,
         *,
         through: ArrayLike | None = None,
@@ -171,7 +171,7 @@ class TaskRegion(WithinTolerances):
         ranges: Mask = self.bounds[:, 0] < self.bounds[:, 1]
         return ranges
 
-    def started_at(self, T_world_frame: Any) -> TaskRegion:
+    def started_at(self, T_world_frame: PoseLike) -> TaskRegion:
         """The region of the world that a region ``from_start`` is, for a pose of its frame at the start."""
         if not self.from_start:
             return self

@@ -70,7 +70,7 @@ def find_planner(name: str) -> PlannerFactory:
     if bare in _wheel():
         return _wheel()[bare]
     if bare in catalog.list_planners():
-        return catalog.find_planner(bare)  # type: ignore[no-any-return]
+        return catalog.find_planner(bare)
     raise UnknownNameError("planner", name, list_planners())
 
 

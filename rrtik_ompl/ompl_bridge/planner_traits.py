@@ -126,5 +126,6 @@ def traits_of(factory: PlannerFactory) -> PlannerTraits:
 
 def planners_with(condition: Callable[[PlannerTraits], object]) -> dict[str, PlannerTraits]:
     """The planners that packages offer whose traits meet a condition, by their names, sorted; OMPL's are left out."""
-    stated = {name: traits_of(catalog.find_planner(name)) for name in catalog.list_planners()}
+    offered: dict[str, PlannerFactory] = {name: catalog.find_planner(name) for name in catalog.list_planners()}
+    stated = {name: traits_of(factory) for name, factory in offered.items()}
     return {name: traits for name, traits in stated.items() if condition(traits)}

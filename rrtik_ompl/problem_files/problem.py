@@ -170,7 +170,7 @@ def problem_data(problem: Problem, folder: Path) -> dict[str, Any]:
 
 def problem_schema() -> dict[str, Any]:
     """JSON schema of the problem file, made from the same models that check it."""
-    schema: dict[str, Any] = without_null(ProblemFile.model_json_schema())
+    schema = without_null(ProblemFile.model_json_schema())
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

@@ -43,7 +43,7 @@ class PoseEntry(Section):
             raise PydanticCustomError("two_orientations", "give quat_xyzw or rpy_deg, not both")
         return self
 
-    def build(self) -> Any:
+    def build(self) -> pin.SE3:
         """The pose as ``pinocchio.SE3``."""
         if self.rpy_deg is not None:
             return pose_from_rpy(self.xyz, np.radians(self.rpy_deg))
@@ -81,7 +81,7 @@ class SolidEntry(ShapeEntry):
 
     pose: PoseEntry | None = None
 
-    def build_pose(self) -> Any:
+    def build_pose(self) -> pin.SE3:
         """The pose; identity if none is given."""
         return pin.SE3.Identity() if self.pose is None else self.pose.build()
 
@@ -231,7 +231,7 @@ def scene_data(scene: Scene, folder: Path) -> dict[str, Any]:
     return data
 
 
-def pose_data(placement: Any) -> dict[str, Any]:
+def pose_data(placement: pin.SE3) -> dict[str, Any]:
     """What a file says about a pose; the orientation is left out if there is none."""
     data: dict[str, Any] = {"xyz": placement.translation.tolist()}
     if not np.array_equal(placement.rotation, np.eye(3)):

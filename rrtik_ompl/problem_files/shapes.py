@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from pydantic import Field, create_model, model_validator
@@ -33,7 +33,9 @@ from rrtik_ompl.model.shapes.shape import MeasureKind
 
 ONE_SHAPE = {"oneOf": [{"required": [key]} for key in SHAPES]}
 
-_TYPES: dict[MeasureKind, Any] = {
+TypeForm: TypeAlias = Any  # a type or what ``Annotated`` makes of one, for which typing has no name yet
+
+_TYPES: dict[MeasureKind, TypeForm] = {
     "length": Length,
     "three lengths": Sizes3,
     "number": Number,
@@ -42,11 +44,11 @@ _TYPES: dict[MeasureKind, Any] = {
 }
 
 
-def _optional(kind: Any, text: str | None) -> Any:
+def _optional(kind: TypeForm, text: str | None) -> tuple[TypeForm, Any]:
     return kind | None, Field(None, description=text)
 
 
-def _required(measure: Measure) -> Any:
+def _required(measure: Measure) -> tuple[TypeForm, Any]:
     default = ... if measure.default is None else measure.default
     return _TYPES[measure.kind], Field(default, description=measure.text)
 
@@ -100,12 +102,8 @@ def _keys(kind: type[Shape]) -> dict[str, Any]:
     if kind in _FILES:
         return {kind.key: _optional(_FILES[kind][0], None)}
     if kind.grouped:
-        entry = create_model(
-            f"{kind.__name__}Entry",
-            __base__=Section,
-            __doc__=kind.__doc__,
-            **{m.name: _required(m) for m in kind.measures},
-        )
+        parts: dict[str, Any] = {m.name: _required(m) for m in kind.measures}
+        entry = create_model(f"{kind.__name__}Entry", __base__=Section, __doc__=kind.__doc__, **parts)
         return {kind.key: _optional(entry, None)}
     first, *others = kind.measures
     return {
@@ -156,7 +154,7 @@ class ShapeEntry(_ShapeKeys):
             return _FILES[kind][1](folder / value.file, value)
         return kind(**dict(self._values(kind, value)))
 
-    def _values(self, kind: type[Shape], value: Any) -> Iterator[tuple[str, Any]]:
+    def _values(self, kind: type[Shape], value: object) -> Iterator[tuple[str, Any]]:
         for k, measure in enumerate(kind.measures):
             if kind.grouped:
                 yield measure.name, getattr(value, measure.name)

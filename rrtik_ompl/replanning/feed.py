@@ -57,7 +57,7 @@ class Snapshot:
     def __iter__(self) -> Iterator[Any]:
         return iter((self.time, self.scene))
 
-    def __getitem__(self, place: int) -> Any:
+    def __getitem__(self, place: int) -> Any:  # noqa: ANN401 - a time or a scene
         return (self.time, self.scene)[place]
 
     def __len__(self) -> int:

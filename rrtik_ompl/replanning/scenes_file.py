@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import finite_array, finite_number, whole_number
 from rrtik_ompl.base.choices import one_of
@@ -98,7 +99,7 @@ def _shape_data(shape: Shape) -> Json:
     return {"kind": shape.key, **values}
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """Numbers as JSON has them; NaN, for a column that is not there, as null."""
     if not isinstance(value, np.ndarray):
         return value
@@ -157,6 +158,6 @@ def _numbered(row: Mapping[str, Any], shapes: Sequence[Shape]) -> Shape:
     return shapes[number]
 
 
-def _pose(values: Any, name: str) -> pin.SE3:
+def _pose(values: ArrayLike, name: str) -> pin.SE3:
     row = finite_array(values, (7,), f"pose of '{name}'")
     return pose(row[:3], row[3:], f"pose of '{name}'")

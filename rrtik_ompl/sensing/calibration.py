@@ -91,11 +91,12 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board) -> Calibratio
     return Calibration(camera, frozen(doubts[:4]), float(error), frozen(view_errors), tuple(unused))
 
 
-def _solve(views: Sequence[tuple[Any, Any]], shape: tuple[int, ...]) -> Any:
+def _solve(views: Sequence[tuple[Matrix, Matrix]], shape: tuple[int, ...]) -> tuple[Any, ...]:
     points = [np.ascontiguousarray(p, dtype=np.float32) for p, _ in views]
     pixels = [np.ascontiguousarray(q, dtype=np.float32) for _, q in views]
     solve: Any = cv2.calibrateCameraExtended  # its type requires first guesses where None is allowed
-    return solve(points, pixels, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3)
+    solved: tuple[Any, ...] = solve(points, pixels, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3)
+    return solved
 
 
 def _too_few(count: int) -> str:

@@ -178,7 +178,7 @@ def subject_of(
     return replace(_moving(subject, getattr(shown, "world", shown), path), before=earlier)
 
 
-def _posture(shown: Any, robot: Robot, scene: Scene) -> Subject:
+def _posture(shown: Showable, robot: Robot, scene: Scene) -> Subject:
     """A robot at its start, and its goal."""
     named = getattr(shown, "name", "problem")
     name = robot.name if named == "problem" else str(named)

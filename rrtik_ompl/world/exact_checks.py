@@ -208,7 +208,7 @@ class ExactChecker:
             gaps.append(gap)
         return None if self._containment().between(pairs, self._data.oMi) else gaps
 
-    def _transform(self, number: int) -> Any:
+    def _transform(self, number: int) -> coal.Transform3s:
         """Coal's pose of a body in the world."""
         body = self.bodies[number]
         pose = self._data.oMi[body.joint] * body.placement
@@ -219,7 +219,13 @@ def _containment_of(bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spher
     return Containment(tuple(bodies), pairs, [outer for outer, _ in covers])
 
 
-def distance(first: Any, first_pose: Any, second: Any, second_pose: Any, margin: float = 0.0) -> float | None:
+def distance(
+    first: coal.CollisionGeometry,
+    first_pose: coal.Transform3s,
+    second: coal.CollisionGeometry,
+    second_pose: coal.Transform3s,
+    margin: float = 0.0,
+) -> float | None:
     """A lower bound of the distance of two coal geometries at coal's poses less a margin [m], None if it is not kept.
 
     For solids coal's answer to "do they touch" comes with the distance. Meshes take much longer, so their hulls are

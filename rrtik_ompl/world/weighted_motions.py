@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.motion_queries import MotionQueries, is_conservative, keeps_constraints, kernel_tables
+
+if TYPE_CHECKING:
+    from rrtik_ompl.world.world import World
 
 
 class WeightedMotions(MotionQueries):
@@ -34,7 +37,7 @@ class WeightedMotions(MotionQueries):
         weights: Of the joints, shape (dof,).
     """
 
-    def __init__(self, world: Any, weights: Vector) -> None:
+    def __init__(self, world: World, weights: Vector) -> None:
         robot: Robot = world.robot
         self._world, self._scale = world, weights
         chain = replace(robot.chain, gain=frozen(robot.chain.gain / weights))

@@ -13,6 +13,7 @@ import pytest
 import umsgpack
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.tasks import Attach, Detach, Gripper, MoveTo, Task, TaskPlan
 from rrtik_ompl.viewer.drawing.nodes import Recording
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
@@ -40,7 +41,7 @@ SEMANTICS = """<robot name="two-handed"><group name="arm"><joint name="turn"/><j
 <group_state name="close" group="grip"><joint name="grip" value="0"/></group_state>
 <end_effector name="hand" parent_link="hand" group="grip"/></robot>"""
 REST = rrtik.pose([0.9, 0.3, 0.4])  # of a cup out of the arm's way
-GRASP = rrtik.poses.pose_from_rpy([0.1, 0.0, 0.3], [0.1, 0.2, 0.3])
+GRASP = pose_from_rpy([0.1, 0.0, 0.3], [0.1, 0.2, 0.3])
 A, B, C = [0.5, 0.3], [-0.8, 0.9], [1.2, -0.4]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from rrtik_ompl.base.errors import InputError, few
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
@@ -13,7 +12,7 @@ from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits
 from rrtik_ompl.description.mjcf.bodies import WORLD
 from rrtik_ompl.description.mjcf.read import Mjcf, read_mjcf
 from rrtik_ompl.description.robot_build import build_robot
-from rrtik_ompl.description.robot_source import source_entry
+from rrtik_ompl.description.robot_source import BasePose, source_entry
 from rrtik_ompl.description.urdf_read import located
 from rrtik_ompl.files.text import read_text
 from rrtik_ompl.model.robot import Robot
@@ -40,7 +39,7 @@ def robot_from_mjcf(
     tip: str | None = None,
     joint_limits: str | os.PathLike[str] | None = None,
     locked: Mapping[str, float] | None = None,
-    base_pose: Any = None,
+    base_pose: BasePose = None,
     strict: bool = False,
 ) -> Robot:
     """Load a robot from an MJCF file.

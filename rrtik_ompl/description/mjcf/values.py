@@ -5,14 +5,13 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.poses import pose, turned_z
 from rrtik_ompl.description.urdf_read import numbers
@@ -92,31 +91,33 @@ class Settings:
         turn = getattr(self, f"_{given[0]}")(element, where) if given else np.eye(3)
         return pin.SE3(turn, np.array(position))
 
-    def _quat(self, element: Element, where: str) -> Any:
+    def _quat(self, element: Element, where: str) -> Matrix:
         w, x, y, z = numbers(element, "quat", 4, None, where)
         length = float(np.linalg.norm([w, x, y, z]))
         if length < 1e-9:
             raise InputError(f"{where}: <{element.tag} quat> is zero; 1 0 0 0 turns nothing")
-        return pose(quat_xyzw=np.array([x, y, z, w]) / length).rotation
+        turn: Matrix = pose(quat_xyzw=np.array([x, y, z, w]) / length).rotation
+        return turn
 
-    def _axisangle(self, element: Element, where: str) -> Any:
+    def _axisangle(self, element: Element, where: str) -> Matrix:
         *axis, angle = numbers(element, "axisangle", 4, None, where)
-        return pin.exp3(self.angle(angle) * _unit(axis, element, where))
+        turn: Matrix = pin.exp3(self.angle(angle) * _unit(axis, element, where))
+        return turn
 
-    def _euler(self, element: Element, where: str) -> Any:
+    def _euler(self, element: Element, where: str) -> Matrix:
         turn = np.eye(3)
         for letter, angle in zip(self.sequence, numbers(element, "euler", 3, None, where), strict=True):
             step = pin.exp3(self.angle(angle) * _UNITS[letter.lower()])
             turn = turn @ step if letter.islower() else step @ turn
         return turn
 
-    def _xyaxes(self, element: Element, where: str) -> Any:
+    def _xyaxes(self, element: Element, where: str) -> Matrix:
         values = np.array(numbers(element, "xyaxes", 6, None, where))
         x = _unit(values[:3], element, where)
         y = _unit(values[3:] - values[3:] @ x * x, element, where)
         return np.column_stack([x, y, np.cross(x, y)])
 
-    def _zaxis(self, element: Element, where: str) -> Any:
+    def _zaxis(self, element: Element, where: str) -> Matrix:
         return turned_z(_unit(numbers(element, "zaxis", 3, None, where), element, where))
 
 

@@ -6,7 +6,7 @@ Near is what lies close to the other body's bounding box; the cloud's tree finds
 from __future__ import annotations
 
 import weakref
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import coal
 import numpy as np
@@ -106,7 +106,7 @@ def nearest_of_cloud(ends: Ends) -> Nearest:
     return Nearest(float(best.min_distance), *(found if swapped else found[::-1]))
 
 
-def _sides(ends: Ends) -> tuple[PointCloud, Any, Any, bool]:
+def _sides(ends: Ends) -> tuple[PointCloud, coal.CollisionGeometry, coal.Transform3s, bool]:
     """The cloud, the other geometry, the cloud's pose in the other's frame, and whether the cloud is the second one."""
     first, first_pose, second, second_pose = ends
     if isinstance(first, CloudSolid):
@@ -114,7 +114,9 @@ def _sides(ends: Ends) -> tuple[PointCloud, Any, Any, bool]:
     return second.cloud, first, first_pose.inverseTimes(second_pose), True
 
 
-def _near(cloud: PointCloud, other: Any, to_other: Any, reach: float) -> tuple[Matrix, Vector]:
+def _near(
+    cloud: PointCloud, other: coal.CollisionGeometry, to_other: coal.Transform3s, reach: float
+) -> tuple[Matrix, Vector]:
     """Points of a cloud within a reach [m] of the other's bounding box, deepest inside it first, in the other's frame.
 
     Also their distances from that box.

@@ -8,6 +8,7 @@ from typing import Any
 
 import coal
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, distinct, frozen
@@ -108,7 +109,7 @@ class Containment:
             return False
         return self._inside(k, local)
 
-    def between(self, pairs: Iterable[tuple[int, int]], joints: Any) -> bool:
+    def between(self, pairs: Iterable[tuple[int, int]], joints: Sequence[pin.SE3]) -> bool:
         """Whether in one of some pairs, in either order, a body holds the other.
 
         Args:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any
 
 import coal
 import numpy as np
@@ -58,7 +57,7 @@ def _bodies(bodies: Iterable[Body]) -> Iterable[bytes]:
             yield _numbers(distance)
 
 
-def _shape(geometry: Any) -> Iterable[ArrayLike]:
+def _shape(geometry: coal.CollisionGeometry) -> Iterable[ArrayLike]:
     """The numbers that give a coal geometry, as arrays."""
     sizes = sizes_of(geometry)
     if sizes is not None:
@@ -74,7 +73,7 @@ def _shape(geometry: Any) -> Iterable[ArrayLike]:
     return (np.array(geometry.aabb_center), geometry.aabb_radius)  # a kind of which nothing is ever proven
 
 
-def _swept(geometry: Any) -> list[float]:
+def _swept(geometry: coal.CollisionGeometry) -> list[float]:
     return [float(geometry.getSweptSphereRadius())] if hasattr(geometry, "getSweptSphereRadius") else []
 
 

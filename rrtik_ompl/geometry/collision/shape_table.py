@@ -117,7 +117,7 @@ def box_corners(half: Vector) -> Matrix:
     return frozen(BOX_CORNERS * half)
 
 
-def _radius_and_half_length(geometry: Any) -> Vector:
+def _radius_and_half_length(geometry: coal.CollisionGeometry) -> Vector:
     return np.array([geometry.radius, geometry.halfLength])
 
 
@@ -253,13 +253,13 @@ def _pieces(shape: Shape) -> tuple[Piece, ...]:
     return tuple(map(Piece, solids, places))
 
 
-def sizes_of(geometry: Any) -> Vector | None:
+def sizes_of(geometry: coal.CollisionGeometry) -> Vector | None:
     """The numbers that give a coal geometry; None if its kind is in no row."""
     row = _BY_GEOMETRY.get(type(geometry))
     return None if row is None else row.sizes(geometry)
 
 
-def resized(geometry: Any, factor: float) -> Any:
+def resized(geometry: coal.CollisionGeometry, factor: float) -> coal.CollisionGeometry | None:
     """A coal geometry whose sizes are a factor larger, about its own frame; None if its kind is in no row."""
     row = _BY_GEOMETRY.get(type(geometry))
     if row is None:
@@ -286,7 +286,7 @@ def _core(geometry: coal.CollisionGeometry) -> Core:
     return row.core(*row.sizes(geometry).tolist())
 
 
-def shape_of(geometry: Any) -> Shape | None:
+def shape_of(geometry: coal.CollisionGeometry) -> Shape | None:
     """The shape of a coal geometry, for whoever draws; None if there is no such shape (a plane, a cone).
 
     Raises:

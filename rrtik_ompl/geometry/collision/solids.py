@@ -50,7 +50,7 @@ def once_per_geometry(find: Callable[[Any], Found]) -> Callable[[Any], Found]:
     return found
 
 
-def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> Any:
+def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> coal.BVHModelBase:
     """Coal mesh (bounding-volume hierarchy) from vertices, shape (n, 3), and triangles, shape (m, 3)."""
     model = coal.BVHModelOBBRSS()
     model.beginModel(len(triangles), len(vertices))
@@ -60,7 +60,7 @@ def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> Any:
     return model
 
 
-def hull(points: Matrix) -> Any:
+def hull(points: Matrix) -> coal.Convex:
     """Convex hull of points, shape (n, 3), as a coal solid.
 
     Raises:
@@ -86,7 +86,7 @@ def _thickness(points: Matrix) -> float:
     return float(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1])
 
 
-def convexified(geometry: Any) -> Any:
+def convexified(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
     """The convex hull of a mesh that is convex (see ``DEEPEST_DENT``); any other geometry as it is."""
     if not fills_its_hull(geometry):
         return geometry
@@ -138,7 +138,7 @@ def of_each(geometries: Iterable[Any], find: Callable[[Any], Found]) -> list[Fou
     return [known[key] if (key := id(each)) in known else known.setdefault(key, find(each)) for each in geometries]
 
 
-def around(geometry: coal.CollisionGeometry) -> Any:
+def around(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
     """A convex solid that contains a coal geometry: a mesh's hull (the mesh, if it is flat), a solid itself."""
     found = _hull_of_mesh(geometry) if is_mesh(geometry) else None
     return geometry if found is None else found
@@ -208,7 +208,7 @@ def robot_solids(robot: Robot) -> tuple[Any, ...]:
     return tuple(measured(convexified(body.geometry)) for body in robot.collision.geometryObjects)
 
 
-def measured(geometry: Any) -> Any:
+def measured(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
     """The geometry with its bounding box and sphere computed, which coal leaves undone for some kinds."""
     geometry.computeLocalAABB()
     return geometry

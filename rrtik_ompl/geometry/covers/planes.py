@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.geometry.collision.solids import convex_arrays, face_normals, once_per_geometry
+
+if TYPE_CHECKING:
+    import coal
 
 MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
 
@@ -25,18 +28,18 @@ def most_different(planes: Matrix, count: int) -> Matrix:
 
 
 @once_per_geometry
-def known_planes(solid: Any) -> Matrix | None:
+def known_planes(solid: coal.Convex) -> Matrix | None:
     """See :func:`outward_planes`; a solid that moves keeps them."""
     return outward_planes(solid)
 
 
 @once_per_geometry
-def outer_planes(solid: Any) -> Matrix:
+def outer_planes(solid: coal.Convex) -> Matrix:
     """The planes of the outer polyhedron of a convex solid."""
     return most_different(cast(Matrix, known_planes(solid)), MOST_PLANES)
 
 
-def outward_planes(solid: Any) -> Matrix | None:
+def outward_planes(solid: coal.Convex) -> Matrix | None:
     """Outward unit normals and offsets of a coal convex solid's faces, shape (k, 4); None if it has no thickness.
 
     Each plane is moved to the outermost corner along its normal, so that the solid lies behind all of them whatever

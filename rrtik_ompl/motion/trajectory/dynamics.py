@@ -213,7 +213,7 @@ def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
     return np.broadcast_to(row, (robot.dof,)).astype(np.float64)
 
 
-def _loaded(robot: Robot, mass: float) -> Any:
+def _loaded(robot: Robot, mass: float) -> pin.Model:
     """Pinocchio's model with a mass at the tip's origin."""
     if mass == 0.0:
         return robot.model

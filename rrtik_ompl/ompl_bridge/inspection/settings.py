@@ -7,9 +7,12 @@ import json
 from collections.abc import Callable, Mapping
 from functools import lru_cache, wraps
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from ompl import base as ob
 
 FILLED_IN = ("world", "seed", "goal")  # options that `plan()` fills in
 GIVEN = "_given"  # the attribute that keeps the arguments of a planner's constructor
@@ -24,21 +27,21 @@ def remembering(constructor: Callable[..., None]) -> Callable[..., None]:
     """A constructor that keeps the options it is given; of constructors that call each other the outermost does."""
 
     @wraps(constructor)
-    def remember(self: Any, *arguments: Any, **options: Any) -> None:
+    def remember(self: object, *arguments: Any, **options: Any) -> None:
         self.__dict__.setdefault(GIVEN, options)
         constructor(self, *arguments, **options)
 
     return remember
 
 
-def options_of(planner: Any) -> dict[str, Any]:
+def options_of(planner: ob.Planner) -> dict[str, Any]:
     """The options of a planner with the values in use."""
     defaults = {name: value for name, value in keyword_parameters(type(planner)).items() if name not in FILLED_IN}
     given = planner.__dict__.get(GIVEN, {})
     return {name: given.get(name, value) for name, value in defaults.items()}
 
 
-def change(planner: Any, name: str, value: object) -> None:
+def change(planner: ob.Planner, name: str, value: object) -> None:
     """Change an option of a planner, as its constructor would take it; a text is read as JSON where it is that.
 
     Raises:
@@ -71,6 +74,6 @@ def _read(value: object) -> object:
 
 
 @lru_cache(maxsize=64)
-def _parameters(planner: Any) -> Mapping[str, Any]:
+def _parameters(planner: Callable[..., Any]) -> Mapping[str, Any]:
     parameters = list(inspect.signature(planner).parameters.values())[1:]
     return MappingProxyType({each.name: each.default for each in parameters})

@@ -130,7 +130,7 @@ FAMILIES: Mapping[str, Builder] = MappingProxyType(
 
 
 def obstacles(
-    family: str, rng: np.random.Generator, place: Any, reach: float, room: float = 1.0
+    family: str, rng: np.random.Generator, place: pin.SE3, reach: float, room: float = 1.0
 ) -> tuple[Obstacle, ...]:
     """Obstacles of a family around a place.
 

@@ -43,8 +43,8 @@ class Camera:
     def __init__(
         self,
         matrix: ArrayLike,
-        width: int,
-        height: int,
+        width: float,
+        height: float,
         distortion: ArrayLike = (0.0,) * 5,
         *,
         sigmas: ArrayLike = (0.0,) * 9,

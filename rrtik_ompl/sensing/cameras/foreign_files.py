@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Callable
+from typing import Annotated, Literal, TypeVar
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ _MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "K", "M1")  # of 
 _LENSES = ("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "D", "D1")
 _WIDTHS, _HEIGHTS = ("image_width", "image_Width", "width"), ("image_height", "image_Height", "height")
 
+Read = TypeVar("Read")
 Size = Annotated[int, Field(strict=True, gt=0, le=100_000)]
 
 
@@ -64,8 +66,8 @@ def camera_from_opencv(text: str, name: str) -> Camera:
     """
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-        matrix, lens = (_first(storage, names, "mat") for names in (_MATRICES, _LENSES))
-        width, height = (_first(storage, names, "real") for names in (_WIDTHS, _HEIGHTS))
+        matrix, lens = (_first(storage, names, cv2.FileNode.mat) for names in (_MATRICES, _LENSES))
+        width, height = (_first(storage, names, cv2.FileNode.real) for names in (_WIDTHS, _HEIGHTS))
     except (cv2.error, SystemError):
         raise InputError(f"{name}: is not a file of OpenCV that can be read; write the camera anew") from None
     if matrix is None:
@@ -94,15 +96,15 @@ def is_of_ros(document: YamlDocument) -> bool:
     return isinstance(document.data, dict) and "camera_matrix" in document.data and "image_width" in document.data
 
 
-def _first(storage: cv2.FileStorage, names: tuple[str, ...], kind: str) -> Any:
+def _first(storage: cv2.FileStorage, names: tuple[str, ...], read: Callable[[cv2.FileNode], Read]) -> Read | None:
     for name in names:
         node = storage.getNode(name)
         if not node.empty():
-            return getattr(node, kind)()
+            return read(node)
     return None
 
 
-def _camera(matrix: ArrayLike, lens: ArrayLike, width: int, height: int) -> Camera:
+def _camera(matrix: ArrayLike, lens: ArrayLike, width: float, height: float) -> Camera:
     numbers, rest = np.ravel(np.asarray(lens, dtype=np.float64)), 5
     if np.any(numbers[rest:]):
         raise InputError(

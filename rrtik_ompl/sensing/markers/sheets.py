@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import check_target, write_bytes
 from rrtik_ompl.sensing.markers.detection import charuco_board, marker_cells
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAPERS = {"a4": (0.210, 0.297), "a3": (0.297, 0.420), "letter": (0.2159, 0.2794)}  # width, height [m]
 EDGE, GAP, CAPTION = 0.010, 0.008, 0.006  # [m]
@@ -131,7 +134,7 @@ def _write(
         write_bytes(target, made.getvalue())
 
 
-def _page(tiles: list[_Tile], size: tuple[float, float]) -> Any:
+def _page(tiles: list[_Tile], size: tuple[float, float]) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

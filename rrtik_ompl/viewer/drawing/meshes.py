@@ -106,12 +106,12 @@ def thickened(look: Look, least: float) -> Look:
     return Look(SphereGeometry(BEAD * least), place, look.corners)
 
 
-def triangle_count(geometry: Any) -> int:
+def triangle_count(geometry: coal.CollisionGeometry) -> int:
     """Triangles of a coal mesh; 0 for every other geometry."""
     return int(geometry.num_tris) if is_mesh(geometry) else 0
 
 
-def look_of_coal(geometry: Any, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | None:
+def look_of_coal(geometry: coal.CollisionGeometry, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | None:
     """How a coal geometry is drawn, with at most ``limit`` triangles; None if it has no bounded surface (a plane)."""
     if isinstance(geometry, coal.Ellipsoid):
         stretch = np.diag([*geometry.radii, 1.0])
@@ -128,7 +128,7 @@ def look_of_coal(geometry: Any, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | N
 
 
 @once_per_geometry
-def _shape_of(geometry: Any) -> Shape | None:
+def _shape_of(geometry: coal.CollisionGeometry) -> Shape | None:
     """The shape of a coal geometry; an arm and its ghosts, which have fewer triangles, ask for the same."""
     return shape_of(geometry)
 
