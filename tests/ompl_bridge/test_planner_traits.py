@@ -39,7 +39,7 @@ BY_NAME: tuple[str, ...] = (
     "planning/shortening/",
     "cli/replan.py",
     "cli/plan.py",
-    "choices.py",
+    "base/choices.py",
     "problem_files/run.py",
     "replanning/scenario.py",
     "planning/plan.py",
