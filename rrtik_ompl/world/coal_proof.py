@@ -38,16 +38,17 @@ class CoalProof:
     """What kernels leave open of motions, settled by coal where it is about two links, one of them a closed mesh.
 
     Attributes:
-        links: Which pairs of the table are such, shape (pairs,).
+        packed: The table that the kernels read.
+        links: Which pairs of it are such, shape (pairs,).
 
     Args:
         robot: The arm.
         bodies: Its bodies and others.
-        packed: The table that the kernels read.
+        packed: See above.
     """
 
     def __init__(self, robot: Robot, bodies: Sequence[Body], packed: ProofPairs) -> None:
-        self._robot, self._bodies, self._packed = robot, bodies, packed
+        self._robot, self._bodies, self.packed = robot, bodies, packed
         own = [body.kind != "obstacle" for body in bodies]
         meshes = np.array([mine and is_mesh(body.geometry) for mine, body in zip(own, bodies, strict=True)], dtype=bool)
         hollow = np.array([mesh and not is_closed(bodies[k].geometry) for k, mesh in enumerate(meshes)], dtype=bool)
@@ -66,7 +67,7 @@ class CoalProof:
         Returns:
             The numbers of two links, level and number of an interval in whose middle they are measured, shape (n, 4).
         """
-        margins, bodies, sides = self._packed.table[layout.MARGINS], self._packed.bodies, self._packed.sides
+        margins, bodies, sides = self.packed.table[layout.MARGINS], self.packed.bodies, self.packed.sides
         kept, told = margins.copy(), list[list[int]]()
         try:
             while pair[0] >= 0 and self.links[pair[0]]:
@@ -82,8 +83,8 @@ class CoalProof:
 
     def logged(self, motion: Matrix, pair: Numbers, place: Vector, run: Callable[[], object]) -> Told:
         """What kernels tell while they prove a motion, and :meth:`settle` of it; arguments as there."""
-        told = [logged(self._packed, run)]
-        measured = self.settle(motion, pair, place, lambda: told.append(logged(self._packed, run)))
+        told = [logged(self.packed, run)]
+        measured = self.settle(motion, pair, place, lambda: told.append(logged(self.packed, run)))
         return told[-1], measured
 
     def _intervals(self, motion: Matrix, row: int, place: float) -> list[tuple[int, int]]:
@@ -91,8 +92,8 @@ class CoalProof:
 
         None if they are not apart in all of it. Where kernels gave up is looked at first.
         """
-        pair = [self._bodies[k] for k in self._packed.bodies[row].tolist()]
-        kept = float(self._packed.table[layout.MARGINS][row]) + DISTANCE_TOLERANCE
+        pair = [self._bodies[k] for k in self.packed.bodies[row].tolist()]
+        kept = float(self.packed.table[layout.MARGINS][row]) + DISTANCE_TOLERANCE
         way = SPARE * float(approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0]))
         if kept <= 0.0 or Containment((*pair,), ((0, 1),)).holds((0, 1), self._robot.joint_frames(motion[:1])[0]):
             return []

@@ -8,9 +8,8 @@ last support points and have been seen to miss overlaps.
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import coal
@@ -19,102 +18,102 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.base.copies import Items, Once, shallow_copy
+from rrtik_ompl.base.copies import Items
 from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.collector import collector_waits
-from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
-from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.own_distances import is_ours, own_gap
 from rrtik_ompl.geometry.collision.solids import around, is_mesh, solids_of
 from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.taken_tables import TakenTables
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.world.arm_cache import Pairs, Spheres, arm_cache
+from rrtik_ompl.world.arm_cache import arm_cache
+from rrtik_ompl.world.arrangement import Arrangement
 from rrtik_ompl.world.proof import Prover
 
 
+@dataclass(eq=False)
 class ExactChecker:
     """Exact collision checks of configurations within the robot's limits and of straight motions between them.
 
     Attributes:
-        fast: The same pairs for the kernels, but for those in contact.
-        bodies: As given.
-        in_contact: Pairs that may overlap to some depth, of which kernels of checks know nothing: that they do not
-            overlap more is proven of every configuration and motion.
+        solids: The bodies, and which of them must not touch.
+        room: What is kept from obstacles on top of their margins [m].
+        bodies: Those of ``solids``, obstacles with that room.
+        tables: The checked pairs for the kernels; for one thread at a time.
         conservative: Whether nothing falls back to coal: what kernels leave undecided then counts as colliding.
-
-    Args:
-        robot: The arm.
-        bodies: The solids of the robot, first, and of the scene.
-        pairs: Numbers of the bodies that must not touch.
-        conservative: See above.
+        motions: Tables of motions that :func:`rrtik_ompl.kernels.search.motions.motion_table.motions_of` keeps.
     """
 
-    @collector_waits
-    def __init__(self, robot: Robot, bodies: Items[Body], pairs: Pairs, *, conservative: bool = False) -> None:
-        self.conservative = conservative
-        self._arrays = body_arrays(bodies.whole)  # held, so that all that asks for them finds them
-        touching = self._arrays.contacts
-        self.in_contact = tuple(pair for pair in pairs if pair in touching) if touching else ()
-        pairs = tuple(pair for pair in pairs if pair not in touching) if touching else pairs
-        arm = arm_cache(robot)
-        covers = arm.covers_of(bodies.whole)
-        self._tables = TakenTables(arm.pack(bodies.whole, pairs, covers))
-        self._robot, self.bodies = robot, bodies
-        self._pairs, self._covers = pairs, covers
-        self._contacts = Once(Prover, robot, bodies, self.in_contact)  # most worlds have none, and never ask
-        self._data = working_memory(robot.model)
-        self._approaches = Once(lambda: dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True)))
-        self._containment = Once(_containment_of, bodies, pairs, covers)
+    solids: Arrangement
+    room: float
+    bodies: Items[Body]
+    tables: TakenTables
+    conservative: bool = False
+    motions: dict[tuple[bool, float], FastMotions] = field(default_factory=dict)
+    _data: Any = None
 
-    __copy__ = shallow_copy
+    @classmethod
+    @collector_waits
+    def of(cls, solids: Arrangement, room: float) -> ExactChecker:
+        """Checks of an arrangement, with some room [m] around obstacles."""
+        bodies = solids.with_room(room)
+        packed = arm_cache(solids.robot).pack(bodies.whole, solids.checked, solids.covers())
+        return cls(solids, room, bodies, TakenTables(packed), _data=working_memory(solids.robot.model))
 
     @property
     def fast(self) -> FastWorld:
-        """See the class; made anew where another checker has taken the tables over."""
-        return self._tables.get(self._packed)
+        """The tables; made anew where another checker has taken them over."""
+        return self.tables.get(self._packed)
 
-    def as_conservative(self, conservative: bool) -> ExactChecker:
-        """The same checker, conservative or not; shares the tables."""
-        other = copy.copy(self)
-        other.conservative = conservative
-        return other
+    def as_conservative(self) -> ExactChecker:
+        """The same checker, which never asks coal; shares the tables."""
+        return replace(self, conservative=True)
 
     def for_thread(self) -> ExactChecker:
         """The same checker for another thread."""
-        other = copy.copy(self)
-        other._tables, other._data = self._tables.for_thread(self._packed), self._robot.model.createData()
-        other._contacts = Once(Prover, self._robot, self.bodies, self.in_contact)
-        return other
+        tables = self.tables.for_thread(self._packed)
+        return replace(self, tables=tables, motions={}, _data=self.solids.robot.model.createData())
 
-    def moved(self, number: int, placement: pin.SE3) -> ExactChecker | None:
-        """The same checker with one standing body elsewhere, which takes over the tables; None where it cannot.
+    def moved(self, solids: Arrangement, numbers: tuple[int, ...]) -> ExactChecker | None:
+        """The same checker with some standing bodies elsewhere, which takes over the tables; None where it cannot.
 
         This one makes its tables anew should it be asked again.
-        """
-        body = replace(self.bodies[number], placement=placement)
-        taken = self._tables.take(number, body, self._covers[number])
-        if taken is None:
-            return None
-        other = copy.copy(self)
-        other._tables, other.bodies = taken, self.bodies.with_(number, body)
-        other._contacts = Once(Prover, self._robot, other.bodies, self.in_contact)
-        other._containment = Once(_containment_of, other.bodies, self._pairs, self._covers)
-        return other
 
-    def with_bodies(self, bodies: Items[Body]) -> ExactChecker:
-        """The same checker of the same bodies with other margins."""
-        other = copy.copy(self)
-        other.bodies = bodies
-        other._tables = TakenTables(other._packed())
-        other._contacts = Once(Prover, self._robot, other.bodies, self.in_contact)
-        return other
+        Args:
+            solids: Where the bodies are now.
+            numbers: Of those that stand elsewhere.
+        """
+        bodies = solids.bodies
+        if self.room != 0.0:
+            bodies = self.bodies
+            for number in numbers:
+                bodies = bodies.with_(number, replace(bodies[number], placement=solids.bodies[number].placement))
+
+        tables = self.tables
+        covers = solids.covers()
+        for number in numbers:
+            taken = tables.take(number, bodies[number], covers[number])
+            if taken is None:
+                return None
+            tables = taken
+
+        motions, self.motions = self.motions, {}
+        return replace(self, solids=solids, bodies=bodies, tables=tables, motions=motions)
 
     def _packed(self) -> FastWorld:
-        return arm_cache(self._robot).pack(self.bodies.whole, self._pairs, self._covers)
+        return arm_cache(self._robot).pack(self.bodies.whole, self.solids.checked, self.solids.covers())
+
+    @property
+    def _robot(self) -> Robot:
+        return self.solids.robot
+
+    @cached_property
+    def _contacts(self) -> Prover:
+        """Proves of the pairs in contact that they overlap no deeper than they may."""
+        return Prover(self._robot, self.bodies, self.solids.in_contact)
 
     def free(self, rows: Matrix) -> Mask:
         """Which rows, shape (m, dof), are free of collision. Shape (m,)."""
@@ -126,8 +125,8 @@ class ExactChecker:
             configurations = self._robot.pinocchio_configuration(undecided)
             apart = [self._gaps(full, pairs) is not None for full, pairs in zip(configurations, doubtful, strict=True)]
             free[answers == UNDECIDED] = apart
-        if self.in_contact:
-            free[free] = self._contacts().proven(rows[free], rows[free])
+        if self.solids.in_contact:
+            free[free] = self._contacts.proven(rows[free], rows[free])
         return free
 
     def contacts_of_meshes_kept(self, row: Matrix) -> frozenset[tuple[int, int]]:
@@ -135,7 +134,7 @@ class ExactChecker:
 
         Of these coal knows the depth of their hulls only, which are filled.
         """
-        doubtful = [pair for pair in self.in_contact if any(is_mesh(self.bodies[k].geometry) for k in pair)]
+        doubtful = [pair for pair in self.solids.in_contact if any(is_mesh(self.bodies[k].geometry) for k in pair)]
         return frozenset(pair for pair in doubtful if Prover(self._robot, self.bodies, (pair,)).proven(row, row).all())
 
     def motions_free(
@@ -154,8 +153,8 @@ class ExactChecker:
         elif not self.conservative:
             for k in np.flatnonzero(answers == UNDECIDED):
                 free[k] = self._motion_free_by_coal(starts[k], ends[k], int(steps[k]))
-        if self.in_contact:
-            free[free] = self._contacts().proven(starts[free], ends[free])
+        if self.solids.in_contact:
+            free[free] = self._contacts.proven(starts[free], ends[free])
         return free
 
     def _motion_free_by_coal(self, start: Vector, end: Vector, steps: int) -> bool:
@@ -178,7 +177,7 @@ class ExactChecker:
             if gaps is None:
                 return False
             for pair, gap in zip(left, gaps, strict=True):
-                approach = float(self._approaches()[pair] @ travel)  # [m] along the whole motion
+                approach = float(self.solids.approaches()[pair] @ travel)  # [m] along the whole motion
                 certain = max(gap - DISTANCE_TOLERANCE, 0.0)
                 reach = int(min(steps * certain / approach, steps)) if approach > 0.0 else steps
                 mask = cleared.setdefault(pair, np.zeros(steps + 1, dtype=bool))
@@ -206,17 +205,13 @@ class ExactChecker:
             if gap is None:
                 return None
             gaps.append(gap)
-        return None if self._containment().between(pairs, self._data.oMi) else gaps
+        return None if self.solids.containment.between(pairs, self._data.oMi) else gaps
 
     def _transform(self, number: int) -> coal.Transform3s:
         """Coal's pose of a body in the world."""
         body = self.bodies[number]
         pose = self._data.oMi[body.joint] * body.placement
         return coal.Transform3s(pose.rotation, pose.translation)
-
-
-def _containment_of(bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres]) -> Containment:
-    return Containment(tuple(bodies), pairs, [outer for outer, _ in covers])
 
 
 def distance(

@@ -25,8 +25,9 @@ class MovingProver(Prover):
             room: For each body what is to be kept from it beside its margin [m]; read for obstacles.
             always_colliding: Whether an obstacle touches what never moves: then nothing is proven.
         """
-        self.bodies, self._room, self._always_colliding = tuple(bodies), room, always_colliding
-        self._margin = None
+        self.bodies = tuple(bodies)
+        self._room = room
+        self.always_colliding = always_colliding
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
         if self._moved is None:

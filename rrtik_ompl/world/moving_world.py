@@ -79,7 +79,7 @@ class MovingWorld:
             kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
         arm = arm_cache(self.robot)
         self._fast = arm.pack(self._bodies, kept, arm.covers_of(self._bodies), share=self_collision)
-        self._motions: dict[bool, FastMotions] = {}
+        self._motions: dict[tuple[bool, float], FastMotions] = {}
         self._inflation = [0.0] * len(self._bodies)
         self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()

@@ -6,17 +6,17 @@ planners use, and nothing else: their forward kinematics are their own, in float
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import Any, TypeAlias
+from functools import cached_property, lru_cache, partial
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Mask, Matrix
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.digests import world_digest
 from rrtik_ompl.geometry.collision.solids import of_each
@@ -26,7 +26,7 @@ from rrtik_ompl.kernels.proof.taken_proof import TakenProof
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.world.arm_cache import Pairs, strokes
+from rrtik_ompl.world.arm_cache import MAX_ROBOTS, Pairs, strokes
 from rrtik_ompl.world.coal_proof import CoalProof, Told, distance_between
 from rrtik_ompl.world.contact_planes import suggest_planes
 
@@ -116,37 +116,38 @@ class Proof:
         return not self.unproven
 
 
+@dataclass(eq=False)
 class Prover:
     """Proofs of motions of an arm among bodies; without kernels, or where bodies always touch, it proves nothing.
 
     Attributes:
         robot, bodies, pairs: What the proofs are about.
         self_margin: What links, and what they hold, keep from each other [m].
+        always_colliding: Whether two bodies touch that never move.
+        constraints: What a motion must keep too; None if nothing.
+        tables: What the kernels read, once something is to be proven.
+        kin: The same object for all provers that take each other's proofs for their own.
     """
 
-    _fixed = True  # whether obstacles stay where they are
+    robot: Robot
+    bodies: Sequence[Body]
+    pairs: Pairs
+    self_margin: float = 0.0
+    always_colliding: bool = False
+    constraints: HeldRegions | None = None
+    tables: TakenProof = field(default_factory=TakenProof)
+    kin: object = field(default_factory=object)
     _coal: CoalProof | None = None
 
-    def __init__(
-        self,
-        robot: Robot,
-        bodies: Sequence[Body],
-        pairs: Pairs,
-        *,
-        self_margin: float = 0.0,
-        always_colliding: bool = False,
-    ) -> None:
-        self.robot, self.bodies, self.pairs, self.self_margin = robot, bodies, pairs, self_margin
-        self._always_colliding, self._kin, self._tables = always_colliding, object(), TakenProof()
-        self._gain, self._offset = np.ascontiguousarray(robot.chain.gain.T), robot.chain.offset
-        ends = np.stack([robot.lower, robot.upper])
-        self._bounded = bool(np.isfinite(ends).all() and np.abs(robot.joint_values(ends)).max() < 0.5 * LARGEST_VALUE)
+    _fixed: ClassVar[bool] = True  # whether obstacles stay where they are
 
     def for_thread(self) -> Prover:
-        """The same prover for another thread; each takes the other's proofs for its own."""
-        other = copy.copy(self)
-        other._tables, other._coal = self._tables.for_thread(self.bodies), None
-        return other
+        """The same prover for another thread."""
+        return replace(self, tables=self.tables.for_thread(self.bodies), _coal=None)
+
+    def holding(self, constraints: HeldRegions) -> Prover:
+        """The prover of the same bodies for motions that keep path constraints; its proofs are others."""
+        return replace(self, constraints=constraints, kin=object())
 
     def moved(self, bodies: Sequence[Body], numbers: tuple[int, ...], *, always_colliding: bool) -> Prover:
         """The prover of a world in which some bodies stand elsewhere; it takes over this one's table.
@@ -156,12 +157,8 @@ class Prover:
             numbers: Of those that stand elsewhere.
             always_colliding: Whether two that never move touch.
         """
-        other = copy.copy(self)
-        other.bodies, other._always_colliding, other._kin = bodies, always_colliding, object()
-        other._tables = self._tables.take(numbers)
-        if other._tables.packed is None:
-            other._coal = None
-        return other
+        tables = self.tables.take(numbers)
+        return replace(self, bodies=bodies, always_colliding=always_colliding, tables=tables, kin=object())
 
     @property
     def digest(self) -> str:
@@ -192,8 +189,17 @@ class Prover:
         sound = self._sound(rows, values)
         between = None if sound is None else sound[:-1] & sound[1:]
         gaps = self._gaps((rows, rows[1:]), (values, values[1:]), between, (clearance, slack), seconds)
-        places = (replace(gap, _measure=partial(self._distance, rows, gap)) for gap in gaps)
+        places = [replace(gap, _measure=partial(self._distance, rows, gap)) for gap in gaps]
+        if self.constraints is not None:
+            places = self._with_breaches(self.constraints, rows, places)
         return Proof(count, clearance, tuple(places), self.margin, _prover=self)
+
+    def _with_breaches(self, constraints: HeldRegions, rows: Matrix, gaps: list[Gap]) -> list[Gap]:
+        """The gaps of a route, and a gap for each other motion of it that is not held."""
+        known = {gap.motion for gap in gaps}
+        left = np.flatnonzero(~constraints.route_held(rows)).tolist()
+        breaches = [Gap(k, float("nan"), constraints.why(rows[k], rows[k + 1]), "") for k in left if k not in known]
+        return sorted(gaps + breaches, key=lambda gap: gap.motion)
 
     def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[Told] | None:
         """By what each motion between waypoints, shape (k, dof), is proven; None if one of them is not."""
@@ -222,6 +228,8 @@ class Prover:
         both = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
         gaps = self._gaps((starts, ends), (values, values[len(starts) :]), both, (clearance, 0.0), None)
         mask[[gap.motion for gap in gaps]] = False
+        if self.constraints is not None:
+            mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
         return mask
 
     def table(self, clearance: float) -> int:
@@ -235,14 +243,14 @@ class Prover:
 
     def made(self, proof: Proof) -> bool:
         """Whether a proof is one of these bodies, by this object or its like for another thread."""
-        return proof.prover is not None and proof.prover._kin is self._kin
+        return proof.prover is not None and proof.prover.kin is self.kin
 
     def still_proven(self, rows: Matrix, *, clearance: float) -> Mask:
         """Which configurations, shape (m, dof), are proven free, with a clearance [m]. Shape (m,).
 
         Of a few none is, as long as the table is not made: that takes longer than coal needs for them.
         """
-        mask = np.full(len(rows), self._tables.packed is not None or len(rows) > FEW)
+        mask = np.full(len(rows), self.tables.packed is not None or len(rows) > FEW)
         if mask.any():
             mask[[gap.motion for gap in self.still_gaps(rows, clearance=clearance)]] = False
         return mask
@@ -259,12 +267,13 @@ class Prover:
 
     def _joint_values(self, rows: Matrix) -> Matrix:
         """Values of every joint of the chain, shape (m, joints), row after row in memory."""
-        return np.asarray(rows @ self._gain + self._offset)
+        gain, offset, _ = _joints(self.robot)
+        return np.asarray(rows @ gain + offset)
 
     def _sound(self, rows: Matrix, values: Matrix) -> Mask | None:
         """Which configurations are inside the limits and not too large for the bound on rounding; None for all."""
         inside = self.robot.within_limits(rows)
-        if inside.all() and (self._bounded or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
+        if inside.all() and (_joints(self.robot)[2] or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
             return None
         return np.asarray(inside & (np.abs(values) <= LARGEST_VALUE).all(axis=1))
 
@@ -278,10 +287,10 @@ class Prover:
         tails, heads = values
         count, joints = heads.shape
         begin, looked, open_, kernels = time.monotonic(), 0, 0, library(PROOF_KERNELS)
-        if kernels is None or self._always_colliding:
+        if kernels is None or self.always_colliding:
             return [Gap(k, float("nan"), "", "") for k in range(count)]
         packed = self._packed_for(*kept)
-        coal = self._coal = self._coal or CoalProof(self.robot, self.bodies, packed)
+        coal = self._coal_proof(packed)
         pairs, places = np.full(count, NOT_LOOKED_AT, dtype=np.int32), np.full(count, np.nan)
         table = ProofTable(packed.table.address)
         at, found, where = (tails.ctypes.data, heads.ctypes.data), pairs.ctypes.data, places.ctypes.data
@@ -308,12 +317,18 @@ class Prover:
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
         """The table, with a clearance and a slack to keep."""
-        packed = self._tables.get(self.bodies, self._made)
+        packed = self.tables.get(self.bodies, self._made)
         packed.keep(clearance, slack)
         return packed
 
+    def _coal_proof(self, packed: ProofPairs) -> CoalProof:
+        """What coal settles of a table: it is about links alone, wherever obstacles are."""
+        if self._coal is None or self._coal.packed is not packed:
+            self._coal = CoalProof(self.robot, self.bodies, packed)
+        return self._coal
+
     def _made(self) -> ProofPairs:
-        self._coal, bodies = None, tuple(self.bodies)
+        bodies = tuple(self.bodies)
         solids = of_each((body.geometry for body in bodies), convex_solids)
         return proof_pairs(self.robot.chain, bodies, self.pairs, solids, strokes(self.robot), fixed=self._fixed)
 
@@ -321,3 +336,12 @@ class Prover:
         if pair < 0:
             return Gap(motion, float("nan"), "", "")
         return Gap(motion, place, *(self.bodies[k].name for k in packed.bodies[pair].tolist()))
+
+
+@lru_cache(maxsize=MAX_ROBOTS)
+def _joints(robot: Robot) -> tuple[Matrix, Vector, bool]:
+    """How joint values follow from configurations, and whether the limits keep them below half the largest value."""
+    gain = np.ascontiguousarray(robot.chain.gain.T)
+    ends = np.stack([robot.lower, robot.upper])
+    bounded = bool(np.isfinite(ends).all() and np.abs(robot.joint_values(ends)).max() < 0.5 * LARGEST_VALUE)
+    return gain, robot.chain.offset, bounded

@@ -2,47 +2,67 @@
 
 from __future__ import annotations
 
-import copy
 import warnings
 from collections.abc import Iterable
 from dataclasses import fields, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import MOST_NUMBERS, Mask, Matrix, finite_array, in_blocks, not_negative, positive
+from rrtik_ompl.base.arrays import MOST_NUMBERS, Mask, Matrix, Vector, finite_array, in_blocks, not_negative, positive
 from rrtik_ompl.base.choices import Accuracy
-from rrtik_ompl.base.copies import Items, KeptHere, in_notebook, shallow_copy
-from rrtik_ompl.base.errors import InputError, MeshWarning, Renamed, UnknownNameError
+from rrtik_ompl.base.copies import ThreadOwn, in_notebook
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, Renamed, UnknownNameError, require
+from rrtik_ompl.base.sharing import Shared
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
-from rrtik_ompl.geometry.collision.bodies import Body, by_motion, colliding_pairs, in_contact, link_bodies, scene_bodies
-from rrtik_ompl.geometry.collision.certificate import Certificate, fixed_contact
+from rrtik_ompl.geometry.collision.bodies import Body, Pairs
+from rrtik_ompl.geometry.collision.certificate import Certificate
 from rrtik_ompl.geometry.collision.contacts import Contact as Contact
 from rrtik_ompl.geometry.collision.contacts import inside, measured
-from rrtik_ompl.geometry.collision.motion_bound import displacement_weights
 from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.scene import AttachedObject, Scene
 from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.world.arrangement import Arrangement, arranged
 from rrtik_ompl.world.exact_checks import ExactChecker, one_way
-from rrtik_ompl.world.holding_prover import HoldingProver
 from rrtik_ompl.world.proof import Gap as Gap
 from rrtik_ompl.world.proof import Proof as Proof
 from rrtik_ompl.world.proof import Prover
-from rrtik_ompl.world.rebuild import Rebuilt, hollow_solids, with_room
 from rrtik_ompl.world.settings import ACCURACIES as ACCURACIES
 from rrtik_ompl.world.settings import FINEST_RESOLUTION as FINEST_RESOLUTION
 from rrtik_ompl.world.settings import MOTION_RESOLUTION, WorldSettings
 
 SETTINGS = tuple(each.name for each in fields(WorldSettings))
-# What of a world is made anew when one of these changes is said in World._in; any other change makes all of it anew.
-SHARING = {"accuracy", "motion_resolution", "clearance", "proving", "inflation", "constraints"}
 
 
-class World(Rebuilt):
+def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
+    if constraints is not None:
+        return PROVERS.of(solids, None).holding(constraints)
+    always = solids.always_colliding
+    return Prover(solids.robot, solids.bodies, solids.moving, self_margin=solids.self_margin, always_colliding=always)
+
+
+def _held_regions(robot: Robot, attached: tuple[AttachedObject, ...], regions: tuple[TaskRegion, ...]) -> HeldRegions:
+    return held_regions(robot, Scene(attached=attached), regions, None)
+
+
+def _second_checker(solids: Arrangement, clearance: float) -> Certificate:
+    return Certificate(solids.robot, solids.with_room(clearance).whole, solids.pairs)
+
+
+# What a world is made of, and what each part depends on: worlds that are made of the same values share them.
+ARRANGEMENTS = Shared(arranged)  # robot, scene, self_margin
+CHECKERS = Shared(ExactChecker.of)  # arrangement, room
+PROVERS = Shared(_prover_of)  # arrangement, held regions
+HELD = Shared(_held_regions)  # robot, what is attached, regions
+CERTIFICATES = Shared(_second_checker)  # arrangement, clearance
+
+
+class World:
     """Exact collision checks of a robot in a scene; several threads may ask one world, each in memory of its own.
 
     Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
@@ -56,11 +76,12 @@ class World(Rebuilt):
     ``self_margin``; the base, which no posture moves, must only not touch an obstacle.
 
     All of it is made from :attr:`settings`. The other forms of a world (``with_...``, :meth:`proving`, :meth:`moved`,
-    copies) have the same settings but for what they are asked to change.
+    copies) are worlds made from the same settings but for what they are asked to change; what does not depend on that
+    they share.
 
     Attributes:
         settings: The arguments, checked; ``robot``, ``scene``, ``motion_resolution``, ``accuracy`` and ``self_margin``
-            are also attributes of the world.
+            are also attributes of the world. ``World.of(replace(world.settings, ...))`` is another form of it.
         bodies: The solids of the robot and the scene.
         pairs: Numbers of the bodies that must not touch.
         prover: Proves motions free; where there are path constraints, free and held.
@@ -109,28 +130,82 @@ class World(Rebuilt):
             constraints=constraints,  # type: ignore[arg-type]  # made a tuple there
         )
         self._settings = settings
-        self._obstacles = Items(settings.scene.obstacles)
-        for doubt in hollow_solids(robot, settings.scene):
-            warnings.warn(doubt, MeshWarning, stacklevel=2)
-        own = settings.self_margin
-        solids = link_bodies(robot, own) + scene_bodies(robot, settings.scene.at(0.0), own)
-        self._bodies = Items(in_contact(robot, settings.scene, solids))
-        self.weights = displacement_weights(robot, [b for b in self.bodies if b.kind != "obstacle"])
-        self.pairs = pairs = colliding_pairs(robot, settings.scene, self.bodies)
-        moving, standing = by_motion(self.bodies, pairs)
-        self._certificate = self._second_checker()
-        self._motions = KeptHere()
-        conservative = settings.accuracy == "conservative"
-        self._checks = ExactChecker(robot, self._searched_bodies(), moving, conservative=conservative)
-        self._always_colliding = always = fixed_contact(robot, self.bodies, standing) is not None
-        self.prover = Prover(robot, self._bodies, moving, self_margin=own, always_colliding=always)
-        self.constraints: HeldRegions | None = None
-        self._hold(settings.constraints)
+        self._solids = ARRANGEMENTS.of(robot, settings.scene, settings.self_margin)
+        while self._solids.doubts:  # each is said once
+            warnings.warn(self._solids.doubts.pop(0), MeshWarning, stacklevel=2)
 
+        checks = CHECKERS.of(self._solids, settings.clearance + settings.inflation)
+        self._checks = checks.as_conservative() if settings.accuracy == "conservative" else checks
+        self.constraints: HeldRegions | None = None
+        if settings.constraints:
+            self.constraints = HELD.of(robot, settings.scene.attached, settings.constraints)
+        self.prover = PROVERS.of(self._solids, self.constraints)
+
+    @classmethod
+    def of(cls, settings: WorldSettings) -> World:
+        """A world made from settings: all of them are arguments of its class.
+
+        Raises:
+            InputError: If they are none.
+        """
+        require(settings, WorldSettings, "settings of a world", "use world.settings, or dataclasses.replace of them")
+        return cls(**{name: getattr(settings, name) for name in SETTINGS})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy answers as the world does, and may be used in another thread or process."""
+        return _quietly, (self.settings,)
+
+    prover: ThreadOwn[Prover] = ThreadOwn()
+    _checks: ThreadOwn[ExactChecker] = ThreadOwn()
     resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
 
     def __repr__(self) -> str:
         return f"World({', '.join([self.robot.name, str(self.scene), *self._settings.unusual()])})"
+
+    @property
+    def settings(self) -> WorldSettings:
+        """What the world is made from."""
+        return self._settings
+
+    @property
+    def robot(self) -> Robot:
+        """The arm."""
+        return self._settings.robot
+
+    @property
+    def scene(self) -> Scene:
+        """The surroundings."""
+        return self._settings.scene
+
+    @property
+    def accuracy(self) -> Accuracy:
+        """What counts as free where the kernels cannot decide: "exact" or "conservative"."""
+        return self._settings.accuracy
+
+    @property
+    def motion_resolution(self) -> float:
+        """Largest step of any point of the arm between two checked configurations [m]."""
+        return self._settings.motion_resolution
+
+    @property
+    def self_margin(self) -> float:
+        """How far links, and what they hold, must stay from each other where they must not touch [m]."""
+        return self._settings.self_margin
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The solids of the robot and the scene, with the margins of obstacles, without the clearance."""
+        return self._solids.bodies.whole
+
+    @property
+    def pairs(self) -> Pairs:
+        """Numbers of the bodies that must not touch."""
+        return self._solids.pairs
+
+    @property
+    def weights(self) -> Vector:
+        """No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,)."""
+        return self._solids.weights
 
     @property
     def fast(self) -> FastWorld | None:
@@ -138,14 +213,15 @@ class World(Rebuilt):
 
         They do not where motions have to be proven or held, nor where something is in contact: they know nothing of it.
         """
-        tables, settings = self._checks.fast, self._settings
+        tables = self._checks.fast
+        settings = self._settings
         enough = settings.proving is None and self.constraints is None and not settings.scene.contacts
-        return tables if tables.address and enough and not self._always_colliding else None
+        return tables if tables.address and enough and not self._solids.always_colliding else None
 
     @property
     def motions(self) -> FastMotions | None:
         """How motions are checked, for searches in kernels: one table for all of them. None where ``fast`` is."""
-        return motions_of(self, self._motions)
+        return motions_of(self, self._checks.motions)
 
     @property
     def free_motions(self) -> FastMotions | None:
@@ -156,9 +232,9 @@ class World(Rebuilt):
         free = self.with_settings(proving=None, constraints=())
         scene = free.scene
         if not scene.contacts:
-            return motions_of(free, self._motions)
+            return free.motions
         pairs = (*scene.allowed_collisions, *(contact.names for contact in scene.contacts))
-        return motions_of(free.with_scene(replace(scene, contacts=(), allowed_collisions=pairs)), KeptHere())
+        return free.with_scene(replace(scene, contacts=(), allowed_collisions=pairs)).motions
 
     @property
     def unheld(self) -> World:
@@ -184,28 +260,8 @@ class World(Rebuilt):
             if name not in SETTINGS:
                 raise UnknownNameError("setting of a world", name, SETTINGS)
         settings = replace(self._settings, **changes)
-        if "scene" in changes:
-            return World.of(settings)
-        changed = {name for name in changes if getattr(settings, name) != getattr(self._settings, name)}
-        if changed <= SHARING:
-            return self._in(settings, changed) if changed else self
-        return World.of(replace(settings, scene=self.scene))
-
-    def _in(self, settings: WorldSettings, changed: set[str]) -> World:
-        """The same robot and scene with other settings."""
-        other = copy.copy(self)
-        other._settings = settings
-        if changed & {"clearance", "inflation"}:
-            other._checks = self._checks.with_bodies(other._searched_bodies())
-        if "clearance" in changed:
-            other._certificate = other._second_checker()
-        if "accuracy" in changed:
-            other._checks = other._checks.as_conservative(settings.accuracy == "conservative")
-        if changed & {"clearance", "inflation", "motion_resolution"}:
-            other._motions = KeptHere()
-        if "constraints" in changed:
-            other._hold(settings.constraints)
-        return other
+        changed = any(getattr(settings, name) != getattr(self._settings, name) for name in changes)
+        return World.of(settings) if changed else self
 
     def with_scene(self, scene: Scene) -> World:
         """A world of the same robot in another scene, made anew with the same settings.
@@ -232,7 +288,7 @@ class World(Rebuilt):
         return self.with_settings(motion_resolution=motion_resolution)
 
     refined = Renamed("with_resolution")
-    __copy__, _repr_html_ = shallow_copy, in_notebook
+    _repr_html_ = in_notebook
 
     def with_clearance(self, clearance: float) -> World:
         """The same world, where a distance [m] is kept from obstacles on top of their margins.
@@ -255,19 +311,38 @@ class World(Rebuilt):
         """
         return self.with_settings(proving=clearance)
 
-    def _searched_bodies(self) -> Items[Body]:
-        """The bodies, obstacles with all that checks keep on top of their margins."""
-        return with_room(self._bodies, self._settings.clearance + self._settings.inflation)
+    def moved(self, name: str, pose: ArrayLike | pin.SE3) -> World:
+        """The world in which an obstacle stands elsewhere; what that costs hardly grows with their number.
 
-    def _hold(self, regions: tuple[TaskRegion, ...]) -> None:
-        """Keep path constraints, and no others."""
-        prover = self.prover
-        free = prover.free if isinstance(prover, HoldingProver) else prover
-        if not regions:
-            self.constraints, self.prover = None, free
-            return
-        self.constraints = held_regions(self.robot, self._settings.scene, regions, None)
-        self.prover = HoldingProver(free, self.constraints)
+        The new world takes over the tables of this one and writes a few rows of them. This one is as it was; should it
+        be asked again, it makes its tables anew, as it does for other threads.
+
+        Args:
+            name: Of the obstacle.
+            pose: T_world_obstacle, in any form that :func:`rrtik_ompl.base.poses.rigid` takes.
+
+        Raises:
+            UnknownNameError: If there is no obstacle of that name.
+            InputError: If the pose is none.
+
+        Example:
+            >>> ball = rrtik.Obstacle("ball", rrtik.Sphere(0.1), rrtik.pose([0.4, 0.0, 0.4]))
+            >>> world = rrtik.World(rrtik.load_robot("ur5"), rrtik.Scene([ball]))
+            >>> world = world.moved("ball", [0.4, 0.3, 0.4])
+            >>> world.scene.obstacle("ball").pose.translation.tolist()
+            [0.4, 0.3, 0.4]
+        """
+        require(name, str, "name of an obstacle")
+        settings = self._settings
+        moved, numbers = self._solids.moved(name, pose)
+        solids = ARRANGEMENTS.keep(moved, settings.robot, moved.scene, settings.self_margin)
+        free = PROVERS.of(self._solids, None)
+        prover = free.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
+        PROVERS.keep(prover, solids, None)
+        checks = self._checks.moved(solids, numbers)
+        if checks is not None:
+            CHECKERS.keep(checks, solids, checks.room)
+        return World.of(replace(settings, scene=solids.scene))
 
     def valid(self, q: ArrayLike) -> bool:
         """Whether q, shape (dof,), is inside the limits and free of collision.
@@ -347,7 +422,7 @@ class World(Rebuilt):
         found = list(measured(self.bodies, pairs, self.robot.joint_frames(rows)[0], near_only=True))
         if not found:
             shared = not kept and self._settings.clearance == 0.0
-            certificate = self._certificate() if shared else Certificate(self.robot, self.bodies, pairs)
+            certificate = self._certificate if shared else Certificate(self.robot, self.bodies, pairs)
             found = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
         return tuple(sorted(found, key=lambda c: c.clearance))
 
@@ -374,7 +449,7 @@ class World(Rebuilt):
         if self._settings.clearance == 0.0:
             return ()
         frames = self.robot.joint_frames(self._rows(q, 1))[0]
-        roomy = with_room(self._bodies, self._settings.clearance).whole
+        roomy = self._solids.with_room(self._settings.clearance).whole
         near = measured(roomy, self.pairs, frames, near_only=True)
         kept = (c for c in near if c.clearance + self._settings.clearance > 0.0)
         return tuple(sorted(kept, key=lambda c: c.clearance))
@@ -405,8 +480,13 @@ class World(Rebuilt):
         """A second opinion on rows of Q, (m, dof) -> (m,), not by the checks of planners: proofs first, then coal."""
         mask = self.robot.within_limits(rows := self._rows(Q, 2))
         open_ = mask & ~self.prover.still_proven(rows, clearance=self._settings.clearance)
-        mask[open_] = self._certificate().free(rows[open_])
+        mask[open_] = self._certificate.free(rows[open_])
         return mask if self.constraints is None else mask & self.constraints.held(rows)
+
+    @cached_property
+    def _certificate(self) -> Certificate:
+        """The checker behind :meth:`certify`."""
+        return CERTIFICATES.of(self._solids, self._settings.clearance)
 
     def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:
         starts, ends = self._rows(A, 2), self._rows(B, 2)
@@ -423,7 +503,7 @@ class World(Rebuilt):
         return np.atleast_2d(rows)
 
     def _free(self, rows: Matrix) -> Mask:
-        mask = self.robot.within_limits(rows) & (not self._always_colliding)
+        mask = self.robot.within_limits(rows) & (not self._solids.always_colliding)
         if mask.all():
             mask = self._checks.free(rows)
         else:
@@ -433,7 +513,7 @@ class World(Rebuilt):
         return mask
 
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
-        mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._always_colliding)
+        mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._solids.always_colliding)
         A, B = one_way(starts[mask], ends[mask])
         counts = step_counts(A, B, self.weights, self.motion_resolution)
         clearance = self._settings.proving
@@ -448,3 +528,11 @@ class World(Rebuilt):
 def _and_more(contacts: tuple[Contact, ...]) -> str:
     more = len(contacts) - 1
     return f" (and {more} more pair{'s' * (more > 1)})" if more else ""
+
+
+def _quietly(settings: WorldSettings) -> World:
+    """A world like one that there is already; what it doubts was said there."""
+    with warnings.catch_warnings():
+        for doubt in (MeshWarning, DescriptionWarning):
+            warnings.simplefilter("ignore", doubt)
+        return World.of(settings)

@@ -59,7 +59,7 @@ def test_obstacles_moved_in_the_table_are_where_a_new_world_has_them(copies):
         less = moving.motions_proven(A, B, less=0.005)
         assert (proven <= less).all()
         assert less.sum() > proven.sum()
-    assert moving._prover._tables.packed.table.intact()
+    assert moving._prover.tables.packed.table.intact()
 
 
 def test_nothing_is_proven_while_an_obstacle_overlaps_the_base():

@@ -85,7 +85,7 @@ def test_what_is_proven_is_free_wherever_coal_looks(name, tmp_path):
     assert not (proven & ~free).any()
     if name != "planar10":  # whose links hardly keep clear of all that stands on its plane
         assert proven.any()
-    assert world.prover._tables.packed.table.intact()
+    assert world.prover.tables.packed.table.intact()
 
 
 @pytest.mark.kernels
@@ -96,7 +96,7 @@ def test_no_point_leaves_its_chord_by_more_than_the_bound(name, tmp_path):
     starts, ends = random_motions(robot, rng, 20, length=1.5)
     for a, b in zip(starts, ends, strict=True):
         world.motion_proven(a, b)
-        table = world.prover._tables.packed.table
+        table = world.prover.tables.packed.table
         bends = table[layout.BENDS]
         frames = robot.joint_frames(a + np.linspace(0.0, 1.0, 101)[:, None] * (b - a))
         sweeps = table[layout.SWEEPS].reshape(-1, layout.SWEEP_SIZE)

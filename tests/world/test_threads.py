@@ -55,7 +55,7 @@ def test_threads_get_the_answers_of_one(world):
         assert [str(each) for each in pool.map(ask, range(8))] == [str(each) for each in alone]
         tables = list(pool.map(lambda _: (world.fast, world.prover), range(8)))
     assert world.fast.intact()
-    assert all(fast.intact() and own._tables.packed.table.intact() for fast, own in tables)
+    assert all(fast.intact() and own.tables.packed.table.intact() for fast, own in tables)
 
 
 def test_each_thread_has_its_own_memory_and_takes_the_proofs_of_others(world):

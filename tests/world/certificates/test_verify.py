@@ -52,7 +52,7 @@ def test_a_certificate_of_a_proven_path_holds_also_when_read_again(name, cases):
         assert verify_certificate(again, world, path.waypoints, clearance=0.001) == ""
         assert again.entries == certificate.entries
         assert (again.waypoints == path.waypoints).all()
-        assert world.prover._tables.packed.table.intact()
+        assert world.prover.tables.packed.table.intact()
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -207,7 +207,7 @@ def test_the_verifier_computes_the_frames_that_pinocchio_does_and_bounds_all_acc
 
 def test_the_log_grows_where_it_is_too_small_and_costs_nothing_afterwards(cases, monkeypatch):
     case = cases("panda")[0]
-    packed = case.world.prover._tables.packed
+    packed = case.world.prover.tables.packed
     monkeypatch.setattr(log.logged, "__defaults__", (1,))
     again = certificate_of(case.world, case.path, 0.001)
     assert verify_certificate(again, case.world, case.path.waypoints) == ""

@@ -156,7 +156,9 @@ class FastMotions:
 class MotionSource(Protocol):
     """A world whose motion table is wanted."""
 
-    weights: Vector
+    @property
+    def weights(self) -> Vector:
+        """No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,)."""
 
     @property
     def robot(self) -> Any:
@@ -175,20 +177,23 @@ class MotionSource(Protocol):
         """The tables of the checks, None where nothing can be checked in kernels."""
 
 
-def motions_of(world: MotionSource, tables: dict[bool, FastMotions]) -> FastMotions | None:
+def motions_of(world: MotionSource, tables: dict[tuple[bool, float], FastMotions]) -> FastMotions | None:
     """The motion table of a world: the one that is kept while it still fits, None where kernels cannot be used.
 
     Args:
         world: The world.
-        tables: Those that are kept, by whether doubtful motions are resolved.
+        tables: Those that are kept, by whether doubtful motions are resolved, and the resolution [m].
     """
-    fast, resolve = world.fast, world.resolves
+    fast = world.fast
     if fast is None:
         return None
-    kept, resolution = tables.get(resolve), world.motion_resolution
-    if kept is None or kept.fast is not fast or kept.resolution != resolution:
+    resolve = world.resolves
+    resolution = world.motion_resolution
+    kept = tables.get((resolve, resolution))
+    if kept is None or kept.fast is not fast:
         chain = world.robot.chain
-        kept = tables[resolve] = FastMotions(
+        kept = FastMotions(
             fast, chain.gain, chain.offset, weights=world.weights, resolution=resolution, resolve=resolve
         )
+        tables[resolve, resolution] = kept
     return kept

@@ -1,0 +1,204 @@
+"""The solids of a robot in a scene, and what depends on nothing else: the first part of a world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.copies import Items, Once
+from rrtik_ompl.base.errors import UnknownNameError
+from rrtik_ompl.geometry.collision.bodies import (
+    Body,
+    Pairs,
+    by_motion,
+    colliding_pairs,
+    far_apart,
+    link_bodies,
+    scene_bodies,
+)
+from rrtik_ompl.geometry.collision.bodies import in_contact as with_contacts
+from rrtik_ompl.geometry.collision.body_arrays import BodyArrays, body_arrays
+from rrtik_ompl.geometry.collision.certificate import fixed_contact
+from rrtik_ompl.geometry.collision.containment import Containment
+from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE
+from rrtik_ompl.geometry.collision.motion_bound import approach_weights, displacement_weights
+from rrtik_ompl.geometry.collision.shape_table import pieces
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Mesh
+from rrtik_ompl.world.arm_cache import Spheres, arm_cache
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangement:
+    """The solids of a robot in a scene, moving obstacles where they are at time 0; made by :func:`arranged`.
+
+    Attributes:
+        robot, scene: See above.
+        bodies: The solids; those of the robot's links first.
+        pairs: Numbers of the bodies that must not touch.
+        checked: Those of which a body moves, and that may not overlap at all.
+        in_contact: The others of which a body moves: how deep they may overlap is proven, kernels of checks know nothing
+            of them.
+        weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
+        always_colliding: Whether two bodies touch that never move.
+        self_margin: How far links, and what they hold, must stay from each other [m].
+        covers: Makes the spheres around and inside each body.
+        approaches: Makes, for each checked pair, how far its bodies can approach each other, shape (dof,) [m].
+        numbers: Makes where the obstacles stand among obstacles and bodies; the same wherever they stand.
+    """
+
+    robot: Robot
+    scene: Scene
+    bodies: Items[Body]
+    pairs: Pairs
+    checked: Pairs
+    in_contact: Pairs
+    weights: Vector
+    always_colliding: bool
+    self_margin: float
+    covers: Once[tuple[Spheres, ...]]
+    approaches: Once[dict[tuple[int, int], Vector]]
+    numbers: Once[Numbers]
+    arrays: BodyArrays  # held, so that whoever asks for those of the bodies finds them
+    doubts: list[str] = field(default_factory=list)
+
+    @cached_property
+    def moving(self) -> Pairs:
+        """The pairs of which a body moves."""
+        return tuple(sorted(self.checked + self.in_contact)) if self.in_contact else self.checked
+
+    @cached_property
+    def containment(self) -> Containment:
+        """Which bodies can be wholly inside others."""
+        return Containment(self.bodies.whole, self.checked, [outer for outer, _ in self.covers()])
+
+    def moved(self, name: str, pose: ArrayLike | pin.SE3) -> tuple[Arrangement, tuple[int, ...]]:
+        """The arrangement with an obstacle elsewhere, and the numbers of its bodies.
+
+        Raises:
+            UnknownNameError: If there is no obstacle of that name.
+            InputError: If the pose is none.
+        """
+        numbers = self.numbers()
+        if name not in numbers.obstacles:
+            raise UnknownNameError("obstacle", name, numbers.obstacles)
+        place = numbers.obstacles[name]
+        obstacle = replace(self.scene.obstacles[place], pose=pose)
+        placements = numbers.placements(obstacle)
+
+        bodies = self.bodies
+        for number, placement in placements.items():
+            bodies = bodies.with_(number, replace(bodies[number], placement=placement))
+
+        still = numbers.standing(None if self.always_colliding else placements)
+        other = replace(
+            self,
+            scene=self.scene.moved(place, obstacle),
+            bodies=bodies,
+            always_colliding=_touching(self.robot, bodies, still),
+        )
+        return other, tuple(placements)
+
+    def with_room(self, room: float) -> Items[Body]:
+        """The bodies, obstacles with that much more margin [m]."""
+        if room == 0.0:
+            return self.bodies
+        return Items(
+            tuple(
+                replace(body, margin=body.margin + room) if body.kind == "obstacle" else body
+                for body in self.bodies.whole
+            )
+        )
+
+
+def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
+    """The solids of a robot in a scene.
+
+    Raises:
+        InputError: If the scene does not fit the robot.
+    """
+    solids = link_bodies(robot, self_margin) + scene_bodies(robot, scene.at(0.0), self_margin)
+    bodies = Items(with_contacts(robot, scene, solids))
+    pairs = colliding_pairs(robot, scene, bodies.whole)
+    moving, standing = by_motion(bodies, pairs)
+    arrays = body_arrays(bodies.whole)
+    in_contact = tuple(pair for pair in moving if pair in arrays.contacts) if arrays.contacts else ()
+    checked = tuple(pair for pair in moving if pair not in arrays.contacts) if arrays.contacts else moving
+    return Arrangement(
+        robot,
+        scene,
+        bodies,
+        pairs,
+        checked,
+        in_contact,
+        weights=displacement_weights(robot, [body for body in bodies if body.kind != "obstacle"]),
+        always_colliding=fixed_contact(robot, bodies.whole, standing) is not None,
+        self_margin=self_margin,
+        covers=Once(arm_cache(robot).covers_of, bodies),
+        approaches=Once(_approaches, robot, bodies, checked),
+        numbers=Once(Numbers.of, scene.obstacles, bodies, standing),
+        arrays=arrays,
+        doubts=list(_doubts(robot, scene)),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Numbers:
+    """Where the obstacles of a scene stand among its obstacles and bodies."""
+
+    obstacles: dict[str, int]
+    bodies: dict[str, list[int]]
+    fixed: dict[int, list[tuple[int, int]]]  # pairs of each body that both never move
+
+    @classmethod
+    def of(cls, obstacles: Sequence[Obstacle], bodies: Sequence[Body], standing: Pairs) -> Numbers:
+        """Those of a scene."""
+        numbers: dict[str, list[int]] = {}
+        for k, body in enumerate(bodies):
+            if body.kind == "obstacle":
+                numbers.setdefault(body.name, []).append(k)
+
+        fixed: dict[int, list[tuple[int, int]]] = {}
+        for pair in standing:
+            for k in pair:
+                fixed.setdefault(k, []).append(pair)
+        return cls({each.name: k for k, each in enumerate(obstacles)}, numbers, fixed)
+
+    def placements(self, obstacle: Obstacle) -> dict[int, pin.SE3]:
+        """Where the bodies of an obstacle are, by their numbers."""
+        here = obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, 0.0)
+        return {
+            number: here * part.placement
+            for number, part in zip(self.bodies[obstacle.name], pieces(obstacle.shape), strict=True)
+        }
+
+    def standing(self, moved: Iterable[int] | None) -> Pairs:
+        """Of the pairs that never move those of some bodies; all of them where nobody names bodies."""
+        if moved is None:
+            return tuple(dict.fromkeys(pair for own in self.fixed.values() for pair in own))
+        return tuple(pair for k in moved for pair in self.fixed.get(k, ()))
+
+
+def _approaches(robot: Robot, bodies: Items[Body], pairs: Pairs) -> dict[tuple[int, int], Vector]:
+    return dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True))
+
+
+def _touching(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> bool:
+    """Whether one of some pairs of bodies that never move touches; most are told apart by the balls around them."""
+    near = [(bodies[i], bodies[j]) for i, j in pairs if not far_apart(bodies[i], bodies[j], DISTANCE_TOLERANCE)]
+    return any(fixed_contact(robot, both, ((0, 1),)) is not None for both in near)
+
+
+def _doubts(robot: Robot, scene: Scene) -> Iterator[str]:
+    """What a world does not take for a solid, where nobody was told when a file was read."""
+    if not robot.collision.geometryObjects:
+        yield f"robot '{robot.name}' has no collision geometry: all is free"
+    for name, shape in ((item.name, item.shape) for items in (scene.obstacles, scene.attached) for item in items):
+        if isinstance(shape, Mesh) and not (shape.closed or shape.source):
+            yield f"the mesh of '{name}' has {shape.open_edges} open edges; it is treated as a surface, not as a solid"
