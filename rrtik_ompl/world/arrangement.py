@@ -43,8 +43,8 @@ class Arrangement:
         bodies: The solids; those of the robot's links first.
         pairs: Numbers of the bodies that must not touch.
         checked: Those of which a body moves, and that may not overlap at all.
-        in_contact: The others of which a body moves: how deep they may overlap is proven, kernels of checks know nothing
-            of them.
+        in_contact: The others of which a body moves. How deep they may overlap is proven; kernels of checks know
+            nothing of them.
         weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
         always_colliding: Whether two bodies touch that never move.
         self_margin: How far links, and what they hold, must stay from each other [m].
