@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,6 +14,7 @@ from ompl import geometric as og
 
 from rrtik_ompl import Obstacle, Problem, ProblemError, Scene, World, list_problems, load_problem, load_robot
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.copies import changed
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder
 from rrtik_ompl.ompl_bridge.attempt import attempt
@@ -168,8 +168,7 @@ def asked_configurations(problem: Problem, count: int, rng: np.random.Generator)
     It is started again with other random numbers until it has asked about ``MOTIONS``.
     """
     listener = _Listener(problem.world)
-    listened = copy.copy(problem)
-    listened.world = listener  # type: ignore[assignment]
+    listened = changed(problem, world=listener)
     goals = goal_configurations(problem, np.random.default_rng(0)).rows
     for seed in range(ATTEMPTS):
         attempt(listened, og.RRTConnect, goals, seconds=1.0, seed=seed, parameters={"range": 1.0})

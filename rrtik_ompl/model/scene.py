@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import LARGEST, Vector, bounded_array, finite_array, finite_number, frozen
-from rrtik_ompl.base.copies import as_value, restored
+from rrtik_ompl.base.copies import as_value, changed
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, listed, name_of, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.model.shapes import SHAPES, Shape
@@ -304,8 +304,7 @@ class Scene:
         """The scene with an obstacle in the place of one of the same name and shape; nothing else is checked again."""
         obstacles = list(self.obstacles)
         obstacles[number] = obstacle
-        same = {each.name: getattr(self, each.name) for each in fields(self)}
-        return restored(Scene, same | {"obstacles": tuple(obstacles)})
+        return changed(self, obstacles=tuple(obstacles))
 
     def attaching(
         self,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, frozen
+from rrtik_ompl.base.copies import changed
 from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.problem import Problem
@@ -24,9 +27,10 @@ class WeightedProblem:
 
     def __init__(self, problem: Problem, motions: MotionQueries | None = None) -> None:
         self._scale = weights_of(problem.robot)
-        world = problem.world if motions is None else motions
-        self.problem = problem.with_world(WeightedMotions(world, self._scale))  # type: ignore[arg-type]
-        self._start, self.problem.start = problem.start, frozen(problem.start * self._scale)
+        self._start = problem.start
+        asked: Any = problem.world if motions is None else motions  # which has what it needs of a world
+        weighted = WeightedMotions(asked, self._scale)
+        self.problem = changed(problem, world=weighted, start=frozen(problem.start * self._scale))
 
     def there(self, rows: Matrix) -> Matrix:
         """Configurations in these coordinates, shape (m, dof)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from rrtik_ompl.base.arrays import (
     truths,
     usable_waypoints,
 )
-from rrtik_ompl.base.copies import as_value, in_notebook
+from rrtik_ompl.base.copies import as_value, changed, in_notebook, restored
 from rrtik_ompl.base.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
@@ -82,7 +82,16 @@ class JointPath:
         sliding, endless = (truths(mask, "mask of a path's joints") for mask in given)
         if not len(names) == count == sliding.size == endless.size:
             raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
-        _fill(self, frozen(rows), names, frozen(sliding, bool), robot_name, frozen(endless, bool))
+        known = {
+            "waypoints": frozen(rows),
+            "joint_names": names,
+            "prismatic": frozen(sliding, bool),
+            "robot_name": robot_name,
+            "continuous": frozen(endless, bool),
+            "proof": None,
+        }
+        for name, value in known.items():
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         k, n = self.waypoints.shape
@@ -100,9 +109,15 @@ class JointPath:
         rows: Matrix = waypoints if isinstance(waypoints, np.ndarray) else np.empty(0)
         if rows.dtype != np.float64 or rows.shape[1:] != (robot.dof,) or not np.isfinite(rows[:MOST_ROWS]).all():
             rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
-        kinds = frozen(robot.prismatic, bool), frozen(robot.continuous, bool)
-        rows = frozen(usable_waypoints(robot.onto_limits(rows)))
-        return _fill(object.__new__(cls), rows, robot.joint_names, kinds[0], robot.name, kinds[1])
+        known = {
+            "waypoints": frozen(usable_waypoints(robot.onto_limits(rows))),
+            "joint_names": robot.joint_names,
+            "prismatic": frozen(robot.prismatic, bool),
+            "robot_name": robot.name,
+            "continuous": frozen(robot.continuous, bool),
+            "proof": None,
+        }
+        return restored(cls, known)
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
         """The same joints, other waypoints."""
@@ -200,8 +215,7 @@ class JointPath:
 
     def with_proof(self, proof: Proof) -> JointPath:
         """The same path with what somebody else has proven of its motions."""
-        known = self.waypoints, self.joint_names, self.prismatic, self.robot_name, self.continuous
-        return _fill(object.__new__(type(self)), *known, proof)
+        return changed(self, proof=proof)
 
     @property
     def proven(self) -> bool:
@@ -256,16 +270,6 @@ class JointPath:
             "transitions": self.transitions,
             "waypoints": (self.waypoints + 0.0).tolist(),  # a person reads 0.0, not -0.0
         }
-
-
-def _fill(path: JointPath, *values: object) -> JointPath:
-    """A path with the values of its attributes, in their order; nothing is checked, and there may be no proof."""
-    for name, value in zip(_ATTRIBUTES, (*values, None), strict=False):
-        object.__setattr__(path, name, value)
-    return path
-
-
-_ATTRIBUTES = tuple(each.name for each in fields(JointPath))
 
 
 def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:

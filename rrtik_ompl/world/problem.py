@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import TAU, Vector, dimensions, frozen
 from rrtik_ompl.base.choices import Accuracy
-from rrtik_ompl.base.copies import as_value, in_notebook, shallow_copy
+from rrtik_ompl.base.copies import as_value, changed, in_notebook, restored
 from rrtik_ompl.base.errors import InputError, ProblemError, Renamed, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.constraints.contradiction import contradiction
@@ -25,6 +25,7 @@ from rrtik_ompl.world.route_check import verification_resolution
 from rrtik_ompl.world.world import World
 
 
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Problem:
     """A planning problem.
 
@@ -59,6 +60,13 @@ class Problem:
         (7,)
     """
 
+    world: World
+    start: Vector
+    goal: Goal
+    name: str
+    planner: str | None
+    constraints: tuple[TaskRegion, ...]
+
     def __init__(
         self,
         world: World,
@@ -71,34 +79,44 @@ class Problem:
     ) -> None:
         require(world, World, "world of a problem", "use World(robot, scene)")
         require(planner, str | None, "planner of a problem", "use a name of list_planners()")
-        self.world = world
-        self.name = name
-        self.planner = planner
         start = world.robot.posture(start) if isinstance(start, str) else start
         goal = world.robot.posture(goal) if isinstance(goal, str) else goal
         wanted = _goal_of(goal)
         joints = {"goal": wanted.q} if isinstance(wanted, JointGoal) else {}
         ends = usable_configurations(world, {"start": start, **joints})
-        self.start: Vector = frozen(ends["start"])
+        first = frozen(ends["start"])
+
         known = world.settings.constraints
         fresh = [each for each in listed(constraints, "path constraints") if each not in known]
-        held = held_regions(world.robot, world.scene, (*known, *fresh), self.start)
-        self.constraints = tuple(each.region for each in held.regions)
-        if held.regions:
-            self.world = world = world.with_settings(constraints=self.constraints)
-            _keep(world.robot, held, self.start, "start")
+        held = held_regions(world.robot, world.scene, (*known, *fresh), first)
+        regions = tuple(each.region for each in held.regions)
+        if regions:
+            world = world.with_settings(constraints=regions)
+            _keep(world.robot, held, first, "start")
+
         if isinstance(wanted, JointGoal):
             _keep(world.robot, held, ends["goal"], "goal")
-            wanted = JointGoal(_nearest_turn(world, self.start, ends["goal"]), wanted.tolerance)
+            wanted = JointGoal(_nearest_turn(world, first, ends["goal"]), wanted.tolerance)
         elif any(_of_a_path(part) for part in parts_of(wanted) if isinstance(part, TaskRegion)):
             raise InputError(
                 "goal region: frame, from_start and allowances are for path constraints; a goal is of the tip"
             )
         if isinstance(wanted, MultiGoal):
             goal_regions(world.robot, world.scene, wanted)  # refuses links that do not exist
-        self.goal: Goal = wanted
 
-    __copy__, __reduce__, _repr_html_ = shallow_copy, as_value, in_notebook
+        values = {
+            "world": world,
+            "start": first,
+            "goal": wanted,
+            "name": name,
+            "planner": planner,
+            "constraints": regions,
+        }
+        for field, value in values.items():
+            object.__setattr__(self, field, value)
+
+    __reduce__ = as_value
+    _repr_html_ = in_notebook
 
     def __repr__(self) -> str:
         return f"Problem('{self.name}', {self.world}, to a {type(self.goal).__name__})"
@@ -120,9 +138,7 @@ class Problem:
 
     def with_world(self, world: World) -> Problem:
         """The same start and goal in another form of the same world; neither is checked again."""
-        other = copy.copy(self)
-        other.world = world
-        return other
+        return changed(self, world=world)
 
     def reached(self, q: ArrayLike) -> bool:
         """Whether a configuration, shape (dof,), satisfies the goal."""
@@ -131,10 +147,15 @@ class Problem:
 
 def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Problem:
     """A problem whose start, shape (dof,), and goal somebody has checked already; no joint may be continuous."""
-    problem: Problem = object.__new__(Problem)
-    problem.world, problem.name, problem.planner, problem.constraints = world, "problem", None, ()
-    problem.start, problem.goal = frozen(start), goal if isinstance(goal, JointGoal) else JointGoal(goal)
-    return problem
+    known = {
+        "world": world,
+        "start": frozen(start),
+        "goal": goal if isinstance(goal, JointGoal) else JointGoal(goal),
+        "name": "problem",
+        "planner": None,
+        "constraints": (),
+    }
+    return restored(Problem, known)
 
 
 def densely_checked(problem: Problem) -> Problem:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
-from rrtik_ompl.base.copies import as_value, in_notebook
+from rrtik_ompl.base.copies import as_value, changed, in_notebook
 from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.text import write_text
@@ -184,9 +184,7 @@ class Trajectory:
 
     def at_set_points(self, knots: NDArray[np.int64]) -> Trajectory:
         """The same motion, known at these knots alone: limits are judged there."""
-        found = Trajectory(self.times, self.positions, self.velocities, self.accelerations, **self._names())
-        object.__setattr__(found, "set_points", frozen(places(knots, len(self.times), "set points"), np.int64))
-        return found
+        return changed(self, set_points=frozen(places(knots, len(self.times), "set points"), np.int64))
 
     def path(self) -> JointPath:
         """The knots as waypoints of a path."""

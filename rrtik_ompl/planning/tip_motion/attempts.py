@@ -153,5 +153,4 @@ def path_of(world: World, made: Attempt) -> JointPath | None:
     if made.fraction <= 0.0:
         return None
     path = JointPath.of(world.robot, made.rows)
-    object.__setattr__(path, "proof", made.proof)
-    return path
+    return path if made.proof is None else path.with_proof(made.proof)
