@@ -101,6 +101,27 @@ def test_the_cut_pumas_reach_the_published_points(name, degrees, inches):
     np.testing.assert_allclose(tip, inches, atol=6e-5)
 
 
+def published_tip(q, d7=2.2):
+    """The tip of the five-joint arm of [2] in inches, as printed, term by term; q: shape (m, 5)."""
+    a2, a3, d3, d4 = 17.0, 0.8, 4.9, 17.0
+    (c1, c2, c3, c4, c5), (s1, s2, s3, s4, s5) = np.cos(q).T, np.sin(q).T
+    x = a2 * c1 * c2 + a3 * c1 * c2 * c3 - d3 * s1 - d4 * c1 * c3 * s2 - d7 * c1 * c3 * c5 * s2 - d4 * c1 * c2 * s3
+    x += -d7 * c1 * c2 * c5 * s3 - a3 * c1 * s2 * s3 - d7 * c1 * c2 * c3 * c4 * s5 + d7 * c1 * c4 * s2 * s3 * s5
+    x += -d7 * s1 * s4 * s5
+    y = d3 * c1 + a2 * c2 * s1 + a3 * c2 * c3 * s1 - d4 * c3 * s1 * s2 - d7 * c3 * c5 * s1 * s2 - d4 * c2 * s1 * s3
+    y += -d7 * c2 * c5 * s1 * s3 - a3 * s1 * s2 * s3 - d7 * c2 * c3 * c4 * s1 * s5 + d7 * c4 * s1 * s2 * s3 * s5
+    y += d7 * c1 * s4 * s5
+    z = -d4 * c2 * c3 - d7 * c2 * c3 * c5 - a2 * s2 - a3 * c3 * s2 - a3 * c2 * s3 + d4 * s2 * s3 + d7 * c5 * s2 * s3
+    z += d7 * c3 * c4 * s2 * s5 + d7 * c2 * c4 * s3 * s5
+    return np.stack([x, y, z], axis=1)
+
+
+def test_the_cut_puma_of_five_joints_is_where_the_printed_formulas_say():
+    robot = load_robot("puma560_5dof")
+    q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (10_000, 5))
+    np.testing.assert_allclose(robot.fk_batch(q)[:, :3, 3] / INCH, published_tip(q), atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("degrees", "point"),
     [
