@@ -1,24 +1,23 @@
-"""Measure planning under path constraints on generated problems, and judge every path densely.
+"""Planning under path constraints on generated problems, every path judged densely.
 
-Usage: ``python bench/constraints/report.py [--problems 100] [--others 100] [--peers 0 --python PYTHON] [--jobs 1]
-[--out bench/reports/constraints.md]``; about a second a problem. An interrupted run goes on where it was.
+About a second a problem. An interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from typer import Option
 
 from bench.constraints.pairs import TIPS, Pair, pair
 from bench.constraints.peers import DELTA, Other, Others, others, versions
 from bench.constraints.problems import MOST_SCENES
 from bench.constraints.runs import EXPLORED, EXPLORED_LONG, LIMIT, LONG, ROUNDS, Outcome, branches, measured
-from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.machine import processes
+from bench.shared.parts import Parts
+from bench.shared.run import Roboplan, Run
 from rrtik_bench.report.page import Report
 
 LARGEST_TILT, ROUNDING = 5.0, 1e-6  # [deg]; of the judge [mm or deg]
@@ -103,32 +102,36 @@ HEADS = [
 ]
 
 
-def main() -> None:
-    """Write the page."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--problems", type=int, default=100, help="with a cup, of each of two robots")
-    parser.add_argument(
-        "--others", nargs="+", default=["100"], metavar="N", help="of each other constraint: a number, or ARM=NUMBER"
-    )
-    parser.add_argument("--branches", type=int, default=30, help="goals of any branch, of each of four sets")
-    parser.add_argument("--pairs", type=int, default=20, help="scenes of each robot with two arms")
-    parser.add_argument("--peers", type=int, default=0, help="problems of each set for OMPL and roboplan too")
-    parser.add_argument("--python", default=sys.executable, help="interpreter of an environment with roboplan")
-    add_options(parser, "constraints.md")
-    given = parser.parse_args()
-    cups = [(name, "upright", seed) for name in CUP_ARMS for seed in range(given.problems)]
-    counts = _counts(given.others)
-    further = [(name, kind, seed) for name in ARMS for kind in KINDS for seed in range(counts[name])]
-    with Parts(given.out, given.jobs) as parts:
-        outcomes = dict(zip(cups + further, parts(measured, cups + further), strict=True))
-        ends = [(*which, seed) for which in BRANCHES for seed in range(given.branches)]
-        seen = dict(zip(ends, parts(branches, ends), strict=True))
-        sets = list(dict.fromkeys((name, kind) for name, kind, _ in cups + further))
-        asked = [(given.python, *which, seed) for which in sets for seed in range(given.peers)]
-        twos = [(name, number) for name in TIPS for number in range(given.pairs)]
-        found = dict(zip(twos, parts(pair, twos), strict=True))
-        theirs = dict(zip(asked, parts(others, asked), strict=True))
-    report = Report("Path constraints", "python bench/constraints/report.py", processes(given.jobs))
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    problems: Annotated[int, Option(help="With a cup, of each of two robots.")] = 100,
+    further: Annotated[
+        list[str] | None,
+        Option(
+            "--others", help="Of each other constraint: a number, or ARM=NUMBER; may be repeated.", show_default="100"
+        ),
+    ] = None,
+    branched: Annotated[int, Option("--branches", help="Goals of any branch, of each of four sets.")] = 30,
+    pairs: Annotated[int, Option(help="Scenes of each robot with two arms.")] = 20,
+    peers: Annotated[int, Option(help="Problems of each set for OMPL and roboplan too.")] = 0,
+    python: Roboplan = sys.executable,
+) -> Report:
+    """Measure."""
+    counts = _counts(further or ["100"])
+    cups = [(name, "upright", seed) for name in CUP_ARMS for seed in range(problems)]
+    rest = [(name, kind, seed) for name in ARMS for kind in KINDS for seed in range(counts[name])]
+    ends = [(*which, seed) for which in BRANCHES for seed in range(branched)]
+    sets = list(dict.fromkeys((name, kind) for name, kind, _ in cups + rest))
+    asked = [(python, *which, seed) for which in sets for seed in range(peers)]
+    twos = [(name, number) for name in TIPS for number in range(pairs)]
+    outcomes = dict(zip(cups + rest, parts(measured, cups + rest), strict=True))
+    seen = dict(zip(ends, parts(branches, ends), strict=True))
+    found = dict(zip(twos, parts(pair, twos), strict=True))
+    theirs = dict(zip(asked, parts(others, asked), strict=True))
+
+    report = run.report("Path constraints")
     report.intro = (
         "Generated problems: an arm among 5 to 20 boxes, balls and cylinders, a start and a goal that keep the "
         "constraint. Times are processor time of whole calls of `plan()`, with the second check, in a world that has "
@@ -140,7 +143,7 @@ def main() -> None:
         "coal alone, at every second of them."
     )
     for name in CUP_ARMS:
-        some = [outcomes[name, "upright", seed] for seed in range(given.problems)]
+        some = [outcomes[name, "upright", seed] for seed in range(problems)]
         _bars(report, f"{name}, cup upright within 5 degrees", some)
         tilt = max(each.tilt for each in some)
         report.bar(
@@ -163,9 +166,7 @@ def main() -> None:
     report.bar("start and goal apart: said", ">= 90 % within 1 s", text, share >= 0.9 and slowest <= LIMIT)
     contacts = sum(each.contacts for each in outcomes.values())
     report.bar("contacts that the judge saw", "0", str(contacts), contacts == 0)
-    table = [
-        row(name, "upright", [outcomes[name, "upright", seed] for seed in range(given.problems)]) for name in CUP_ARMS
-    ]
+    table = [row(name, "upright", [outcomes[name, "upright", seed] for seed in range(problems)]) for name in CUP_ARMS]
     table += [
         row(name, kind, [outcomes[name, kind, seed] for seed in range(counts[name])]) for name in ARMS for kind in KINDS
     ]
@@ -180,15 +181,15 @@ def main() -> None:
     heads = ["robot", "constraint", "all", "connected without obstacles", "proven apart", "neither"]
     lines = []
     for name, kind in BRANCHES:
-        some = [seen[name, kind, seed] for seed in range(given.branches)]
+        some = [seen[name, kind, seed] for seed in range(branched)]
         joined, apart = sum(each.joined for each in some), sum(each.apart for each in some)
         lines.append([name, kind, str(len(some)), str(joined), str(apart), str(len(some) - joined - apart)])
     text = f"Goals of any branch of inverse kinematics, without obstacles; {EXPLORED} samples for what is connected."
     report.table("Start and goal apart", heads, lines, text=text)
-    _pairs(report, {name: [found[name, k] for k in range(given.pairs)] for name in TIPS})
+    _pairs(report, {name: [found[name, k] for k in range(pairs)] for name in TIPS})
     if theirs:
-        _peers(report, given, sets, outcomes, theirs)
-    raise SystemExit(report.finish(given.out))
+        _peers(report, python, peers, sets, outcomes, theirs)
+    return report
 
 
 def _pairs(report: Report, outcomes: dict[str, list[Pair]]) -> None:
@@ -221,21 +222,21 @@ def _counts(words: list[str]) -> dict[str, int]:
     return counts
 
 
-def _peers(report: Report, given: argparse.Namespace, sets: list[Set], outcomes: Outcomes, theirs: Theirs) -> None:
+def _peers(report: Report, python: str, count: int, sets: list[Set], outcomes: Outcomes, theirs: Theirs) -> None:
     """The table of the libraries of others, on the first problems of each set."""
     rows = []
     for which in sets:
-        ours = [outcomes[(*which, seed)] for seed in range(given.peers)]
-        rows += beside(*which, ours, [theirs[(given.python, *which, seed)] for seed in range(given.peers)])
+        ours = [outcomes[(*which, seed)] for seed in range(count)]
+        rows += beside(*which, ours, [theirs[(python, *which, seed)] for seed in range(count)])
     heads = ["robot", "constraint", "who", "solved / solvable", "ms (median / 95 %)", *HEADS[-3:]]
     text = (
-        f"The first {given.peers} problems of each set, {LIMIT:g} s of processor time. OMPL: RRTConnect in a "
+        f"The first {count} problems of each set, {LIMIT:g} s of processor time. OMPL: RRTConnect in a "
         f"ProjectedStateSpace of step {DELTA:g}, motions checked by our world from Python. roboplan: its RRT-Connect "
         "with the same region as a PoseConstraint, its own checks of 32 a radian, no second check. Ours: `plan()` with "
         "proofs and second check, the quickest of 3 calls; theirs once. The judge is the same for all."
     )
     report.table("Beside others", heads, rows, text=text)
-    report.note("Versions", versions(given.python))
+    report.note("Versions", versions(python))
 
 
 def _bars(report: Report, what: str, outcomes: list[Outcome]) -> None:
@@ -250,7 +251,3 @@ def _bars(report: Report, what: str, outcomes: list[Outcome]) -> None:
         f"{what}: solved in {LIMIT:g} s", ">= 99 % of the solvable", f"{len(found)} of {solvable}", share >= 0.99
     )
     report.bar(f"{what}: median", "<= 5 ms", f"{median:.2f} ms", median <= 5.0)
-
-
-if __name__ == "__main__":
-    main()

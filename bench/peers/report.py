@@ -1,35 +1,31 @@
 """Libraries of others on the same problems: planning and inverse kinematics, all in one run, in turns.
 
-    python bench/peers/report.py [FOLDER] [--problems N] [--seeds N] [--seconds S] [--python NAME=INTERPRETER ...]
-                                 [--poses N] [--budget S] [--out FILE]
-
-FOLDER is the unpacked MotionBenchMaker set of the Panda (``panda.urdf``, ``panda.srdf``, ``problems/``). A peer that
-cannot live with our versions of numpy and Pinocchio is given an interpreter of its own, for instance
+A peer that cannot live with our versions of numpy and Pinocchio is given an interpreter of its own, for instance
 ``--python mplib=venv_mplib/bin/python``. A peer that is absent is a row that says why.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 import rrtik_ompl as rrtik
-from bench.ik.comparison import ARMS, METRES, RADIANS, single
-from bench.ik.comparison import HEAD as IK_HEAD
+from bench.ik.ik_comparison import ARMS, METRES, RADIANS, single
+from bench.ik.ik_comparison import HEAD as IK_HEAD
 from bench.peers.description import task_of
 from bench.peers.host import Answer, Host, answered
 from bench.peers.serve import timed
 from bench.peers.task import PER_RADIAN, RANGE, Rows
-from bench.shared.pages import add_out
 from bench.shared.problems import goal_joints
+from bench.shared.run import PandaSetOrNone, Pythons, Run
 from bench.speed.cases import Options, exact_problem, family, panda_files
 from bench.speed.machine import machine
 from bench.speed.ours import our_search, warm_up
@@ -37,6 +33,7 @@ from rrtik_bench.report.machine import package_version
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, Problem
 from rrtik_ompl.base.arrays import TAU
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.planning.generated_problems import generated_problem
 
 OURS, OWN_RULE = "rrtik_ompl, fastrrtconnect", "the same by its own, denser rule"
@@ -104,52 +101,49 @@ def joins(problem: Problem, rows: Rows) -> bool:
     return bool(np.allclose(off, turns, atol=1e-6))
 
 
-def problems(options: argparse.Namespace) -> Iterator[tuple[str, Problem]]:
+def problems(folder: Path | None, count: int) -> Iterator[tuple[str, Problem]]:
     """Problems with the groups in which they are reported."""
     for name in SHIPPED:
         yield name, rrtik.load_problem(name)
     for robot, kind in GENERATED:
-        for seed in range(options.problems):
+        for seed in range(count):
             yield f"{robot}, {kind}", generated_problem(rrtik.load_robot(robot), kind, seed)
-    case = Options(options.folder, options.problems, options.problems, 1, False, 0)
-    for file in panda_files(case, options.problems):
+    case = Options(folder, count, count, 1, False, 0)
+    for file in panda_files(case, count):
         yield f"panda, {family(file)}", exact_problem(case, file)
 
 
-def planning(options: argparse.Namespace, report: Report) -> None:
+def planning(
+    report: Report, cases: Iterable[tuple[str, Problem]], seeds: int, seconds: float, pythons: Mapping[str, str]
+) -> None:
     """Everybody on every problem, in turns."""
-    interpreters = dict(options.python)
     with ExitStack() as stack:
         hosts = {
-            name: stack.enter_context(Host(module, interpreters.get(module.split()[0], sys.executable)))
+            name: stack.enter_context(Host(module, pythons.get(module.split()[0], sys.executable)))
             for name, module in PEERS.items()
         }
         runs = {name: Runs() for name in (OURS, OWN_RULE, *(name for name, host in hosts.items() if not host.absent))}
-        for group, problem in problems(options):
+        for group, problem in cases:
             print(f"{problem.name} ...", file=sys.stderr, flush=True)
             warm_up(problem)
             with TemporaryDirectory() as folder:
-                task = task_of(problem, Path(folder), options.seconds)
+                task = task_of(problem, Path(folder), seconds)
                 ours = {
                     OURS: our_search(problem, seconds=task.seconds, per_radian=PER_RADIAN),
                     OWN_RULE: our_search(problem, seconds=task.seconds),
                 }
-                for seed in range(1, options.seeds + 1):
+                for seed in range(1, seeds + 1):
                     for name, done in runs.items():
                         answer = answered(timed(ours[name], seed)) if name in ours else hosts[name].ask(task, seed)
                         done.add(group, problem, answer)
-    _planning_tables(options, report, hosts, runs)
+    _planning_tables(report, hosts, runs)
 
 
-def _planning_tables(
-    options: argparse.Namespace, report: Report, hosts: dict[str, Host], runs: dict[str, Runs]
-) -> None:
+def _planning_tables(report: Report, hosts: dict[str, Host], runs: dict[str, Runs]) -> None:
     ours = runs[OURS]
     absent = [[name, *[""] * 8, f"absent: {host.absent}"] for name, host in hosts.items() if host.absent]
     rows = [[*done.row(name, ours), hosts[name].versions if name in hosts else ""] for name, done in runs.items()]
     report.table("Planning", HEAD, rows + absent)
-    how = HOW.format(range=RANGE, density=PER_RADIAN, seeds=options.seeds, seconds=options.seconds)
-    report.note("How it was measured", how if options.folder else f"{how} {NO_FOLDER}")
     groups = list(dict.fromkeys(ours.group))
     cells = []
     for group in groups:
@@ -162,13 +156,13 @@ def _planning_tables(
         report.table("Runs that broke", ["", "runs", "why"], failed)
 
 
-def inverse_kinematics(options: argparse.Namespace, report: Report) -> None:
+def inverse_kinematics(report: Report, count: int, budget: float) -> None:
     """Everybody on the same poses of several arms."""
     rows, missing = [], []
     for name in ARMS:
         robot = rrtik.load_robot(name)
-        poses = robot.fk_batch(np.random.default_rng(2).uniform(*robot.finite_range(), (options.poses, robot.dof)))
-        runs, absent = single(robot, poses, options.budget, methods=("auto",))
+        poses = robot.fk_batch(np.random.default_rng(2).uniform(*robot.finite_range(), (count, robot.dof)))
+        runs, absent = single(robot, poses, budget, methods=("auto",))
         missing += absent
         rows += [[name, *done.row(f"rrtik_ompl, {each}" if each == "auto" else each)] for each, done in runs.items()]
     report.table("Inverse kinematics", ["arm", *IK_HEAD], rows)
@@ -178,41 +172,39 @@ def inverse_kinematics(options: argparse.Namespace, report: Report) -> None:
         report.note("Not asked", "\n".join(f"- {line}" for line in missing))
 
 
-def interpreter(text: str) -> tuple[str, str]:
-    """A peer's module and its interpreter."""
-    name, equals, path = text.partition("=")
+def interpreters(words: Iterable[str]) -> dict[str, str]:
+    """The interpreters of peers that have one of their own, from words such as ``mplib=venv/bin/python``.
+
+    Raises:
+        InputError: If a word is no such pair, or names no peer.
+    """
     known = sorted({module.split()[0] for module in PEERS.values()})
-    if not equals or name not in known:
-        raise argparse.ArgumentTypeError(f"found '{text}', expected NAME=INTERPRETER, NAME being {', '.join(known)}")
-    return name, path
+    found = {}
+    for word in words:
+        name, equals, path = word.partition("=")
+        if not equals or name not in known:
+            raise InputError(f"--python {word}: expected NAME=INTERPRETER, NAME being {', '.join(known)}")
+        found[name] = path
+    return found
 
 
-def add_interpreters(parser: argparse.ArgumentParser) -> None:
-    """Add ``--python``, which may be repeated."""
-    named: dict[str, Any] = {"type": interpreter, "metavar": "NAME=INTERPRETER", "help": "of one peer; may be repeated"}
-    parser.add_argument("--python", action="append", default=[], **named)
-
-
-def main() -> None:
-    """Measure, print the page and write it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, nargs="?", help="the unpacked Panda set, for instance mbm_panda")
-    parser.add_argument("--problems", type=int, default=3, help="of each family")
-    parser.add_argument("--seeds", type=int, default=3, help="runs of each candidate on each problem")
-    parser.add_argument("--seconds", type=float, default=10.0, help="for each run")
-    add_interpreters(parser)
-    parser.add_argument("--poses", type=int, default=500)
-    parser.add_argument("--budget", type=float, default=1.0, help="seconds for our method, seven times as many a peer")
-    add_out(parser, "peers.md")
-    options = parser.parse_args()
-    report = Report(
-        "Beside the libraries of others", "python bench/peers/report.py FOLDER", "a process for each planner"
-    )
+def main(
+    run: Run,
+    folder: PandaSetOrNone = None,
+    *,
+    count: Annotated[int, Option("--problems", help="Of each family.")] = 3,
+    seeds: Annotated[int, Option(help="Runs of each candidate on each problem.")] = 3,
+    seconds: Annotated[float, Option(help="For each run.")] = 10.0,
+    python: Pythons = None,
+    poses: int = 500,
+    budget: Annotated[float, Option(help="Seconds for our method, seven times as many a peer.")] = 1.0,
+) -> Report:
+    """Measure."""
+    pythons = interpreters(python or ())
+    report = run.report("Beside the libraries of others", "a process for each planner")
     report.note("Machine", machine())
-    planning(options, report)
-    inverse_kinematics(options, report)
-    report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+    how = HOW.format(range=RANGE, density=PER_RADIAN, seeds=seeds, seconds=seconds)
+    report.note("How planning was measured", how if folder else f"{how} {NO_FOLDER}")
+    planning(report, problems(folder, count), seeds, seconds, pythons)
+    inverse_kinematics(report, poses, budget)
+    return report

@@ -1,36 +1,33 @@
 """The standing comparison: planners that pip installs on generated families and on MotionBenchMaker's problems.
 
-    python bench/peers/standing.py [FOLDER] [--problems N] [--seeds N] [--seconds S] [--python NAME=INTERPRETER ...]
-                                   [--pages FOLDER] [--out FILE]
-
-FOLDER holds the unpacked sets mbm_panda and mbm_ur5. Each path, ours and theirs, is judged three times: its ends, our
-dense second check, and a certificate that a second program verifies. ``--pages`` writes a page of each group that can
-be turned. What is done is kept beside the page: the same command goes on from there.
+Each path, ours and theirs, is judged three times: its ends, our dense second check, and a certificate that a second
+program verifies. What is done is kept beside the page: the same command goes on from there.
 """
 
 from __future__ import annotations
 
-import argparse
 import atexit
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.peers.description import NoTask, task_of
 from bench.peers.host import Host
-from bench.peers.report import PEERS, add_interpreters, interpreter, joins
-from bench.shared.parts import Parts, add_options
+from bench.peers.report import PEERS, interpreters, joins
+from bench.shared.parts import Parts
+from bench.shared.run import Pythons, Run, SetsOrNone
 from bench.speed.machine import machine
-from bench.whole_calls.search import scene_files
+from bench.whole_calls.report import scene_files
 from bench.whole_calls.search_calls import problem_of, spent
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, Problem
@@ -99,8 +96,10 @@ def compared(
     arm: str, family: str, number: int, file: str, seeds: int, seconds: float, pythons: str, pages: str
 ) -> list[Outcome]:
     """Everybody on one problem, in turns."""
-    interpreters, group = dict(interpreter(word) for word in pythons.split()), f"{arm}, {family}"
-    problem, outcomes = _problem(arm, family, number, file), []
+    own = interpreters(pythons.split())
+    group = f"{arm}, {family}"
+    problem = _problem(arm, family, number, file)
+    outcomes = []
     call = partial(rrtik.plan, problem, PLANNER, seconds=seconds)
     call(seed=0)  # what a world keeps is made
     paths: dict[str, JointPath] = {}
@@ -114,7 +113,7 @@ def compared(
             taken, plan = spent(partial(call, seed=seed))
             found = {OURS: (None if plan.path is None else plan.path.waypoints, taken, "")}
             for name, module in PEERS.items():
-                host = _host(module, interpreters.get(module.split()[0], sys.executable))
+                host = _host(module, own.get(module.split()[0], sys.executable))
                 if not host.absent:
                     answer = host.ask(task, seed)
                     found[name] = (answer.rows, answer.cpu, answer.failed)
@@ -134,26 +133,22 @@ def _show(folder: Path, group: str, problem: Problem, paths: dict[str, JointPath
         rrtik.view(problem, path, html=file, title=f"{group}: {name}", still=True)
 
 
-def parts(options: argparse.Namespace) -> list[tuple[Any, ...]]:
+def comparisons(folder: Path | None, count: int, *rest: Any) -> list[tuple[Any, ...]]:
     """What `compared` is called with."""
-    rest = options.seeds, options.seconds, " ".join("=".join(pair) for pair in options.python), str(options.pages or "")
     found: list[tuple[Any, ...]] = [
-        (arm, family, number, "", *rest)
-        for arm in GENERATED
-        for family in FAMILIES
-        for number in range(options.problems)
+        (arm, family, number, "", *rest) for arm in GENERATED for family in FAMILIES for number in range(count)
     ]
-    for arm in SETS if options.folder else ():
-        files = scene_files(options.folder, arm, options.problems)
+    if folder is None:
+        return found
+    for arm in SETS:
+        files = scene_files(folder, arm, count)
         for family, members in groupby(files, lambda file: Path(file).parent.name.rsplit("_", 1)[0]):
             found += [(arm, f"MotionBenchMaker {family}", k, file, *rest) for k, file in enumerate(members)]
     return found
 
 
-def page(outcomes: Sequence[Outcome], options: argparse.Namespace) -> Report:
+def fill(report: Report, outcomes: Sequence[Outcome], pythons: Mapping[str, str]) -> None:
     """All of them, then group by group."""
-    command = "python bench/peers/standing.py FOLDER --python NAME=INTERPRETER"
-    report = Report("The standing comparison", command, "a process for each planner")
     names = list(dict.fromkeys(each.planner for each in outcomes))
     ours = np.array([each.seconds for each in outcomes if each.planner == OURS])
     rows = []
@@ -188,39 +183,40 @@ def page(outcomes: Sequence[Outcome], options: argparse.Namespace) -> Report:
     if reasons:
         counted = [[*pair, str(sum((e.planner, e.failed) == pair for e in outcomes))] for pair in reasons]
         report.table("Runs that broke", ["", "why", "runs"], counted)
-    interpreters = dict(options.python)
-    hosts = {name: _host(module, interpreters.get(module.split()[0], sys.executable)) for name, module in PEERS.items()}
+    hosts = {name: _host(module, pythons.get(module.split()[0], sys.executable)) for name, module in PEERS.items()}
     who = [(name, f"absent: {host.absent}" if host.absent else host.versions) for name, host in hosts.items()]
     report.table("Who", ["", "versions"], who)
-    report.note("How it was measured", f"{HOW.format(options=options)}\n\n{machine()}")
-    return report
 
 
 HOW = f"""Ours is a whole `plan()` by `{PLANNER}` in a world that has planned before, the proofs of all motions
 included; the others' is their search alone, 32 checks per radian (MPlib: 1 % of the space's extent), first path, no
-shortening. The same files for all: the arm's own solids, limits and pairs. {{options.seeds}} seeds on each of
-{{options.problems}} problems of a family, at most {{options.seconds:g}} s each, in turns; processor time of the
+shortening. The same files for all: the arm's own solids, limits and pairs. {{seeds}} seeds on each of
+{{problems}} problems of a family, at most {{seconds:g}} s each, in turns; processor time of the
 process. A run without a path counts with the time that it took. Dense check: steps in which no point of the arm moves
 more than half of the world's `motion_resolution`. Certificate: written by the log of our proof kernels and verified by
 the program of `rrtik_ompl/certificates`, which shares nothing with them."""
 
 
-def main() -> int:
-    """Measure, print the page and write it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, nargs="?", help="holds mbm_panda and mbm_ur5")
-    parser.add_argument("--problems", type=int, default=3, help="of each family")
-    parser.add_argument("--seeds", type=int, default=2, help="runs of each planner on each problem")
-    parser.add_argument("--seconds", type=float, default=5.0, help="for each run")
-    add_interpreters(parser)
-    parser.add_argument("--pages", type=Path, help="a folder for pages that can be turned, one a group and planner")
-    add_options(parser, "standing.md")
-    options = parser.parse_args()
+def main(
+    run: Run,
+    parts: Parts,
+    folder: SetsOrNone = None,
+    *,
+    problems: Annotated[int, Option(help="Of each family.")] = 3,
+    seeds: Annotated[int, Option(help="Runs of each planner on each problem.")] = 2,
+    seconds: Annotated[float, Option(help="For each run.")] = 5.0,
+    python: Pythons = None,
+    pages: Annotated[
+        Path | None, Option(help="A folder for pages that can be turned, one a group and planner.")
+    ] = None,
+) -> Report:
+    """Measure."""
     warnings.simplefilter("ignore")
-    with Parts(options.out, options.jobs) as run:
-        report = page([each for some in run(compared, parts(options)) for each in some], options)
-        return report.finish(options.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    pythons = interpreters(python or ())
+    asked = comparisons(folder, problems, seeds, seconds, " ".join(python or ()), str(pages or ""))
+    outcomes = [each for some in parts(compared, asked) for each in some]
+    report = run.report("The standing comparison", "a process for each planner")
+    fill(report, outcomes, pythons)
+    how = HOW.format(problems=problems, seeds=seeds, seconds=seconds)
+    report.note("How it was measured", f"{how}\n\n{machine()}")
+    return report

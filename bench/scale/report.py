@@ -1,24 +1,22 @@
 """Large scenes: thousands of boxes, clouds of points, many queries by threads, clusters.
 
-Usage: ``python -m bench.scale.report FOLDER [--boxes 1 10 100 1000 10000] [--problems 50] [--runs 200]``
-
-FOLDER has the Panda's problems of MotionBenchMaker, as for `bench/whole_calls/search.py`. One process; what is done is
-kept beside the page until that is written.
+What is done is kept beside the page until that is written.
 """
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 from bench.scale.boxes import Among, among_boxes, among_panels
 from bench.scale.clouds import RADIUS, Seen, files_of, memory_of, seen_as_points
 from bench.scale.cluster import TASKS, Measured, on_workers, simulated
 from bench.scale.replans import POINTS, RATE, Walk, walks
 from bench.scale.threads import Spread, plans_in_threads, poses_in_threads
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
+from bench.shared.run import PandaSet, Run
 from bench.speed.machine import machine
 from rrtik_bench.report.page import Report
 
@@ -160,42 +158,42 @@ def cluster(report: Report, found: list[Measured]) -> None:
     report.table("A thousand workers, by simulation", heads, rows, text=text)
 
 
-def main() -> None:
-    """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--boxes", type=int, nargs="+", default=[1, 10, 100, 1000, 10_000])
-    parser.add_argument("--problems", type=int, default=50)
-    parser.add_argument("--large", type=int, default=10, help="problems with a million points")
-    parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--queries", type=int, default=1000)
-    add_options(parser, "scale.md")
-    given = parser.parse_args()
-    report = Report("Large scenes", "python -m bench.scale.report FOLDER")
-    folder = str(given.folder)
-    with Parts(given.out, given.jobs) as parts:
-        among = parts(among_boxes, [[n] for n in given.boxes])
-        inside = parts(among_panels, [[n] for n in given.boxes])
-        files = files_of(given.folder, given.problems)
-        seen = parts(seen_as_points, [[file, folder, MANY, True] for file in files])
-        large = parts(seen_as_points, [[file, folder, MOST, False] for file in files[: given.large]])
-        memory = parts(memory_of, [[MOST]])[0]
-        plans, poses = parts(plans_in_threads, [[folder, given.queries]])[0], parts(poses_in_threads, [[100_000]])[0]
-        spread = parts(on_workers, [[n] for n in (1, 2, 4)])
-        starts = [[first, AT_ONCE] for first in range(0, given.runs, AT_ONCE)]
-        walked = [walk for part in parts(walks, starts) for walk in part]
-        report.note("Machine", machine())
-        boxes(report, "A UR5 in a room of panels", inside, ROOM_TEXT)
-        boxes(report, "A UR5 among boxes drawn around it", among, DRAWN_TEXT)
-        single_boxes(report, among)
-        clouds(report, MANY, seen, (25.0, 2.0, 3.0))
-        clouds(report, MOST, large, (300.0, 0.0, 6.0))
-        report.bar("memory of a cloud of 1,000,000 points", "<= 150 MB", f"{memory:.0f} MB", memory <= 150.0)
-        threads(report, plans, poses)
-        replanning(report, walked)
-        cluster(report, spread)
-        report.finish(given.out)
+def main(
+    run: Run,
+    parts: Parts,
+    panda: PandaSet,
+    *,
+    boxed: Annotated[
+        list[int] | None, Option("--boxes", help="How many; may be repeated.", show_default="1 to 10,000")
+    ] = None,
+    problems: int = 50,
+    few: Annotated[int, Option("--large", help="Problems with a million points.")] = 10,
+    runs: int = 200,
+    queries: int = 1000,
+) -> Report:
+    """Measure."""
+    counts = boxed or [1, 10, 100, 1000, 10_000]
+    folder = str(panda)
+    files = files_of(panda, problems)
+    among = parts(among_boxes, [[n] for n in counts])
+    inside = parts(among_panels, [[n] for n in counts])
+    seen = parts(seen_as_points, [[file, folder, MANY, True] for file in files])
+    large = parts(seen_as_points, [[file, folder, MOST, False] for file in files[:few]])
+    (memory,) = parts(memory_of, [[MOST]])
+    (plans,) = parts(plans_in_threads, [[folder, queries]])
+    (poses,) = parts(poses_in_threads, [[100_000]])
+    spread = parts(on_workers, [[n] for n in (1, 2, 4)])
+    walked = [walk for part in parts(walks, [[first, AT_ONCE] for first in range(0, runs, AT_ONCE)]) for walk in part]
 
-
-if __name__ == "__main__":
-    main()
+    report = run.report("Large scenes")
+    report.note("Machine", machine())
+    boxes(report, "A UR5 in a room of panels", inside, ROOM_TEXT)
+    boxes(report, "A UR5 among boxes drawn around it", among, DRAWN_TEXT)
+    single_boxes(report, among)
+    clouds(report, MANY, seen, (25.0, 2.0, 3.0))
+    clouds(report, MOST, large, (300.0, 0.0, 6.0))
+    report.bar("memory of a cloud of 1,000,000 points", "<= 150 MB", f"{memory:.0f} MB", memory <= 150.0)
+    threads(report, plans, poses)
+    replanning(report, walked)
+    cluster(report, spread)
+    return report

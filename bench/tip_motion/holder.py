@@ -1,11 +1,10 @@
-"""Measure a TITAN 4 that draws a tool out of a tight holder: proven but for the pair that may touch.
+"""A TITAN 4 that draws a tool out of a tight holder: proven but for the pair that may touch.
 
-Usage: ``python bench/tip_motion/holder.py [--scenes 100] [--jobs 1] [--out FILE]``; an interrupted run goes on.
+An interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections import Counter
 from dataclasses import dataclass
@@ -16,7 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from bench.tip_motion.judge import Judge
 from rrtik_bench.report.machine import processes, processor
 from rrtik_bench.report.page import Report
@@ -122,33 +122,23 @@ def _kind(reason: str) -> str:
     return f"{stage}: {next((text for words, text in kinds.items() if words in why), why)}"
 
 
-def main() -> None:
-    """Run everything and write the page."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--scenes", type=int, default=100)
-    add_options(parser, "holder.md")
-    options = parser.parse_args()
-    report = Report(
-        "A tool out of a tight holder", "python bench/tip_motion/holder.py", f"{processes(options.jobs)}, {processor()}"
-    )
-    report.intro = INTRO
-    with Parts(options.out, options.jobs) as measure:
-        own: list[Drawn] = measure(drawn_out, [(k,) for k in range(options.scenes)])
+def main(run: Run, parts: Parts, *, scenes: int = 100) -> Report:
+    """Measure."""
+    report = run.report("A tool out of a tight holder", f"{processes(run.jobs)}, {processor()}", INTRO)
+    own: list[Drawn] = parts(drawn_out, [(k,) for k in range(scenes)])
     found = [each for each in own if each.found]
-    motions, proven = sum(each.motions for each in found), sum(each.proven for each in found)
-    faults, room = sum(each.faults for each in found), min((each.room for each in found), default=np.inf)
+    motions = sum(each.motions for each in found)
+    proven = sum(each.proven for each in found)
+    faults = sum(each.faults for each in found)
+    room = min((each.room for each in found), default=np.inf)
     times = 1e3 * np.array([each.seconds for each in found])
     wanted = "all but for the allowed pair"
     report.bar("titan4: motions proven free", wanted, f"{proven} of {motions}", proven == motions)
     report.bar("titan4: motions with a fault, by the judge", "0", f"{faults} of {motions}", faults == 0)
     report.bar("titan4: tool and holder while it is drawn out", "> 0 mm apart", f"{1e3 * room:.3f} mm", room > 0.0)
-    spread = f"{np.median(times):.0f} / {np.quantile(times, 0.95):.0f} / {times.max():.0f}"
+    spread = f"{np.median(times):.0f} / {np.quantile(times, 0.95):.0f} / {times.max():.0f}" if found else "-"
     report.table("Plans", ["found", "ms, median / 95 % / worst"], [[f"{len(found)} of {len(own)}", spread]])
     reasons = Counter(_kind(each.reason) for each in own if not each.found)
     if reasons:
         report.table("Not found", ["reason", "scenes"], [[why, str(count)] for why, count in reasons.most_common()])
-    raise SystemExit(report.finish(options.out))
-
-
-if __name__ == "__main__":
-    main()
+    return report

@@ -1,18 +1,18 @@
-"""Measure straight lines of the tip and tasks.
-
-Usage: ``python bench/tip_motion/report.py [--lines 1000] [--brute 200] [--scenes 50] [--jobs 1] [--out FILE]``
+"""Straight lines of the tip, and tasks.
 
 An interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from bench.tip_motion.lines import Line, line_of
 from bench.tip_motion.tasks import CASES, Done, carried
 from rrtik_bench.report.machine import processes, processor
@@ -84,21 +84,16 @@ def tasks(report: Report, measure: Parts, scenes: int) -> None:
     report.table("Pick and place", ["arm", "found", "ms, median / 95 % / worst", "motions proven"], rows, text=TASKS)
 
 
-def main() -> None:
-    """Run everything and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--lines", type=int, default=1000, help="of each arm")
-    parser.add_argument("--brute", type=int, default=200, help="of these, that the judge follows too")
-    parser.add_argument("--scenes", type=int, default=50, help="of each arm")
-    add_options(parser, "tip_motion.md")
-    options = parser.parse_args()
-    where = f"{processes(options.jobs)}, {processor()}"
-    report = Report("Straight lines of the tip, and tasks", "python bench/tip_motion/report.py", where)
-    with Parts(options.out, options.jobs) as measure:
-        lines(report, measure, options.lines, options.brute)
-        tasks(report, measure, options.scenes)
-        report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    followed: Annotated[int, Option("--lines", help="Of each arm.")] = 1000,
+    brute: Annotated[int, Option(help="Of these, that the judge follows too.")] = 200,
+    scenes: Annotated[int, Option(help="Of each arm.")] = 50,
+) -> Report:
+    """Measure."""
+    report = run.report("Straight lines of the tip, and tasks", f"{processes(run.jobs)}, {processor()}")
+    lines(report, parts, followed, brute)
+    tasks(report, parts, scenes)
+    return report

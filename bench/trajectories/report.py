@@ -1,21 +1,20 @@
 """Timed motions: limits, chatter, durations beside toppra and ruckig, torques, blends, the steered tip.
 
-Usage: ``python bench/trajectories/report.py FOLDER [--per-family 29]``. FOLDER holds the unpacked MotionBenchMaker sets
-``mbm_panda`` and ``mbm_ur5`` (see bench/README.md). toppra and ruckig, which judge, come with the extra ``test``.
+toppra and ruckig, which judge, come with the extra ``test``.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
 import warnings
 from collections.abc import Callable
-from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
+from bench.shared.run import Run, Sets
 from bench.trajectories import judges
 from bench.trajectories.cases import ARMS, planned_files
 from bench.trajectories.motions import BLEND, OF_A_PART, Paths, measured_lines, measured_moves, measured_planned
@@ -30,33 +29,37 @@ from rrtik_ompl.world.path import JointPath
 ROUNDS = 25  # of a measurement of time; the least counts
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--per-family", type=int, default=29, help="planned paths of each family of each arm")
-    parser.add_argument("--others", type=int, default=300, help="lines of the tip, and as many single-joint moves")
-    add_options(parser, "trajectories.md")
-    given = parser.parse_args()
+def main(
+    run: Run,
+    parts: Parts,
+    folder: Sets,
+    *,
+    per_family: Annotated[int, Option(help="Planned paths of each family of each arm.")] = 29,
+    others: Annotated[int, Option(help="Lines of the tip, and as many single-joint moves.")] = 300,
+) -> Report:
+    """Measure."""
     warnings.simplefilter("ignore")
-    report = Report("Timed motions", "python bench/trajectories/report.py FOLDER")
+    report = run.report("Timed motions")
     report.intro = (
         f"Times are processor times, the least of {ROUNDS}; {versions('numpy', 'toppra', 'ruckig')}. The Panda has its "
         "published limits. The UR5 has the velocities of its URDF, full speed after 0.5 s, and 10 times the "
         f"acceleration a second as jerk. Blend {BLEND} rad, all motions proven free in their worlds."
     )
-    files = planned_files(given.folder, given.per_family)
-    others = [(arm, part) for part in range(given.others // OF_A_PART // len(ARMS)) for arm in ARMS]
-    with Parts(given.out, given.jobs) as parts:
-        routes = parts(measured_planned, files)
-        further = [*parts(measured_lines, others), *parts(measured_moves, others)]
-        kept(report, [*routes, *further])
-        blends(report, [*routes, *further])
-        judges.by_toppra(report, parts, files)
-        judges.by_ruckig(report, parts)
-        judges.by_inverse_dynamics(report, parts)
-        judges.steered(report, parts)
-        times(report)
-    return report.finish(given.out)
+    files = planned_files(folder, per_family)
+    further = [(arm, part) for part in range(others // OF_A_PART // len(ARMS)) for arm in ARMS]
+    found = [
+        *parts(measured_planned, files),
+        *parts(measured_lines, further),
+        *parts(measured_moves, further),
+    ]
+    kept(report, found)
+    blends(report, found)
+    judges.by_toppra(report, parts, files)
+    judges.by_ruckig(report, parts)
+    judges.by_inverse_dynamics(report, parts)
+    judges.steered(report, parts)
+    times(report)
+    return report
 
 
 def kept(report: Report, paths: list[Paths]) -> None:
@@ -128,7 +131,3 @@ def least(work: Callable[[], object]) -> float:
         work()
         spent.append(time.process_time() - begin)
     return min(spent)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,23 +1,24 @@
 """The shortest known paths of the MotionBenchMaker problems, `bench/data/mbm_best.csv`: searched anew and shortened.
 
-    python bench/whole_calls/best_known.py FOLDER --seconds 20
-
-FOLDER holds mbm_panda and mbm_ur5. A path is planned from another seed and shortened, again and again, for so many
-seconds of processor time a problem; a length that is less than the one in the file takes its place. "The 70" of an arm
-are every fifth of the first 50 pairs of each family.
+A path is planned from another seed and shortened, again and again, for so many seconds of processor time a problem; a
+length that is less than the one in the file takes its place. "The 70" of an arm are every fifth of the first 50 pairs
+of each family. The file is written after each problem.
 """
 
 from __future__ import annotations
 
-import argparse
 import csv
 import sys
 import time
 import warnings
 from itertools import count
 from pathlib import Path
+from typing import Annotated
 
-from bench.whole_calls.search import scene_files
+from typer import Option
+
+from bench.shared.run import Sets
+from bench.whole_calls.report import scene_files
 from bench.whole_calls.search_calls import problem_of
 from rrtik_ompl import Problem, plan, shorten
 
@@ -57,24 +58,16 @@ def shortest(problem: Problem, seconds: float) -> float:
     return best
 
 
-def main() -> int:
-    """Search for shorter paths and write the file after each problem."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="holds mbm_panda and mbm_ur5")
-    parser.add_argument("--seconds", type=float, default=20.0, help="of processor time, each problem")
-    given = parser.parse_args()
+def main(folder: Sets, seconds: Annotated[float, Option(help="Of processor time, each problem.")] = 20.0) -> None:
+    """Search for shorter paths."""
     warnings.simplefilter("ignore")
-    known, files = best_lengths(), [f for arm in ("panda", "ur5") for f in the_70(given.folder, arm)]
+    known = best_lengths()
+    files = [file for arm in ("panda", "ur5") for file in the_70(folder, arm)]
     for number, file in enumerate(files, 1):
         problem = problem_of(file, balls=False)
         assert problem is not None
-        known[title(file)] = min(known.get(title(file), float("inf")), shortest(problem, given.seconds))
+        known[title(file)] = min(known.get(title(file), float("inf")), shortest(problem, seconds))
         with BEST.open("w", newline="") as lines:
             rows = csv.writer(lines, lineterminator="\n")
             rows.writerows([("problem", "length"), *((name, f"{known[name]:.6f}") for name in sorted(known))])
         print(f"{number} of {len(files)}: {title(file)} {known[title(file)]:.4f} rad", file=sys.stderr)
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

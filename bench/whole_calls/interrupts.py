@@ -1,14 +1,11 @@
 """How soon Ctrl-C ends what a user waits for: calls of the library, and commands.
 
-    python bench/whole_calls/interrupts.py
-
 Each is interrupted at random moments. What counts is the processor time from the signal to the exception, or to the end
 of the command: the wall's clock would count what else the machine does.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import signal
 import subprocess
@@ -23,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.shared.pages import add_out
+from bench.shared.run import Run
 from bench.speed.machine import machine
 from rrtik_bench.report.page import Report
 from rrtik_ompl import Roadmap, load_problem, plan, shorten
@@ -128,13 +125,10 @@ def _spent(process: int) -> float:
     return 1e-9 * sum(int(task.read_text().split()[0]) for task in tasks)
 
 
-def main() -> int:
-    """Interrupt, print the page and write it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    add_out(parser, "interrupts.md")
-    given = parser.parse_args()
+def main(run: Run) -> Report:
+    """Interrupt."""
     warnings.simplefilter("ignore")
-    report = Report("Interruptions", "python bench/whole_calls/interrupts.py")
+    report = run.report("Interruptions")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         closed = folder / "closed.yaml"
@@ -142,8 +136,4 @@ def main() -> int:
         of_calls(report, closed)
         of_commands(report, closed, folder)
     report.note("Where", machine())
-    return report.finish(given.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    return report

@@ -1,4 +1,4 @@
-"""One version's side of `bench/whole_calls/search.py`: measures what it is asked, a line of JSON for each question.
+"""One version's side of `bench/whole_calls/report.py`: measures what it is asked, a line of JSON for each question.
 
 Run as a script with the version to measure on ``PYTHONPATH``; it uses nothing of this folder.
 """
@@ -200,7 +200,7 @@ def plan_many(file: str) -> dict[str, Any]:
 ROWS = {each.__name__: each for each in (search_on_balls, plan_on_meshes, plan_shipped, plan_many)}
 
 
-def main() -> None:
+def answer_questions() -> None:
     """Answer questions until there are no more; what libraries print goes to the errors."""
     warnings.simplefilter("ignore")
     ou.setLogLevel(ou.LogLevel.LOG_NONE)
@@ -213,4 +213,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    answer_questions()

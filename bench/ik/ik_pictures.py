@@ -1,31 +1,26 @@
-"""Pictures of inverse kinematics: solutions as ghosts, MB-RRT's tree in space, maps of reach. Needs Chromium.
+"""Pictures of inverse kinematics: solutions as ghosts, a map of reach. Needs Chromium.
 
-    python bench/ik/pictures.py [--out bench/reports]
-
-Pages are drawn by a headless browser and made smaller with OpenCV; the slices by matplotlib.
+Pages are drawn by a headless browser and made smaller with OpenCV.
 """
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
+from typer import Option
 
 import rrtik_ompl as rrtik
-from bench.shared.pages import REPORTS
+from bench.shared.run import REPORTS
 from rrtik_ompl.base.poses import pose_from_rpy
-from rrtik_ompl.ik.mb_rrt.growth import grow
-from rrtik_ompl.ik.mb_rrt.links import Links
 from rrtik_ompl.ik.reach.sampling import reach_map
 from rrtik_ompl.viewer import view
 from rrtik_ompl.viewer.drawing.reach_marks import reach_marks
-from rrtik_ompl.viewer.drawing.tree_marks import tree_marks
-from rrtik_ompl.viewer.plots.reach import plot_slices
 from rrtik_ompl.viewer.subject import Shown
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -58,31 +53,16 @@ def ghosts(page: Path) -> None:
     view(Shown(robot, rrtik.Scene(), goal, found[0]), ghosts=found, html=page, title=title)
 
 
-def tree(page: Path) -> None:
-    """Four links of 10 cm in space, grown by the published rules."""
-    run = grow(Links([0.1] * 4, dimension=3), [0.2, 0.1, 0.2], tolerance=0.001, rng=np.random.default_rng(5))
-    view(rrtik.Scene(), marks=tree_marks(run), html=page, title=f"MB-RRT in space: {run.passes} passes to 1 mm")
-
-
 def reach(page: Path) -> None:
     robot = rrtik.load_robot("titan4", limits="envelope")
     found = reach_map(robot)
     view(robot, marks=reach_marks(found), html=page, title="titan4: share of directions in reach")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--out", type=Path, default=REPORTS)
-    folder = parser.parse_args().out
+def main(folder: Annotated[Path, Option(help="Of the pictures.")] = REPORTS) -> None:
+    """Draw both."""
     with tempfile.TemporaryDirectory() as drawn:
-        for name, draw in (("ik_ghosts", ghosts), ("mb_rrt_space", tree), ("reach_titan4", reach)):
+        for name, draw in (("ik_ghosts", ghosts), ("reach_titan4", reach)):
             page = Path(drawn) / f"{name}.html"
             draw(page)
             photograph(page, folder / f"{name}.png")
-    slices = reach_map(rrtik.load_robot("ur5_limited"), cell=0.05).slices()
-    title = "ur5: share of 64 directions in which the tip was seen to point"
-    plot_slices(slices, folder / "reach_ur5.png", title=title, label="orientations")
-
-
-if __name__ == "__main__":
-    main()

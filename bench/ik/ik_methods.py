@@ -1,18 +1,16 @@
 """Every method of `solve_ik` on the same reachable goals: how often, how fast, how near.
 
-Usage: ``python bench/ik/methods_report.py [--goals 15] [--seconds 2] [--out bench/reports/ik_methods.md]``; a few
-minutes.
+A few minutes.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
 
 import numpy as np
 
 import rrtik_ompl as rrtik
-from bench.shared.pages import add_out
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.solve import IkResult, list_ik_methods
@@ -67,19 +65,11 @@ def _figures(done: list[IkResult], times: list[float]) -> list[str]:
     ]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--goals", type=int, default=15)
-    parser.add_argument("--seconds", type=float, default=2.0)
-    add_out(parser, "ik_methods.md")
-    options = parser.parse_args()
-    report = Report("Methods of inverse kinematics side by side", "python bench/ik/methods_report.py")
+def main(run: Run, *, goals: int = 15, seconds: float = 2.0) -> Report:
+    """Measure."""
+    report = run.report("Methods of inverse kinematics side by side")
     for title, names, points in (("Poses, 1 mm and 0.01 rad", POSES, False), ("Points, 1 mm", POINTS, True)):
-        table = [row for name in names for row in rows(name, options.goals, options.seconds, points)]
-        text = f"{title}: {options.goals} reachable goals, at most {options.seconds:g} s each, processor time"
+        table = [row for name in names for row in rows(name, goals, seconds, points)]
+        text = f"{title}: {goals} reachable goals, at most {seconds:g} s each, processor time"
         report.table(text, HEAD, table)
-    report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+    return report

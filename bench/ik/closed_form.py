@@ -1,7 +1,5 @@
 """Closed-form inverse kinematics: 100,000 configurations of every arm, singular ones too, and its speed beside EAIK.
 
-    python bench/ik/closed_form_report.py [--quick] [--out bench/reports/closed_form.md]
-
 Round trip: forward kinematics of a random configuration inside the joint limits, all branches of that pose, forward
 kinematics of all of them. Only branches inside the limits count.
 Speed: process CPU time of one thread in batches of 10,000 poses, median of interleaved repeats. EAIK is optional
@@ -10,18 +8,18 @@ Speed: process CPU time of one thread in batches of 10,000 poses, median of inte
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from typer import Option
 
 from bench.peers.libraries.eaik import eaik_robot, turned_back
-from bench.shared.pages import add_out
+from bench.shared.run import Run
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
 from rrtik_ompl import load_robot
@@ -129,10 +127,11 @@ def agreement(robot: Robot, count: int, rng: np.random.Generator) -> str:
     return f"{count} poses: {missed} solutions of EAIK that we do not have, {extra} of ours that EAIK does not have"
 
 
-def report(quick: bool) -> Report:
+def main(run: Run, *, quick: Annotated[bool, Option(help="Fewer configurations.")] = False) -> Report:
+    """Measure."""
     rng = np.random.default_rng(0)
     about = f"{versions('numpy', 'eaik')}; seed 0."
-    page = Report("Closed-form inverse kinematics", "python bench/ik/closed_form_report.py", intro=about)
+    page = run.report("Closed-form inverse kinematics", intro=about)
     shown = ("robot", "case", "configurations", "solved", "exact", "same or flagged", "flagged", "asked near")
     rows = []
     for robot, case, Q in cases(5_000 if quick else COUNT, rng):
@@ -166,15 +165,3 @@ SPEED = (
     f"Poses per second of CPU time, one thread, batches of {BATCH}.\n\nOf arms with six joints kernels do the work; "
     "beside them the same in numpy, which arms without a kernel use."
 )
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer configurations")
-    add_out(parser, "closed_form.md")
-    options = parser.parse_args()
-    report(options.quick).finish(options.out)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,29 +1,29 @@
 """Searches and whole `plan()` calls on the MotionBenchMaker problems, this version beside an earlier one.
 
-    python bench/whole_calls/search.py FOLDER --old CHECKOUT
-
-FOLDER holds mbm_panda and mbm_ur5; CHECKOUT is another version's. Each version runs in a process of its own, and they
-take turns, problem by problem: machines are shared, so only the factors between them say much. Processor time.
+Each version runs in a process of its own, and they take turns, problem by problem: machines are shared, so only the
+factors between them say much. Processor time.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from typer import Option
 
-from bench.shared.pages import add_out
+from bench.shared.run import Run, Sets
 from bench.speed.machine import machine
 from rrtik_bench.report.page import Report
 from rrtik_ompl import list_problems, load_problem
+from rrtik_ompl.base.choices import one_of
 
+TABLES = ("searches", "plans", "queries")
 ROOT = Path(__file__).resolve().parent.parent.parent
 WANTED_FACTORS = {"panda": 0.68, "ur5": 0.65, "ur5, cage": 0.40}
 WANTED_PLANS = {"panda": (0.8, 6.0), "ur5": (2.0, 15.0)}  # [ms] median, 95 %
@@ -174,27 +174,23 @@ def queries(report: Report, versions: Sequence[Version], folder: Path) -> None:
     )
 
 
-def main() -> int:
-    """Measure, print the page and write it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="holds mbm_panda and mbm_ur5")
-    parser.add_argument("--old", type=Path, help="checkout of an earlier version")
-    parser.add_argument("--problems", type=int, default=50, help="of each family")
-    parser.add_argument("--only", choices=("searches", "plans", "queries"), action="append")
-    add_out(parser, "whole_calls.md")
-    given = parser.parse_args()
-    wanted = given.only or ("searches", "plans", "queries")
-    versions = [Version(checkout.resolve()) for checkout in (ROOT, given.old) if checkout is not None]
-    report = Report("Whole calls", "python bench/whole_calls/search.py FOLDER --old CHECKOUT")
+def main(
+    run: Run,
+    folder: Sets,
+    *,
+    old: Annotated[Path | None, Option(help="Checkout of an earlier version.")] = None,
+    problems: Annotated[int, Option(help="Of each family.")] = 50,
+    only: Annotated[list[str] | None, Option(help="searches, plans or queries; may be repeated.")] = None,
+) -> Report:
+    """Measure."""
+    wanted = [one_of(TABLES, name, "table") for name in only or TABLES]
+    versions = [Version(checkout.resolve()) for checkout in (ROOT, old) if checkout is not None]
+    report = run.report("Whole calls")
     report.note("Search", machine())
     if "searches" in wanted:
-        searches(report, versions, given.folder, given.problems)
+        searches(report, versions, folder, problems)
     if "plans" in wanted:
-        plans(report, versions, given.folder, given.problems)
+        plans(report, versions, folder, problems)
     if "queries" in wanted:
-        queries(report, versions, given.folder)
-    return report.finish(given.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+        queries(report, versions, folder)
+    return report

@@ -1,14 +1,10 @@
 """Whole calls beside `plan()` by name: the default planner, shortening, inverse kinematics, loading, first plans.
 
-    python bench/whole_calls/calls.py FOLDER
-
-FOLDER holds mbm_panda and mbm_ur5. Lengths are compared with the shortest known ones (`best_known.py`). Processor time
-of this version.
+Lengths are compared with the shortest known ones (`best_known.py`). Processor time of this version.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import subprocess
@@ -18,14 +14,15 @@ import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
-from bench.shared.pages import add_out
+from bench.shared.run import Run, Sets
 from bench.speed.machine import machine
 from bench.whole_calls.best_known import best_lengths, the_70, title
-from bench.whole_calls.search import scene_files, three
+from bench.whole_calls.report import scene_files, three
 from bench.whole_calls.search_calls import problem_of, spent
 from rrtik_bench.report.page import Report
 from rrtik_ompl import (
@@ -205,18 +202,13 @@ def _process(command: list[str], surroundings: dict[str, str]) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def main() -> int:
-    """Measure, print the page and write it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="holds mbm_panda and mbm_ur5")
-    parser.add_argument("--problems", type=int, default=50, help="of each family")
-    add_out(parser, "whole_calls_others.md")
-    given = parser.parse_args()
+def main(run: Run, folder: Sets, *, problems: Annotated[int, Option(help="Of each family.")] = 50) -> Report:
+    """Measure."""
     warnings.simplefilter("ignore")
-    files = {arm: scene_files(given.folder, arm, given.problems) for arm in ("panda", "ur5")}
-    known = {file for arm in files for file in the_70(given.folder, arm)}
+    files = {arm: scene_files(folder, arm, problems) for arm in ("panda", "ur5")}
+    known = {file for arm in files for file in the_70(folder, arm)}
     cases = {arm: loaded(them) for arm, them in files.items()}
-    report = Report("Whole calls: the others", "python bench/whole_calls/calls.py FOLDER")
+    report = run.report("Whole calls: the others")
     default_plans(report, cases, known)
     shortenings(report, cases)
     kinematics(report)
@@ -224,8 +216,4 @@ def main() -> int:
     thousand_boxes(report)
     first_plans(report)
     report.note("Where", machine())
-    return report.finish(given.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    return report

@@ -1,7 +1,5 @@
 """Inverse kinematics on the same reachable poses: every method of ours beside those of other libraries.
 
-    python bench/ik/comparison.py [--poses 1000] [--budget 1.2] [--out bench/reports/ik_comparison.md]
-
 In blocks of 50 poses all methods take turns; time is processor time of the whole process, so that a library with two
 threads pays for both. The others come with ``pip install -e ".[peers]"``; one that is absent is named with the reason.
 A method that has used up its budget takes no more poses: the column "poses" says how many it was asked. Some minutes.
@@ -9,19 +7,20 @@ A method that has used up its budget takes no more poses: the column "poses" say
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Annotated, get_args
 
 import numpy as np
 import pinocchio as pin
+from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.peers.ik import Solver, solvers
 from bench.peers.libraries.eaik import eaik_robot, turned_back
-from bench.shared.pages import add_out
+from bench.shared.run import Run
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.choices import IkMethod, one_of
@@ -122,7 +121,7 @@ def single(robot: Robot, poses: np.ndarray, budget: float, methods: Sequence[str
             if method == KERNEL:
                 runs[method] = Runs(kernel_alone(robot, start), budget)
                 continue
-            named = one_of(list_ik_methods(), method, "IK method")
+            named = one_of(get_args(IkMethod), method, "IK method")
             by_face(robot, named, poses[0])
             runs[method] = Runs(partial(by_face, robot, named), budget)
         except InputError as error:
@@ -200,25 +199,26 @@ def _percent(share: float) -> str:
     return "not judged" if np.isnan(share) else f"{share:.1%}"
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--poses", type=int, default=1000)
-    parser.add_argument("--budget", type=float, default=1.2, help="seconds a method, seven times as many a peer")
-    add_out(parser, "ik_comparison.md")
-    options = parser.parse_args()
-    report = Report("Inverse kinematics beside other libraries", "python bench/ik/comparison.py")
+def main(
+    run: Run,
+    *,
+    poses: int = 1000,
+    budget: Annotated[float, Option(help="Seconds a method, seven times as many a peer.")] = 1.2,
+) -> Report:
+    """Measure."""
+    report = run.report("Inverse kinematics beside other libraries")
     missing: list[str] = []
     for name in ARMS:
         robot = rrtik.load_robot(name)
         rng = np.random.default_rng(2)
-        poses = robot.fk_batch(rng.uniform(*robot.finite_range(), (options.poses, robot.dof)))
-        runs, absent = single(robot, poses, options.budget, (KERNEL, "auto", *list_ik_methods()))
-        batch = batches(robot, poses)
+        wanted = robot.fk_batch(rng.uniform(*robot.finite_range(), (poses, robot.dof)))
+        runs, absent = single(robot, wanted, budget, (KERNEL, "auto", *list_ik_methods()))
+        batch = batches(robot, wanted)
         missing += absent
         compare(report, name, runs, batch)
-        report.table(f"{name}, pose by pose", HEAD, [run.row(each) for each, run in runs.items()])
+        report.table(f"{name}, pose by pose", HEAD, [each.row(method) for method, each in runs.items()])
         rows = [[each, _percent(share), f"{us:.1f}"] for each, (share, us) in batch.items()]
-        report.table(f"{name}, {len(poses)} poses in one call", ["method", "solved", "a pose [us]"], rows)
+        report.table(f"{name}, {len(wanted)} poses in one call", ["method", "solved", "a pose [us]"], rows)
     solved = f"Solved: inside the limits, at most {METRES:g} m and {RADIANS:g} rad away by Pinocchio's kinematics."
     report.note(
         "How",
@@ -227,8 +227,4 @@ def main() -> None:
         "TRAC-IK has 0.1 s by the clock.",
     )
     report.note("Not asked", "\n".join(f"- {line}" for line in missing))
-    report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+    return report

@@ -1,15 +1,15 @@
 """IKURT: every acceptance row for the algorithm of [1, ch. 5.1] and the improved one, both beside IK and RRT-Connect.
 
-Usage: ``python bench/ik/ikurt_report.py [--mbm mbm_panda] [--jobs 2] [--quick]``; half an hour of one core. An
-interrupted run goes on where it was.
+Half an hour of one core. An interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 from bench.ik import ikurt_cases as cases
 from bench.ik.ikurt_runs import (
@@ -28,9 +28,9 @@ from bench.ik.ikurt_runs import (
     literal_falls,
     panda,
 )
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.ikurt import EXAMPLES, METRIC
-from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
 
 SECONDS = 10.0  # of an acceptance run
@@ -158,25 +158,27 @@ def poses(report: Report, measure: Parts, problems: int, folder: Path | None, pa
         report.table(f"{count} problems of MotionBenchMaker, Panda, goals as poses, {PANDA_SECONDS:g} s", HEAD, found)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--mbm", type=Path, help="the unpacked set of Panda problems, see README.md")
-    parser.add_argument("--literal", type=int, default=20, help="runs of the published algorithm, up to 10 s each")
-    parser.add_argument("--problems", type=int, default=500, help="generated pose problems, all arms together")
-    parser.add_argument("--panda", type=int, default=140, help="problems of MotionBenchMaker")
-    parser.add_argument("--stretch", type=float, default=1.0, help="wall time per processor time, on a busy machine")
-    parser.add_argument("--quick", action="store_true", help="a look at everything")
-    add_options(parser, "ikurt.md")
-    options = parser.parse_args()
-    literal, improved, seeds = (2, 5, 10) if options.quick else (options.literal, 20, 100)
-    problems, pandas = (12, 7) if options.quick else (options.problems, options.panda)
-    report = Report("IKURT", "python bench/ik/ikurt_report.py", processes(options.jobs))
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    mbm: Annotated[Path | None, Option(help="Unpacked problems of MotionBenchMaker for the Panda.")] = None,
+    literal: Annotated[int, Option(help="Runs of the published algorithm, up to 10 s each.")] = 20,
+    problems: Annotated[int, Option(help="Generated pose problems, all arms together.")] = 500,
+    panda: Annotated[int, Option(help="Problems of MotionBenchMaker.")] = 140,
+    stretch: Annotated[float, Option(help="Wall time per processor time, on a busy machine.")] = 1.0,
+    quick: Annotated[bool, Option(help="A look at everything.")] = False,
+) -> Report:
+    """Measure."""
+    improved, seeds = 20, 100
+    if quick:
+        literal, improved, seeds, problems, panda = 2, 5, 10, 12, 7
+    report = run.report("IKURT")
     report.note("What was run", INTRODUCTION)
-    with Parts(options.out, options.jobs) as measure:
-        hundred(report, measure, seeds, options.stretch)
-        poses(report, measure, problems, options.mbm, pandas, options.stretch)
-        acceptance(report, measure, literal, improved, options.stretch)
-        report.finish(options.out)
+    hundred(report, parts, seeds, stretch)
+    poses(report, parts, problems, mbm, panda, stretch)
+    acceptance(report, parts, literal, improved, stretch)
+    return report
 
 
 COUNTS = {
@@ -194,7 +196,3 @@ INTRODUCTION = (
     "the published metric at the end of the worst path. Seconds are of processor time, and so are the limits. Where "
     "wall time runs out before that, a failure has had the seconds shown."
 )
-
-
-if __name__ == "__main__":
-    main()

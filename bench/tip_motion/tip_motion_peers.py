@@ -1,27 +1,25 @@
-"""Straight lines of the tip beside roboplan's Cartesian planner, on the same lines in one run.
-
-Usage: ``python bench/tip_motion/peers.py [--lines 12] [--python PYTHON] [--jobs 1] [--out FILE]``
-"""
+"""Straight lines of the tip beside roboplan's Cartesian planner, on the same lines in one run."""
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.peers.description import task_of
 from bench.peers.host import Host
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
+from bench.shared.run import Roboplan, Run
 from bench.tip_motion.judge import Judge
 from bench.tip_motion.lines import ROUNDS, SPREAD
-from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.arrays import Matrix
 
@@ -84,14 +82,15 @@ def _host(module: str, python: str) -> Host:
     return Host(module, python)
 
 
-def main() -> None:
-    """Write the page."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--lines", type=int, default=12, help="of each arm")
-    parser.add_argument("--python", default=sys.executable, help="interpreter of an environment with roboplan")
-    add_options(parser, "tip_motion_peers.md")
-    given = parser.parse_args()
-    report = Report("Straight lines beside roboplan's", "python bench/tip_motion/peers.py", processes(given.jobs))
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    count: Annotated[int, Option("--lines", help="Of each arm.")] = 12,
+    python: Roboplan = sys.executable,
+) -> Report:
+    """Measure."""
+    report = run.report("Straight lines beside roboplan's")
     report.intro = (
         "From a random configuration the tip moves straight to the pose of another one, each joint of which is some "
         "0.35 rad away; no obstacles, for roboplan's Cartesian planner looks at none. Its paths are timed motions at "
@@ -100,21 +99,16 @@ def main() -> None:
         "proofs against contact of the arm with itself."
     )
     table = []
-    with Parts(given.out, given.jobs) as parts:
-        for arm in ARMS:
-            lines = parts(line_of, [(given.python, arm, k) for k in range(given.lines)])
-            for who, name in {OURS: OURS, **THEIRS}.items():
-                whole = [line[who] for line in lines if line[who].whole]
-                ms = 1e3 * np.array([each.seconds for each in whole])
-                spread = f"{np.median(ms):.2f} / {np.quantile(ms, 0.95):.2f}" if whole else "-"
-                most = [max((getattr(each, what) for each in whole), default=0.0) for what in STRAYS]
-                amounts = [f"{1e3 * most[0]:.3f}", f"{np.degrees(most[1]):.3f}", f"{most[2]:.2f}"]
-                table.append([arm, name, f"{len(whole)} of {len(lines)}", spread, *amounts])
+    for arm in ARMS:
+        lines = parts(line_of, [(python, arm, k) for k in range(count)])
+        for who, name in {OURS: OURS, **THEIRS}.items():
+            whole = [line[who] for line in lines if line[who].whole]
+            ms = 1e3 * np.array([each.seconds for each in whole])
+            spread = f"{np.median(ms):.2f} / {np.quantile(ms, 0.95):.2f}" if whole else "-"
+            most = [max((getattr(each, what) for each in whole), default=0.0) for what in STRAYS]
+            amounts = [f"{1e3 * most[0]:.3f}", f"{np.degrees(most[1]):.3f}", f"{most[2]:.2f}"]
+            table.append([arm, name, f"{len(whole)} of {len(lines)}", spread, *amounts])
     heads = ["arm", "who", "whole", "ms (median / 95 %)", "off, mm", "turned, degrees", "largest step, rad"]
     report.table("Lines", heads, table)
-    report.note("Versions", _host(next(iter(THEIRS)), given.python).versions)
-    raise SystemExit(report.finish(given.out))
-
-
-if __name__ == "__main__":
-    main()
+    report.note("Versions", _host(next(iter(THEIRS)), python).versions)
+    return report

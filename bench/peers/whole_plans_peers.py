@@ -1,31 +1,31 @@
 """Whole `plan()` calls beside roboplan's `plan()` on the MotionBenchMaker problems, in turns.
 
-    python bench/peers/whole_plans.py FOLDER --python venv_roboplan/bin/python [--problems N] [--seeds N]
-
-FOLDER holds mbm_panda and mbm_ur5. Ours is the call that a user makes: exact meshes, with proofs of every motion, in a
-world that has planned before. roboplan's is its `plan()` alone, in a planner and a scene that are ready: 32 checks per
-radian, and no second check. Both read the same files, each in a process of its own; processor time.
+Ours is the call that a user makes: exact meshes, with proofs of every motion, in a world that has planned before.
+roboplan's is its `plan()` alone, in a planner and a scene that are ready: 32 checks per radian, and no second check.
+Both read the same files, each in a process of its own; processor time.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 import warnings
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 from bench.peers.description import task_of
 from bench.peers.host import Host
-from bench.shared.pages import add_out
+from bench.shared.run import Roboplan, Run, Sets
 from bench.speed.machine import machine
-from bench.whole_calls.search import scene_files, three
+from bench.whole_calls.report import scene_files, three
 from bench.whole_calls.search_calls import problem_of, spent
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, Problem, plan
+from rrtik_ompl.base.errors import InputError
 
 PLANNER, SECONDS = "fastrrtconnect", 10.0
 WANTED = 0.15  # of roboplan's time
@@ -46,26 +46,27 @@ def compared(problem: Problem, host: Host, seeds: int) -> list[tuple[float, floa
     return found
 
 
-def main() -> int:
-    """Measure, print the page and write it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="holds mbm_panda and mbm_ur5")
-    parser.add_argument("--python", default=sys.executable, help="interpreter of an environment with roboplan")
-    parser.add_argument("--problems", type=int, default=5, help="of each family")
-    parser.add_argument("--seeds", type=int, default=2)
-    add_out(parser, "whole_plans_peers.md")
-    given = parser.parse_args()
+def main(
+    run: Run,
+    folder: Sets,
+    *,
+    python: Roboplan = sys.executable,
+    problems: Annotated[int, Option(help="Of each family.")] = 5,
+    seeds: int = 2,
+) -> Report:
+    """Measure."""
     warnings.simplefilter("ignore")
-    report, rows = Report("Whole plans beside roboplan", "python bench/peers/whole_plans.py FOLDER"), []
-    with Host("roboplan", given.python) as host:
+    report = run.report("Whole plans beside roboplan")
+    rows = []
+    with Host("roboplan", python) as host:
         if host.absent:
-            raise SystemExit(f"roboplan is absent: {host.absent}")
+            raise InputError(f"roboplan is absent: {host.absent}; see --python")
         for arm in ("panda", "ur5"):
             runs = []
-            for file in scene_files(given.folder, arm, given.problems):
+            for file in scene_files(folder, arm, problems):
                 problem = problem_of(file, balls=False)
                 assert problem is not None
-                runs += compared(problem, host, given.seeds)
+                runs += compared(problem, host, seeds)
             ours, theirs, found, valid = (np.array(column) for column in zip(*runs, strict=True))
             ratio = float(np.exp(np.log(ours / theirs).mean()))
             report.bar(f"plan() over roboplan's, {arm}: geometric mean", f"{WANTED:g}", f"{ratio:.3f}", ratio <= WANTED)
@@ -75,8 +76,4 @@ def main() -> int:
     head = ["", "", "runs", "found and valid", "median [ms]", "mean [ms]", "95 % [ms]"]
     report.table("`plan()`", head, rows, text="Valid: our second check finds nothing.")
     report.note("Where", f"{machine()} roboplan's environment: {versions}.")
-    return report.finish(given.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    return report

@@ -1,20 +1,19 @@
-"""The MB-RRT report: the published tables of [3] beside ours, every acceptance row, and what lies beyond [3].
+"""MB-RRT: the published tables of [3] beside ours, every acceptance row, and what lies beyond [3].
 
-    nice python bench/ik/mb_rrt_report.py [--quick] [--out bench/reports/mb_rrt.md]
-
-Takes five to fifteen minutes; ``--quick`` leaves the published tables 6 to 9 out.
+Takes five to fifteen minutes.
 """
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 from bench.ik import mb_rrt_beyond as beyond
 from bench.ik import mb_rrt_tables as published
-from bench.shared.pages import add_out
+from bench.shared.run import Run
 from rrtik_bench.mb_rrt.runs import Measured, arm
 from rrtik_bench.mb_rrt.runs import laws as laws_of
 from rrtik_bench.report.machine import versions
@@ -81,13 +80,15 @@ def acceptance_of_tables(report: Report, found: dict[int, dict[str, Measured]]) 
     )
 
 
-def page(quick: bool, folder: Path) -> Report:
+def main(run: Run, *, quick: Annotated[bool, Option(help="Without the published tables 6 to 9.")] = False) -> Report:
+    """Measure; the pictures go beside the page."""
     rng = np.random.default_rng(0)
     about = (
         f"{versions('numpy')}; seed 0. Goals of the published tables: a sunflower of points, since [3] does not "
         "say which they were. Lengths in cm."
     )
-    report, small = Report("MB-RRT", "python bench/ik/mb_rrt_report.py", intro=about), Report("", "")
+    report = run.report("MB-RRT", intro=about)
+    small = Report("", "")
     exact = published.precision(small, rng)
     acceptance_of_precision(report, exact, structure(rng))
     report.note("The published tables", "")
@@ -97,7 +98,7 @@ def page(quick: bool, folder: Path) -> Report:
     further = left_open(rng)
     laws(report, rng, exact)
     report.add(further)
-    _pictures(folder)
+    _pictures(run.out.parent)
     return report
 
 
@@ -172,15 +173,3 @@ def _pictures(folder: Path) -> None:
     run = grow(links, goal, tolerance=0.05, rng=np.random.default_rng(1))
     plot_tree(run, folder / "mb_rrt_tree.png")
     plot_tree(grow_on_arcs(links, goal, rng=np.random.default_rng(1), passes=20), folder / "mb_rrt_arcs.png")
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--quick", action="store_true")
-    add_out(parser, "mb_rrt.md")
-    options = parser.parse_args()
-    page(options.quick, options.out.parent).finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
