@@ -1,7 +1,6 @@
 """Does the library still give the same results, bit for bit? Hashes of some hundred results, stored and compared.
 
-    python bench/behaviour.py store FILE [--only TEXT]      run all cases and write their hashes
-    python bench/behaviour.py compare FILE [--only TEXT]    run them again and print each case that differs
+``store`` runs all cases and writes their hashes; ``compare`` runs them again and prints each case that differs.
 
 A case is a plan, a shortened path, a call of inverse kinematics, a trajectory, a replanning run or a batch of checks;
 the files ``behaviour_*.py`` hold them. An entry is the SHA-256 of the result's arrays (base64) and a line of flags and
@@ -14,7 +13,6 @@ Exit code 0 if nothing differs, else 1. An error of the same kind in other words
 
 from __future__ import annotations
 
-import argparse
 import base64
 import hashlib
 import json
@@ -26,39 +24,43 @@ import warnings
 from collections.abc import Callable, Iterable
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import llvmlite.binding as llvm
 import numpy as np
 from ompl import util as ou
+from typer import Argument, Option
 
 import rrtik_ompl
-from behaviour_calls import inverse_kinematics, others, replans
-from behaviour_paths import plain, plans, shortenings, trajectories
-from behaviour_problems import Result
+from bench.behaviour_calls import inverse_kinematics, others, replans
+from bench.behaviour_paths import plain, plans, shortenings, trajectories
+from bench.behaviour_problems import Result
+from rrtik_ompl.base.choices import one_of
 
 LIBRARIES = ("ompl", "pin", "coal", "numpy", "scipy", "numba", "llvmlite")
 GROUPS = (plans, plain, shortenings, trajectories, inverse_kinematics, replans, others)
 SLOW = 5.0  # [s] a case that takes longer is named
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("verb", choices=("store", "compare"))
-    parser.add_argument("file", type=Path)
-    parser.add_argument("--only", default="", help="cases whose name contains this text")
-    given = parser.parse_args()
+def main(
+    verb: Annotated[str, Argument(help="store or compare")],
+    file: Path,
+    only: Annotated[str, Option(help="Cases whose name contains this text.")] = "",
+) -> int:
+    """Run the cases."""
+    storing = one_of(("store", "compare"), verb, "verb") == "store"
     ou.setLogLevel(ou.LogLevel.LOG_NONE)
     warnings.simplefilter("ignore")
-    before = json.loads(given.file.read_text()) if given.verb == "compare" else None
+    before = None if storing else json.loads(file.read_text())
     begin = time.process_time()
-    found = {name: entry_of(name, case) for group in GROUPS for name, case in group() if given.only in name}
-    took, where = time.process_time() - begin, Path(rrtik_ompl.__file__).parent
+    found = {name: entry_of(name, case) for group in GROUPS for name, case in group() if only in name}
+    took = time.process_time() - begin
+    where = Path(rrtik_ompl.__file__).parent
     print(f"{len(found)} cases of {where}, {took:.0f} s of processor time")
     if before is None:
-        given.file.write_text(as_text(machine(), found))
+        file.write_text(as_text(machine(), found))
         return 0
-    expected = {name: entry for name, entry in before["cases"].items() if given.only in name}
+    expected = {name: entry for name, entry in before["cases"].items() if only in name}
     return compare(before["machine"], expected, found)
 
 
@@ -132,7 +134,3 @@ def compare(machine_then: dict[str, str], then: dict[str, list[str]], now: dict[
 
 def _shown(entry: list[str] | None) -> str:
     return "no such case" if entry is None else f"{entry[0][:10]} {entry[1]}"
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 import rrtik_ompl as rrtik
-from behaviour_paths import plan_of
-from behaviour_problems import LONG, MADE, Cases, Result, draws, goal_of, problem_of, robot_of, surroundings
+from bench.behaviour_paths import plan_of
+from bench.behaviour_problems import LONG, MADE, Cases, Result, draws, goal_of, problem_of, robot_of, surroundings
 
 SLOW_ALL = ("ccd", "pso", "pso-resampled", "pinocchio", "projection")  # seconds for all solutions of one goal
 

@@ -16,7 +16,7 @@ from ompl import geometric as og
 
 import rrtik_ompl as rrtik
 import rrtik_planners
-from behaviour_problems import LONG, MADE, Cases, Result, problem_of
+from bench.behaviour_problems import LONG, MADE, Cases, Result, problem_of
 
 OWN = ("bicrdt", "crdt", "fastrrtconnect", "mbrrt", "drrt-con", "ikurt")
 WHEEL = ("RRTConnect", "RRT", "KPIECE1", "BKPIECE1", "LBKPIECE1", "FMT", "BFMT")

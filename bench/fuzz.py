@@ -1,7 +1,5 @@
 """Calls the public face with odd values, files and words, and writes down what is no answer and no error of ours.
 
-    python bench/fuzz.py --file finds.jsonl --calls 100000
-
 Calls are numbered; a number is the seed of its call, so that ``--first 4711 --calls 1`` repeats one. They run in forked
 children with limits of memory, of processor time and, far above that, of wall time: a child that crashes or hangs loses
 one call. The file holds one line for each find, and one for each batch that is done: the next run goes on behind it.
@@ -9,7 +7,6 @@ one call. The file holds one line for each find, and one for each batch that is 
 
 from __future__ import annotations
 
-import argparse
 import faulthandler
 import gc
 import json
@@ -25,8 +22,10 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 from bench.robustness import bad_inputs, calls, commands, spoilt_files, values
 from bench.robustness.spoilt_files import Drawn
@@ -129,24 +128,19 @@ def prepare() -> None:
     bad_inputs.prepare()
 
 
-def main() -> None:
+def main(
+    file: Annotated[Path, Option(help="Of the finds.")] = Path("finds.jsonl"),
+    count: Annotated[int, Option("--calls")] = 10_000,
+    first: Annotated[int | None, Option(help="Number of the first call. Without: behind the last run.")] = None,
+) -> None:
     """Run, and go on where the last run ended."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--file", type=Path, default=Path("finds.jsonl"))
-    parser.add_argument("--calls", type=int, default=10_000)
-    parser.add_argument("--first", type=int)
-    given = parser.parse_args()
-    lines = [json.loads(line) for line in given.file.read_text().splitlines()] if given.file.exists() else []
-    first = given.first if given.first is not None else max((line.get("done", 0) for line in lines), default=0)
-    with given.file.open("a") as log, tempfile.TemporaryDirectory() as folder:
-        for begin in range(first, first + given.calls, BATCH):
-            count = min(BATCH, first + given.calls - begin)
-            for seed, wrong in run(begin, count, Path(folder)):
+    lines = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    start = max((line.get("done", 0) for line in lines), default=0) if first is None else first
+    with file.open("a") as log, tempfile.TemporaryDirectory() as folder:
+        for begin in range(start, start + count, BATCH):
+            size = min(BATCH, start + count - begin)
+            for seed, wrong in run(begin, size, Path(folder)):
                 log.write(json.dumps({"seed": seed, "wrong": wrong}) + "\n")
                 print(seed, wrong, flush=True)
-            log.write(json.dumps({"done": begin + count}) + "\n")
+            log.write(json.dumps({"done": begin + size}) + "\n")
             log.flush()
-
-
-if __name__ == "__main__":
-    main()

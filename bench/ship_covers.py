@@ -1,18 +1,18 @@
-"""Write the covers of all robots that come along into the package: ``python bench/ship_covers.py``.
+"""Write the covers of all robots that come along into the package.
 
-What the machine's cache holds is taken from there; ``--anew`` makes all of it, which takes minutes. The same covers
-always make the same file.
+What the machine's cache holds is taken from there. The same covers always make the same file.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import tempfile
 from collections.abc import Callable
+from typing import Annotated
 from unittest.mock import patch
 
 import coal
+from typer import Option
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.description.catalog import list_robots, load_robot
@@ -39,15 +39,8 @@ def covers_of_robots() -> dict[str, Matrix]:
     return found
 
 
-def main() -> None:
+def main(anew: Annotated[bool, Option(help="Make every cover, whatever the cache holds: minutes.")] = False) -> None:
     """Write the file."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--anew", action="store_true", help="make every cover, whatever the cache holds")
-    anew = parser.parse_args().anew
     with tempfile.TemporaryDirectory() as empty, patch.dict(os.environ, {FOLDER_VARIABLE: empty} if anew else {}):
         shipped.write_store(covers_of_robots())
     print(f"{shipped.STORE}: {shipped.STORE.stat().st_size / 1e6:.2f} MB")
-
-
-if __name__ == "__main__":
-    main()

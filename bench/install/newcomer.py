@@ -1,21 +1,23 @@
 """What a newcomer types: Python and commands of tutorials as they stand, in an environment that has the package.
 
     python -m venv fresh && fresh/bin/pip install .
-    python bench/install/newcomer.py fresh/bin/python [--tutorials first_plan own_robot lines_and_constraints]
+    python -m bench newcomer fresh/bin/python
 
 Prints one row a block: how long it took and the first line of what went wrong. Each page is typed in a folder of its
-own, all of its Python in one interpreter, as a person has one open.
+own, all of its Python in one interpreter, as a person has one open. Exit code 1 if something went wrong.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import subprocess
 import tempfile
 import time
 from pathlib import Path
+from typing import Annotated
+
+from typer import Argument, Option
 
 TUTORIALS = Path(__file__).resolve().parents[2] / "docs" / "tutorials"
 BLOCK = re.compile(r"^```python\n(.*?)^```|^((?:    rrtik [^\n]*\n)+)", re.MULTILINE | re.DOTALL)
@@ -68,21 +70,16 @@ def commanded(command: str, python: Path, folder: str) -> str:
     return f"{time.perf_counter() - begin:.1f} s{failed}"
 
 
-def main() -> int:
+def main(
+    python: Annotated[Path, Argument(help="Of the environment.")],
+    tutorials: Annotated[list[str] | None, Option(help="This one; may be repeated. Without: the first three.")] = None,
+) -> int:
     """Type the pages; exit code 1 if something went wrong."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("python", type=Path, help="of the environment")
-    parser.add_argument("--tutorials", nargs="+", default=FIRST_THREE)
-    options = parser.parse_args()
     wrong = 0
-    for page in options.tutorials:
+    for page in tutorials or FIRST_THREE:
         print(f"| {page} | |\n|---|---|")
-        for what, how in typed(page, options.python):
+        for what, how in typed(page, python):
             wrong += ":" in how
             print(f"| `{what.strip()[:70]}` | {how} |", flush=True)
         print()
     return int(wrong > 0)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

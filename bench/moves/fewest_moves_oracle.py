@@ -1,13 +1,8 @@
-"""Compare fewest-moves with an exact oracle in the plane: arms of 2 and 3 links among discs and rectangles.
-
-Usage: ``python bench/moves/fewest_moves_oracle.py [--cases 200] [--first 0] [--jobs 2] [--out PAGE]``
-"""
+"""Fewest moves beside an exact search in the plane: arms of 2 and 3 links among discs and rectangles."""
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from time import process_time
 from unittest.mock import patch
@@ -17,9 +12,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import rrtik_ompl as rrtik
-from bench.shared.pages import add_out
+from bench.shared.parts import Parts
 from bench.shared.problems import goal_joints
-from rrtik_bench.report.machine import processes
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_arms import PlaneArm, PlaneGrid
 from rrtik_ompl.model.scene import Obstacle, Scene
@@ -170,10 +165,8 @@ def outcome(number: int) -> Outcome:
     )
 
 
-def page(found: list[Outcome], jobs: int) -> Report:
+def fill(report: Report, found: list[Outcome]) -> None:
     """What was found."""
-    command = "python bench/moves/fewest_moves_oracle.py"
-    report = Report("Fewest moves beside an exact oracle", command, processes(jobs))
     worse = [one for one in found if one.moves > min(one.oracle, one.refined)]
     equal = 1.0 - sum(one.moves > one.oracle for one in found) / len(found)
     text = f"{100 * equal:.1f} % of {len(found)}"
@@ -215,24 +208,11 @@ def page(found: list[Outcome], jobs: int) -> Report:
     head = ["case", "links", "joints that differ", "oracle", "refined", "planner", "bound", "processor time [s]"]
     report.table("Cases in which the planner has more moves", head, [one.line for one in worse])
     report.note("How", HOW)
+
+
+def main(run: Run, parts: Parts, *, cases: int = 200, first: int = 0) -> Report:
+    """Run all cases."""
+    found = parts(outcome, [(number,) for number in range(first, first + cases)])
+    report = run.report("Fewest moves beside an exact oracle")
+    fill(report, found)
     return report
-
-
-def main() -> None:
-    """Run all cases and print the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=2, help="cases at a time")
-    add_out(parser, "fewest_moves_oracle.md")
-    options = parser.parse_args()
-    found = []
-    with ProcessPoolExecutor(options.jobs) as pool:
-        for one in pool.map(outcome, range(options.first, options.first + options.cases)):
-            found.append(one)
-            print("  ".join(one.line), "" if one.free else "COLLIDES", flush=True)
-    page(found, options.jobs).finish(options.out)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,11 +1,7 @@
-"""Pages to look at, each one file that needs no network: arms that people have, two arms, a maze, a cloud, a tree.
-
-Run it as ``python bench/page/gallery.py FOLDER``.
-"""
+"""Pages to look at, each one file that needs no network: arms that people have, two arms, a maze, a cloud, a tree."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -66,11 +62,8 @@ def pages() -> Iterator[tuple[str, str, Callable[[Path], None]]]:
     yield "mb_rrt_tree", "the tree of MB-RRT", tree
 
 
-def main() -> int:
+def main(folder: Path) -> int:
     """Write all pages; exit code 1 if one is too large."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     sizes = []
     for name, text, write in pages():
@@ -79,7 +72,3 @@ def main() -> int:
         sizes.append(file.stat().st_size)
         print(f"{file}: {sizes[-1] / 1e6:.2f} MB: {text}", flush=True)
     return int(max(sizes) > LARGEST)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -1,19 +1,18 @@
-"""Pages that plan, measured: answers and searches beside Python's, drags in a browser, sizes. Needs node and Chromium.
-
-Run it as ``python bench/page/report.py [--seeds 1000] [--drags 1000] [--configurations 100000]``.
-"""
+"""Pages that plan: answers and searches beside Python's, drags in a browser, sizes. Needs node and Chromium."""
 
 from __future__ import annotations
 
-import argparse
 from functools import cache
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.page.browser import Dragged, dragged
 from bench.page.node import PROBLEMS, ROBOTS, Answers, Searches, answers_of, goal_of, in_node, searched
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.viewer.page_planner import page_planner
 
@@ -51,11 +50,13 @@ def drags_of(name: str, drags: int, timed: int) -> Dragged:
     return dragged(problem_of(name), drags, timed, SEED)
 
 
-def written(
-    answers: dict[str, Answers], searches: dict[tuple[str, bool], Searches], drags: dict[str, Dragged]
-) -> Report:
-    """The page."""
-    report = Report("Pages that plan", "bench/page/report.py")
+def fill(
+    report: Report,
+    answers: dict[str, Answers],
+    searches: dict[tuple[str, bool], Searches],
+    drags: dict[str, Dragged],
+) -> None:
+    """What came out."""
     asked = sum(each.configurations for each in answers.values()), sum(each.motions for each in answers.values())
     differ = sum(each.differ for each in answers.values())
     report.bar(
@@ -149,31 +150,28 @@ def written(
     for name, each in drags.items():
         if each.refused:
             report.note(f"Refused: {name}", "\n".join(f"- {line}" for line in each.refused))
-    return report
 
 
-def main() -> int:
-    """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=1000)
-    parser.add_argument("--drags", type=int, default=1000)
-    parser.add_argument("--timed", type=int, default=60, help="drags of each problem that are timed")
-    parser.add_argument("--configurations", type=int, default=100_000, help="of all robots together")
-    add_options(parser, "page.md")
-    options = parser.parse_args()
-    each, share = options.configurations // len(ROBOTS), -(-options.drags // len(IN_A_BROWSER))
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    seeds: int = 1000,
+    drags: int = 1000,
+    timed: Annotated[int, Option(help="Drags of each problem that are timed.")] = 60,
+    configurations: Annotated[int, Option(help="Of all robots together.")] = 100_000,
+) -> Report:
+    """Measure."""
+    share = -(-drags // len(IN_A_BROWSER))
     kinds = [(name, False) for name in PROBLEMS] + [(name, True) for name in ONE_JOINT]
-    with Parts(options.out, options.jobs) as parts:
-        drags = parts(drags_of, [(name, share, options.timed) for name in IN_A_BROWSER])
-        searches = parts(search_counts, [(name, one, options.seeds) for name, one in kinds])
-        answers = parts(answer_counts, [(robot, each) for robot in ROBOTS])
-    report = written(
+    dragged = parts(drags_of, [(name, share, timed) for name in IN_A_BROWSER])
+    searches = parts(search_counts, [(name, one, seeds) for name, one in kinds])
+    answers = parts(answer_counts, [(robot, configurations // len(ROBOTS)) for robot in ROBOTS])
+    report = run.report("Pages that plan")
+    fill(
+        report,
         dict(zip(ROBOTS, answers, strict=True)),
         dict(zip(kinds, searches, strict=True)),
-        dict(zip(IN_A_BROWSER, drags, strict=True)),
+        dict(zip(IN_A_BROWSER, dragged, strict=True)),
     )
-    return report.finish(options.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    return report

@@ -1,26 +1,23 @@
-"""The sheet of the shipped tasks and of the problems with path constraints or two arms. Needs Chromium.
-
-Run it as ``python bench/page/tasks.py [--single FOLDER]``; it writes ``tasks.png`` to ``bench/reports``, and with
-``--single`` each of its pictures in full size, at three moments, to a folder.
-"""
+"""The sheet of the shipped tasks and of the problems with path constraints or two arms, `tasks.png`. Needs Chromium."""
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
 from PIL import Image
+from typer import Option
 
 import rrtik_ompl as rrtik
+from bench.shared.run import REPORTS
 from rrtik_ompl.tasks.task_file import load_task
 from rrtik_ompl.viewer.film import drawn
 from rrtik_ompl.viewer.page import page
 
 SEED = 1
-REPORTS = Path(__file__).parents[1] / "reports"
 MOMENTS = 3  # that are drawn of each: the beginning, the middle, which stands in the sheet, and the end
 SHOWN = (
     "panda_pick_place", "panda_bookshelf", "panda_serve", "ur5_bin", "titan4_drawer", "titan4_valve_level",
@@ -54,19 +51,15 @@ def drawn_once(name: str, folder: Path) -> Image.Image:
     return Image.open(files[MOMENTS // 2]).convert("RGB")
 
 
-def main() -> None:
-    """Draw all of them and write the sheet."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--single", type=Path, help="a folder for the pictures in full size; its pictures are kept")
-    given = parser.parse_args()
+def main(
+    out: Annotated[Path, Option(help="The sheet.")] = REPORTS / "tasks.png",
+    single: Annotated[Path | None, Option(help="A folder for the pictures in full size, at three moments.")] = None,
+) -> None:
+    """Draw all of them; pictures that the folder has are kept."""
     with tempfile.TemporaryDirectory() as spare:
-        folder = given.single or Path(spare)
+        folder = single or Path(spare)
         folder.mkdir(parents=True, exist_ok=True)
         size = WIDTH, HEIGHT
         small = [cv2.resize(np.asarray(drawn_once(name, folder)), size, interpolation=cv2.INTER_AREA) for name in SHOWN]
     rows = [np.hstack(small[k : k + COLUMNS]) for k in range(0, len(small), COLUMNS)]
-    Image.fromarray(np.vstack(rows)).save(REPORTS / "tasks.png", optimize=True)
-
-
-if __name__ == "__main__":
-    main()
+    Image.fromarray(np.vstack(rows)).save(out, optimize=True)

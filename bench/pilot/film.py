@@ -1,11 +1,7 @@
-"""Films a whole task on the pilot's page in a headless browser: a tool is taken, lifted, carried and put into its rack.
-
-Usage: ``python bench/pilot/film.py [--hands gamepad|keyboard] [--out bench/reports/pilot_task.mp4]``
-"""
+"""Films a whole task on the pilot's page in a headless browser: a tool is taken, lifted, carried and racked."""
 
 from __future__ import annotations
 
-import argparse
 import base64
 import sys
 import tempfile
@@ -15,13 +11,15 @@ from collections.abc import Iterator
 from contextlib import closing
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from typer import Option
 
-from bench.shared.pages import add_out
+from bench.shared.run import REPORTS
+from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle
 from rrtik_ompl.pilot.overlay.film import write_film
 from rrtik_ompl.pilot.setup import SessionOptions
@@ -67,20 +65,15 @@ class Filming(browser.Browser):  # type: ignore[misc]
             yield self.pictures[bisect_right(times, now) - 1][1]
 
 
-def main() -> None:
+def main(
+    out: Annotated[Path, Option(help="The film.")] = REPORTS / "pilot_task.mp4",
+    by: Annotated[str, Option("--hands", help="gamepad or keyboard.")] = "gamepad",
+) -> None:
     """Do the task and write the film."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--hands", choices=sorted(hands.HANDS), default="gamepad")
-    add_out(parser, "pilot_task.mp4", "the film")
-    options = parser.parse_args()
+    hand = hands.HANDS[one_of(hands.HANDS, by, "kind of hands")]
     tool = Path(find_vehicle("titan4_sdu")).with_name("titan4_tool.yaml")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, closing(Filming(folder)) as page:
         with browser.Running(SessionOptions("titan4_sdu", vehicle=tool, seed=1)) as running:
-            hands.pick_and_place(page, running, hands.HANDS[options.hands], page.look, rate=JOINT_RATE)
-        write_film(options.out, page.film(), RATE)
-    count, size = len(page.pictures), options.out.stat().st_size
-    print(f"wrote {options.out}: {count} pictures, {size / 1e6:.2f} MB, by {options.hands}")
-
-
-if __name__ == "__main__":
-    main()
+            hands.pick_and_place(page, running, hand, page.look, rate=JOINT_RATE)
+        write_film(out, page.film(), RATE)
+    print(f"wrote {out}: {len(page.pictures)} pictures, {out.stat().st_size / 1e6:.2f} MB, by {by}")

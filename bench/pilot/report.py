@@ -1,19 +1,17 @@
-"""Measure the acceptance rows of the pilot's tool without a page, and write them as Markdown.
-
-Usage: ``python bench/pilot/report.py [--quick] [--out bench/reports/pilot.md]``
-"""
+"""The pilot's tool without a page: lamps, routes, refusals, a simulated pilot, times."""
 
 from __future__ import annotations
 
-import argparse
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 from bench.pilot.hulls import GROWTH, hulls_of_links
 from bench.pilot.pictures import registration, served, stages, state_rate
 from bench.pilot.routes import REACTION_SECONDS, REPLANNING, panel_routes, simulated_pilot, small_errors
 from bench.pilot.session import color_logic, preventive_checks, scripted_scenario
-from bench.shared.pages import add_out
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, RED
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS
@@ -140,23 +138,14 @@ def write_hulls(report: Report) -> None:
     )
 
 
-def main() -> None:
-    """Run everything and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="a tenth of every count")
-    add_out(parser, "pilot.md")
-    options = parser.parse_args()
-    part = 10 if options.quick else 1
-    report = Report("The pilot's tool, measured without a page", "python bench/pilot/report.py")
+def main(run: Run, *, quick: Annotated[bool, Option(help="A tenth of every count.")] = False) -> Report:
+    """Measure."""
+    report = run.report("The pilot's tool, measured without a page")
     report.note(
         "Times",
         "Processor times unless the clock is named, for the machine is shared; nearly all the work is in one thread.",
     )
     for write in (write_session, write_routes, write_pilot, write_loop):
-        write(report, part)
+        write(report, 10 if quick else 1)
     write_hulls(report)
-    report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+    return report

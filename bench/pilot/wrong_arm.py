@@ -1,20 +1,17 @@
-"""What the pilot's tool does with an arm that is wrong by stated amounts.
-
-Usage: ``python bench/pilot/wrong_arm.py [--routes 20] [--jobs N] [--out bench/reports/wrong_arm.md]``
-"""
+"""What the pilot's tool does with an arm that is wrong by stated amounts."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from typer import Option
 
 from bench.pilot.hands import follow_route
 from bench.pilot.scene import PROBLEM, ROBOT, WORLD
-from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.machine import processes
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.pilot.devices.wrong_arm import Faults, WrongArm
 from rrtik_ompl.pilot.motion.supervisor import FOLLOW_SECONDS
@@ -86,16 +83,12 @@ def row(kind: str, hasty: bool, count: int) -> list[str]:
             shares["touched"], *ends]  # fmt: skip
 
 
-def main() -> None:
-    """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--routes", type=int, default=20, help="of each arm and each kind of hands")
-    add_options(parser, "wrong_arm.md")
-    options = parser.parse_args()
-    command = f"python bench/pilot/wrong_arm.py --routes {options.routes} --jobs {options.jobs}"
-    report = Report("An arm that is wrong", command, processes(options.jobs))
-    with Parts(options.out, options.jobs) as parts:
-        rows = parts(row, [(kind, hasty, options.routes) for kind in KINDS for hasty in (False, True)])
+def main(
+    run: Run, parts: Parts, *, routes: Annotated[int, Option(help="Of each arm and each kind of hands.")] = 20
+) -> Report:
+    """Measure."""
+    report = run.report("An arm that is wrong")
+    rows = parts(row, [(kind, hasty, routes) for kind in KINDS for hasty in (False, True)])
     for cells in rows:
         if cells[0] == "none":
             ends = f"{cells[0]}, {cells[1]}: tip from the end of its route, worst"
@@ -109,8 +102,4 @@ def main() -> None:
             report.bar(ends, "100 % refused" if late else "100 % done", measured, cells[4 if late else 3] == "100")
     report.table("What became of the routes", HEADS, rows)
     report.note("How", INTRO)
-    report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+    return report

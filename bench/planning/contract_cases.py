@@ -1,16 +1,12 @@
 """Contract cases drawn by hypothesis over spaces, goals, checkers and conditions, for every planner of ours, no World.
 
-Usage: ``python bench/planning/contract_cases.py [--cases 100000]``; with ``--turning`` all spaces have coordinates of
-SO(2), and the page is ``contract_cases_turning.md``. Cases come in blocks, one seed each; what is done is kept in a
-file ``.jsonl`` beside the page, so that a later run goes on there.
+Cases come in blocks, one seed each; an interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 from collections import Counter
-from pathlib import Path
+from collections.abc import Sequence
 from time import monotonic, process_time
 
 import numpy as np
@@ -20,7 +16,8 @@ from ompl import geometric as og
 from ompl import util as ou
 
 from bench.planning.contract_questions import CHECKERS, CONDITIONS, GOALS, PLANNERS, Case, cases, goal_of, setup_of
-from bench.shared.pages import add_out
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 
 BLOCK, ALL, ALL_TURNING = 200, 100_000, 10_000
@@ -108,18 +105,10 @@ def block(number: int, turning: bool, count: int = BLOCK) -> tuple[Counter[str],
     return statuses, wrong
 
 
-def page(file: Path, wanted: int, turning: bool) -> Report:
-    """Ask until so many cases are done, and say what came out."""
-    done = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-    while sum(sum(each["statuses"].values()) for each in done) < wanted:
-        statuses, wrong = block(len(done), turning)
-        done.append({"statuses": dict(statuses), "wrong": wrong})
-        with file.open("a") as kept:
-            kept.write(json.dumps(done[-1]) + "\n")
-    total = sum((Counter(each["statuses"]) for each in done), Counter())
-    faults = [line for each in done for line in each["wrong"]]
-    title, option = ("Contract cases with angles", " --turning") if turning else ("Contract cases", "")
-    report = Report(title, f"python bench/planning/contract_cases.py --cases {wanted}{option}")
+def fill(report: Report, done: Sequence[tuple[Counter[str], list[str]]], turning: bool) -> None:
+    """What came out of all blocks."""
+    total = sum((statuses for statuses, _ in done), Counter[str]())
+    faults = [line for _, wrong in done for line in wrong]
     size = ALL_TURNING if turning else ALL
     report.bar("cases", f"{size}", f"{total.total()}", total.total() >= size)
     report.bar("with a fault: a crash, an exception, a path that is none, an end too late", "0", f"{len(faults)}",
@@ -134,21 +123,17 @@ def page(file: Path, wanted: int, turning: bool) -> Report:
         f"NumPy one, an exception after 20 calls), conditions ({', '.join(CONDITIONS)}); {1e3 * MOST:g} ms a search. "
         "A crash is right where the checker is not.",
     )
+
+
+def page(run: Run, parts: Parts, count: int, turning: bool) -> Report:
+    """At least so many cases, and the page that says what came out."""
+    ou.setLogLevel(ou.LogLevel.LOG_NONE)
+    done = parts(block, [(number, turning) for number in range(-(-count // BLOCK))])
+    report = run.report("Contract cases with angles" if turning else "Contract cases")
+    fill(report, done, turning)
     return report
 
 
-def main() -> int:
-    """Ask and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, help=f"default {ALL}, or {ALL_TURNING}")
-    parser.add_argument("--turning", action="store_true", help="spaces with coordinates of SO(2)")
-    add_out(parser, "contract_cases.md")
-    options = parser.parse_args()
-    ou.setLogLevel(ou.LogLevel.LOG_NONE)
-    out = options.out.with_stem(options.out.stem + "_turning") if options.turning else options.out
-    wanted = options.cases or (ALL_TURNING if options.turning else ALL)
-    return page(out.with_suffix(".jsonl"), wanted, options.turning).finish(out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+def main(run: Run, parts: Parts, *, cases: int = ALL) -> Report:
+    """Ask."""
+    return page(run, parts, cases, turning=False)

@@ -1,21 +1,21 @@
 """How much `plan(improve=)` leaves to the best known lengths, over time: Panda problems of MotionBenchMaker.
 
-Usage: ``python bench/planning/improving.py FOLDER [--problems 3] [--seeds 3]``: so many problems of each family, spread
-over it. Lengths are compared with the shortest ones known (`bench/data/mbm_best.csv`).
+Lengths are compared with the shortest ones known (`bench/data/mbm_best.csv`).
 """
 
 from __future__ import annotations
 
-import argparse
 import csv
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 import rrtik_ompl as rrtik
-from bench.shared.pages import add_out
+from bench.shared.run import PandaSet, Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
@@ -63,9 +63,8 @@ def improved(folder: Path, name: str, best: float, seeds: int) -> list[Improved]
     return found
 
 
-def page(results: list[Improved]) -> Report:
+def fill(report: Report, results: list[Improved]) -> None:
     """What came out."""
-    report = Report("Paths that go on getting shorter", "python bench/planning/improving.py FOLDER")
     over, at = np.array([each.over for each in results]), TIMES.index(JUDGED)
     middle, worst = float(np.median(over[:, at])), float(over[:, at].max())
     report.bar(f"over the best known after {JUDGED:g} s, median", f"{MEDIAN:.0%}", f"{middle:.2%}", middle <= MEDIAN)
@@ -81,24 +80,21 @@ def page(results: list[Improved]) -> Report:
     last = sorted(results, key=lambda each: -each.over[at])[:SHOWN]
     rows = [[f"{each.problem}, seed {each.seed}", *(f"{value:.1%}" for value in each.over)] for each in last]
     report.table(f"The worst ones after {JUDGED:g} s", ["problem", *heads[1:]], rows)
-    return report
 
 
-def main() -> int:
-    """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--problems", type=int, default=3)
-    parser.add_argument("--seeds", type=int, default=3)
-    add_out(parser, "improving.md")
-    options = parser.parse_args()
+def main(
+    run: Run,
+    folder: PandaSet,
+    *,
+    problems: Annotated[int, Option(help="Of each family, spread over it.")] = 3,
+    seeds: int = 3,
+) -> Report:
+    """Measure."""
     time.perf_counter = time.monotonic = time.process_time  # all limits are of the processor
     results = []
-    for name, best in chosen(options.problems).items():
-        results += improved(options.folder, name, best, options.seeds)
+    for name, best in chosen(problems).items():
+        results += improved(folder, name, best, seeds)
         print(name, np.round(100.0 * results[-1].over, 1), flush=True)
-    return page(results).finish(options.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    report = run.report("Paths that go on getting shorter")
+    fill(report, results)
+    return report

@@ -1,8 +1,5 @@
 """Length over time on Panda problems: `plan(improve=)`, OMPL's AORRTC and BIT*, roboplan with its shortening.
 
-Usage: ``python bench/planning/over_time.py FOLDER [--python VENV/bin/python] [--problems 3] [--seeds 1]``: so many
-problems of each family, spread over it. ``--python`` is the interpreter of an environment with roboplan.
-
 OMPL's planners ask our world, exactly as `plan()` does, and stop when a time of the processor has passed; so does
 roboplan, in a process of its own, by its own checks (32 a radian). A path counts if our second check finds nothing.
 Each time is a run of its own, with the same seed; `plan(improve=)` runs once, and its course is read.
@@ -10,26 +7,26 @@ Each time is a run of its own, with the same seed; `plan(improve=)` runs once, a
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 import warnings
 from collections.abc import Callable
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated
 
 import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
+from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.peers.description import task_of
 from bench.peers.host import Host
 from bench.planning.improving import JUDGED, TIMES, WORST, chosen
-from bench.shared.pages import add_out
+from bench.shared.run import PandaSet, Roboplan, Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ompl_bridge.setup import exact_path
@@ -83,9 +80,8 @@ def compared(problem: rrtik.Problem, host: Host | None, seeds: int) -> dict[str,
     return found
 
 
-def page(over: dict[str, Matrix], problems: int) -> Report:
+def fill(report: Report, over: dict[str, Matrix], problems: int) -> None:
     """What came out, of lengths over the best known ones, shape (runs, times) of each method."""
-    report = Report("Length over time, beside others", "python bench/planning/over_time.py FOLDER --python PYTHON")
     at = TIMES.index(JUDGED)
     middle = {name: float(np.median(each[:, at])) for name, each in over.items()}
     best = min(middle.values())
@@ -107,41 +103,35 @@ def page(over: dict[str, Matrix], problems: int) -> Report:
         "second check takes. OMPL's planners ask our world about each motion from Python; loading and set-up are "
         "not counted for anybody. Best known: the shortest paths of all searches so far (`bench/data/mbm_best.csv`).",
     )
-    return report
 
 
 def _percent(value: float) -> str:
     return f"{value:.2%}" if np.isfinite(value) else "-"
 
 
-def main() -> int:
-    """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--python", default=sys.executable, help="interpreter of an environment with roboplan")
-    parser.add_argument("--problems", type=int, default=3, help="of each family")
-    parser.add_argument("--seeds", type=int, default=1)
-    add_out(parser, "over_time.md")
-    given = parser.parse_args()
+def main(
+    run: Run,
+    folder: PandaSet,
+    *,
+    python: Roboplan = sys.executable,
+    problems: Annotated[int, Option(help="Of each family, spread over it.")] = 3,
+    seeds: int = 1,
+) -> Report:
+    """Measure."""
     warnings.simplefilter("ignore")
     ou.setLogLevel(ou.LogLevel.LOG_NONE)
     time.perf_counter = time.monotonic = time.process_time  # limits of `plan()` are of the processor
     over: dict[str, list[Vector]] = {}
-    picked = chosen(given.problems)
-    with ExitStack() as open_:
-        host: Host | None = open_.enter_context(Host("roboplan improve", given.python))
-        if host is not None and host.absent:
-            print(f"roboplan is absent: {host.absent}", flush=True)
-            host = None
+    picked = chosen(problems)
+    with Host("roboplan improve", python) as roboplan:
+        if roboplan.absent:
+            print(f"roboplan is absent: {roboplan.absent}", flush=True)
+        host = None if roboplan.absent else roboplan
         for name, best in picked.items():
-            problem = load_motion_bench_maker(
-                given.folder / "problems" / f"{name}.yaml", robot=given.folder / "panda.urdf"
-            )
-            for method, lengths in compared(problem, host, given.seeds).items():
+            problem = load_motion_bench_maker(folder / "problems" / f"{name}.yaml", robot=folder / "panda.urdf")
+            for method, lengths in compared(problem, host, seeds).items():
                 over.setdefault(method, []).extend(each / best - 1.0 for each in lengths)
                 print(name, method, np.round(100.0 * over[method][-1], 1), flush=True)
-    return page({name: np.array(each) for name, each in over.items()}, len(picked)).finish(given.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    report = run.report("Length over time, beside others")
+    fill(report, {name: np.array(each) for name, each in over.items()}, len(picked))
+    return report

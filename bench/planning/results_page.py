@@ -1,30 +1,25 @@
 """The results page of the documents: what campaigns of `rrtik bench` have measured, in one short table each.
 
-    rrtik bench scenarios --jobs 2
-    rrtik bench titan4_families --jobs 2
-    rrtik bench scaling --jobs 2
-    rrtik bench soak
-    python bench/planning/results_page.py bench-scenarios bench-titan4_families bench-scaling bench-soak
-
-Each folder is one that ``rrtik bench`` has written. The section of docs/results.md between its two marks is replaced,
-and nothing in it is typed by hand.
+The campaigns are those of the suites scenarios, titan4_families, scaling (each with ``--jobs 2``) and soak. The section
+of docs/results.md between its two marks is replaced, and nothing in it is typed by hand.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Argument, Option
 
-from bench.shared.pages import REPORTS
+from bench.shared.run import REPORTS
 from rrtik_ompl.benchmark.records import NAME, read_records
 from rrtik_ompl.benchmark.report import read_campaign
 from rrtik_ompl.benchmark.statistics import Result, Spread
 from rrtik_ompl.benchmark.tables import conditions, failures, figure, markdown_table
 
-BEGIN, END = "<!-- results: written by bench/planning/results_page.py -->", "<!-- end of results -->"
+BEGIN, END = "<!-- results: written by python -m bench results_page -->", "<!-- end of results -->"
 HEAD = (
     *("planner", "solved / valid / total", "planning, median / 95 % [ms]", "shortening [ms]", "final length"),
     "final transitions",
@@ -114,16 +109,11 @@ def replaced(text: str, lines: Sequence[str]) -> str:
     return "\n".join([before + BEGIN, "", *lines, END + after])
 
 
-def main() -> None:
+def main(
+    folders: Annotated[list[Path], Argument(help="That `rrtik bench` has written, as bench-scenarios.")],
+    page: Annotated[Path, Option(help="With the two marks.")] = REPORTS.parent.parent / "docs" / "results.md",
+) -> None:
     """Read the campaigns and write the section."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", type=Path, nargs="+", help="of campaigns")
-    parser.add_argument("--readme", type=Path, default=REPORTS.parent.parent / "docs" / "results.md")
-    options = parser.parse_args()
-    lines = [line for folder in options.folders for line in section(folder)]
-    options.readme.write_text(replaced(options.readme.read_text(), lines))
+    lines = [line for folder in folders for line in section(folder)]
+    page.write_text(replaced(page.read_text(), lines))
     print("\n".join(lines))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,19 +1,17 @@
 """Roadmaps of the Panda's MotionBenchMaker scenes: making one, a thousand queries, an obstacle that moves.
 
-Usage: ``python bench/planning/roadmaps.py FOLDER [--queries 1000]``: the first problem of each family. FOLDER is the
-unpacked set (see bench/README.md).
+The first problem of each family.
 """
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
 
 import numpy as np
 
-from bench.shared.pages import add_out
+from bench.shared.run import PandaSet, Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl import Problem, Roadmap, World, plan, pose
 from rrtik_ompl.base.arrays import Matrix
@@ -98,9 +96,8 @@ def measured(file: Path, urdf: Path, queries: int) -> Measured:
     return Measured(file.parent.name, making, seconds, solved, moving, after, plans, others, proven)
 
 
-def page(results: list[Measured]) -> Report:
-    """The report."""
-    report = Report("Roadmaps: many queries in one world", "python bench/planning/roadmaps.py FOLDER")
+def fill(report: Report, results: list[Measured]) -> None:
+    """What came out."""
     slowest = max(float(np.median(r.queries)) for r in results)
     count = len(results[0].queries)
     what = f"{count} queries in one world: median, slowest of {len(results)} worlds"
@@ -129,21 +126,12 @@ def page(results: list[Measured]) -> Report:
         f"checked as queries come to them. `plan()` on the roadmap, with proofs, is for the first {PLANNED}; beside "
         "it `plan()` with `fastrrtconnect`. Most pairs see each other; a roadmap serves where they do not.",
     )
-    return report
 
 
-def main() -> int:
-    """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--queries", type=int, default=1000)
-    add_out(parser, "roadmaps.md")
-    options = parser.parse_args()
-    families = sorted(path for path in (options.folder / "problems").glob("*") if path.is_dir())
+def main(run: Run, folder: PandaSet, *, queries: int = 1000) -> Report:
+    """Measure."""
+    families = sorted(path for path in (folder / "problems").glob("*") if path.is_dir())
     files = [next(iter(sorted(family.glob("*.yaml")))) for family in families]
-    results = [measured(file, options.folder / "panda.urdf", options.queries) for file in files]
-    return page(results).finish(options.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    report = run.report("Roadmaps: many queries in one world")
+    fill(report, [measured(file, folder / "panda.urdf", queries) for file in files])
+    return report

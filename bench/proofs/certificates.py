@@ -1,12 +1,11 @@
 """Make random paths that are proven free, verify the certificate of each, and tamper with all of them.
 
-Usage: ``python -m bench.proofs.certificates [--paths 1000] [--seed 0]``. Exit code 0 if each certificate is accepted
-and each falsified one refused, else 1. Certificates are written to text and read again on their way.
+Exit code 0 if each certificate is accepted and each falsified one refused, else 1. Certificates are written to text and
+read again on their way.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from collections import Counter
@@ -57,20 +56,12 @@ def tampered(case: Case, rng: np.random.Generator) -> Counter[str]:
     return counts
 
 
-def main(arguments: list[str] | None = None) -> int:
+def main(paths: int = 1000, seed: int = 0) -> int:
     """Print the counts; exit code 1 if one of them should be 0."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--paths", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args(arguments)
-    counts = measured(given.paths, given.seed)
-    mean = {name: counts.pop(name) / max(1, given.paths) for name in ("microseconds of verifying", "bytes")}
+    counts = measured(paths, seed)
+    mean = {name: counts.pop(name) / max(1, paths) for name in ("microseconds of verifying", "bytes")}
     for name, count in sorted(counts.items()):
         print(f"{count:8d}  {name}")
     print(f"{1e-3 * mean['microseconds of verifying']:8.1f}  ms to read and verify one, on average")
     print(f"{1e-3 * mean['bytes']:8.1f}  kB of each, on average")
     return 1 if any(name.startswith("WRONG") for name in counts) else 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

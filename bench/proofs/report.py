@@ -1,28 +1,27 @@
-"""Measure proofs of motions: what they cost, what they find, and what is left of shortened paths.
+"""Proofs of motions: what they cost, what they find, and what is left of shortened paths.
 
-Usage: ``python bench/proofs/report.py [--scenes 6] [--shortened 4] [--plane 30] [--certificates 60] [--mbm FOLDER]
-       [--every 2] [--out FILE]``
-
-FOLDER holds mbm_panda and mbm_ur5 (MotionBenchMaker problems with their URDF); without it those rows are left out.
 An interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from itertools import product
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 from bench.proofs.certificates import verified
 from bench.proofs.measurements import Judged, Timed, batch_ratio, benchmark_problem, planned, planted, shortened
 from bench.proofs.plane import plane_shortened
 from bench.proofs.tampering import TAMPERINGS
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.machine import processes, processor
 from rrtik_bench.report.page import Report
+from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.planning.generated_problems import FAMILIES
 from rrtik_ompl.planning.shortening import METHODS
 
@@ -177,31 +176,27 @@ MBM = (
 )
 
 
-def main() -> None:
-    """Run everything and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=6, help="of each arm and family")
-    parser.add_argument("--shortened", type=int, default=4, help="scenes of each arm and family that are shortened")
-    parser.add_argument("--planted", type=int, default=15, help="rounds of planted obstacles of each arm")
-    parser.add_argument("--plane", type=int, default=30, help="arms in the plane whose paths are shortened")
-    parser.add_argument("--certificates", type=int, default=60, help="paths whose certificates are falsified")
-    parser.add_argument("--arms", nargs="+", default=list(ARMS))
-    parser.add_argument("--mbm", type=Path, help="folder with mbm_panda and mbm_ur5")
-    parser.add_argument("--every", type=int, default=2, help="every so many-th of these problems")
-    add_options(parser, "proofs.md")
-    options = parser.parse_args()
-    where = f"{processes(options.jobs)}, {processor()}"
-    report = Report("Proofs of motions", "python bench/proofs/report.py", where)
-    with Parts(options.out, options.jobs) as measure:
-        if options.mbm is not None:
-            benchmarks(report, measure, options.mbm, options.every)
-        plans(report, measure, options.scenes, options.arms)
-        thin(report, measure, options.planted, options.arms)
-        shortenings(report, measure, options.shortened, [arm for arm in SHORTENED_ARMS if arm in options.arms])
-        in_the_plane(report, measure, options.plane)
-        certificates(report, measure, options.certificates)
-        report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    scenes: Annotated[int, Option(help="Of each arm and family.")] = 6,
+    shortened: Annotated[int, Option(help="Scenes of each arm and family that are shortened.")] = 4,
+    planted: Annotated[int, Option(help="Rounds of planted obstacles of each arm.")] = 15,
+    plane: Annotated[int, Option(help="Arms in the plane whose paths are shortened.")] = 30,
+    certified: Annotated[int, Option("--certificates", help="Paths whose certificates are falsified.")] = 60,
+    arms: Annotated[list[str] | None, Option(help="This arm; may be repeated.")] = None,
+    mbm: Annotated[Path | None, Option(help="Holds mbm_panda and mbm_ur5; without it those rows are left out.")] = None,
+    every: Annotated[int, Option(help="Every so many-th of these problems.")] = 2,
+) -> Report:
+    """Measure."""
+    chosen = [one_of(ARMS, name, "arm") for name in arms or ARMS]
+    report = run.report("Proofs of motions", f"{processes(run.jobs)}, {processor()}")
+    if mbm is not None:
+        benchmarks(report, parts, mbm, every)
+    plans(report, parts, scenes, chosen)
+    thin(report, parts, planted, chosen)
+    shortenings(report, parts, shortened, [arm for arm in SHORTENED_ARMS if arm in chosen])
+    in_the_plane(report, parts, plane)
+    certificates(report, parts, certified)
+    return report

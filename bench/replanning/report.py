@@ -1,27 +1,24 @@
-"""Measure DRRT-Con [1, ch. 5.2] in the plane and on arms, and write what was wanted and measured as Markdown.
+"""DRRT-Con [1, ch. 5.2] in the plane and on arms, beside planning from scratch.
 
-Usage: ``nice python bench/replanning/report.py [--jobs 2] [--repeats 30] [--runs 1000]``
-
-Times are of the processor, so that runs beside each other are fair. An interrupted run goes on
-where it was.
+Times are of the processor, so that runs beside each other are fair. An interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
 from itertools import groupby
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.replanning import runs, scenes
 from bench.replanning.arms import HEAD, arm_rows, contacts, figures, repair_rows
 from bench.replanning.runs import outcome
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
 from bench.shared.problems import goal_joints
-from rrtik_bench.report.machine import processes
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_worlds import Plane
 from rrtik_ompl.replanning import ReplanRun, replan
@@ -200,21 +197,21 @@ def part(section: str, amount: int) -> Report:
     return report
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--repeats", type=int, default=30, help="runs of each scene in the plane")
-    parser.add_argument("--runs", type=int, default=1000, help="runs of DRRT-Con of each arm")
-    add_options(parser, "drrt_con.md")
-    given = parser.parse_args()
-    report = Report("DRRT-Con", "python bench/replanning/report.py", processes(given.jobs))
-    parts = [("plane", given.repeats), ("repairs", max(given.repeats // 3, 2))]
-    with Parts(given.out, given.jobs) as measure:
-        for section in measure(part, parts):
-            report.add(section)
-        report.save(given.out)
-        arm_rows(report, given.runs, measure)
-        report.note("How it is read", READING)
-        report.save(given.out)
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    repeats: Annotated[int, Option(help="Runs of each scene in the plane.")] = 30,
+    runs: Annotated[int, Option(help="Runs of DRRT-Con of each arm.")] = 1000,
+) -> Report:
+    """Measure."""
+    report = run.report("DRRT-Con")
+    for section in parts(part, [("plane", repeats), ("repairs", max(repeats // 3, 2))]):
+        report.add(section)
+    report.save(run.out)
+    arm_rows(report, runs, parts)
+    report.note("How it is read", READING)
+    return report
 
 
 READING = (
@@ -229,6 +226,3 @@ READING = (
     "whole tick also packs the moved obstacles, checks the path and steps. Times are of the "
     "processor. Of the baselines fewer runs were made, of 6 s at most; drrt has one tick for a repair."
 )
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,4 @@
-"""Verdicts of worlds at the very contact, judged by another instrument; makes `bench/reports/contact.md`.
-
-    python bench/robustness/contact.py --configurations 2000000
+"""Verdicts of worlds at the very contact, judged by another instrument.
 
 Random worlds of twelve robots hold every kind of obstacle. A free and a colliding configuration are brought together by
 halving, with the world's own `valid_batch`, until no point of the arm moves more than 10 nm from one to the other; then
@@ -9,22 +7,22 @@ the judge measures how far the bodies are apart. What is done stands beside the 
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 from bench.robustness.contact_judge import Judge, Nearest
 from bench.robustness.contact_worlds import ROBOTS, contact_world
-from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.machine import processes
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl import World
 from rrtik_ompl.base.arrays import Matrix
 
-PAGE = "contact.md"
 ALLOWED = 2e-6  # [m]
 WIDTH = 1e-8  # [m] between the free and the colliding side
 DRAWN = 2000
@@ -96,21 +94,19 @@ def _count(found: Found, nearest: Nearest, q: list[float]) -> None:
         found.wrong.append(f"{nearest.pair}: {1e6 * nearest.gap:.2f} um at {q}")
 
 
-def main() -> int:
-    """Judge, and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    add_options(parser, PAGE)
-    parser.add_argument("--configurations", type=int, default=60_000, help="in all; 2,000,000 are wanted")
-    parser.add_argument("--contacts", type=int, default=200, help="of a world, with a configuration on either side")
-    given = parser.parse_args()
-    worlds = max(1, round(given.configurations / (2 * given.contacts * len(ROBOTS))))
-    command = f"python bench/robustness/contact.py --configurations {given.configurations} --contacts {given.contacts}"
-    report = Report("Verdicts at contact, judged by another instrument", command, processes(given.jobs))
-    with Parts(given.out, given.jobs) as parts:
-        parts_of_all = [(robot, seed, given.contacts) for seed in range(worlds) for robot in ROBOTS]
-        found = parts(contacts, parts_of_all)
-        write(report, {robot: found[k :: len(ROBOTS)] for k, robot in enumerate(ROBOTS)})
-        return report.finish(given.out)
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    configurations: Annotated[int, Option(help="In all; 2,000,000 are wanted.")] = 60_000,
+    wanted: Annotated[int, Option("--contacts", help="Of a world, with a configuration on either side.")] = 200,
+) -> Report:
+    """Judge."""
+    worlds = max(1, round(configurations / (2 * wanted * len(ROBOTS))))
+    found = parts(contacts, [(robot, seed, wanted) for seed in range(worlds) for robot in ROBOTS])
+    report = run.report("Verdicts at contact, judged by another instrument")
+    write(report, {robot: found[k :: len(ROBOTS)] for k, robot in enumerate(ROBOTS)})
+    return report
 
 
 def write(report: Report, found: dict[str, Sequence[Found]]) -> None:
@@ -150,7 +146,3 @@ def write(report: Report, found: dict[str, Sequence[Found]]) -> None:
         :40
     ]
     report.note("What was wrong", "\n".join(lines) or "Nothing.")
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

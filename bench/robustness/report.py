@@ -1,7 +1,4 @@
-"""Attacks on the public face, the servers and long work: how many, and what broke; makes `bench/reports/robustness.md`.
-
-    python bench/robustness/report.py --calls 1000000 --messages 10000 --faults 100 --kills 200 --plans 20000 \
-        --pages 2000 --bad 2200
+"""Attacks on the public face, the servers and long work: how many, and what broke.
 
 The stored page says at which sizes it was made. What is done stands beside the page until that is written: an
 interrupted run goes on where it was.
@@ -9,26 +6,26 @@ interrupted run goes on where it was.
 
 from __future__ import annotations
 
-import argparse
 import gc
-import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated
+
+from typer import Option
 
 from bench import fuzz
 from bench.robustness import bad_clients, bad_pages, faults
 from bench.robustness.bad_inputs import bad
 from bench.robustness.long_work import WORK
-from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.machine import processes
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, plan, view
+from rrtik_ompl.base.choices import one_of
 
-PAGE = "robustness.md"
 CALLS, MESSAGES, INPUTS, TRIALS = fuzz.BATCH, 480, 25, 10  # of a part
 LOOKS = 4
-SIZES = {"calls": 2000, "messages": 960, "faults": 5, "kills": 20, "plans": 400, "pages": 40, "bad": 100}
 FLAT_MB = 1.0
 PEERS: dict[str, tuple[str, Callable[[int, int], list[str]]]] = {
     "line server": ("a client of the arm's line: the arm stops, the next is served", bad_clients.line_server),
@@ -73,41 +70,37 @@ def _resident() -> float:
     return int(words[1]) * 4096 / 1e6
 
 
-def main() -> int:
-    """Attack, and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    add_options(parser, PAGE)
-    for name, usual in SIZES.items():
-        parser.add_argument(f"--{name}", type=int, default=usual)
-    parser.add_argument(
-        "--works", nargs="+", choices=list(WORK), default=list(WORK), help="long work that is disturbed"
-    )
-    parser.add_argument(
-        "--few", nargs="+", choices=list(WORK), default=[], help="long work with one trial of each fault"
-    )
-    given = parser.parse_args()
-    command = " ".join(
-        f"--{name} {getattr(given, name)}" for name in ("calls", "messages", "faults", "kills", "plans", "pages", "bad")
-    )
-    if given.works != list(WORK):
-        command += f" --works {' '.join(map(shlex.quote, given.works))}"
-    if given.few:
-        command += f" --few {' '.join(map(shlex.quote, given.few))}"
-    report = Report("Nothing breaks it", f"python bench/robustness/report.py {command}", processes(given.jobs))
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    fuzzed: Annotated[int, Option("--calls", help="Of public functions, commands and readers of files.")] = 2000,
+    sent: Annotated[int, Option("--messages", help="To each server.")] = 960,
+    faulty: Annotated[int, Option("--faults", help="Trials of each fault of each long work.")] = 5,
+    kills: Annotated[int, Option(help="Of each long work.")] = 20,
+    plans: Annotated[int, Option(help="Over which the memory is watched.")] = 400,
+    pages: Annotated[int, Option(help="Over which the memory is watched.")] = 40,
+    inputs: Annotated[int, Option("--bad", help="Inputs that are all bad.")] = 100,
+    works: Annotated[list[str] | None, Option(help="Long work that is disturbed; may be repeated.")] = None,
+    few: Annotated[list[str] | None, Option(help="Long work with one trial of each fault; may be repeated.")] = None,
+) -> Report:
+    """Attack."""
+    disturbed = [one_of(WORK, name, "long work") for name in works or WORK]
+    rarely = [one_of(WORK, name, "long work") for name in few or ()]
+    report = run.report("Nothing breaks it")
     report.intro = (
         "Wanted are 1,000,000 calls, 10,000 messages to each server, 2,000 kills and interrupts, 20,000 plans and "
         "2,000 pages, 2,000 bad inputs; the numbers below are those of this run. Of the calls a quarter are files that "
         "are spoilt and read, a twentieth commands, the rest public functions and methods, of whose values three in "
         "five fit their parameter."
     )
-    with Parts(given.out, given.jobs) as parts:
-        _calls(report, parts(calls, _blocks(given.calls, CALLS)), given.calls)
-        _bad_inputs(report, parts(bad, _blocks(given.bad, INPUTS)), given.bad)
-        _peers(report, parts, given.messages)
-        _faults(report, parts, (given.faults, given.kills), given.works, given.few)
-        for what, count in (("plans", given.plans), ("pages", given.pages)):
-            _memory(report, what, count, parts(memory, [(what, count)])[0])
-    return report.finish(given.out)
+    _calls(report, parts(calls, _blocks(fuzzed, CALLS)), fuzzed)
+    _bad_inputs(report, parts(bad, _blocks(inputs, INPUTS)), inputs)
+    _peers(report, parts, sent)
+    _faults(report, parts, (faulty, kills), disturbed, rarely)
+    for what, count in (("plans", plans), ("pages", pages)):
+        _memory(report, what, count, parts(memory, [(what, count)])[0])
+    return report
 
 
 def _blocks(count: int, size: int) -> list[tuple[int, int]]:
@@ -165,7 +158,3 @@ def _memory(report: Report, what: str, count: int, sizes: Sequence[float]) -> No
 
 def _listed(wrong: Sequence[str]) -> str:
     return "None." if not wrong else "\n".join(f"- `{each.replace('`', '')[:300]}`" for each in wrong)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

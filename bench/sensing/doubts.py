@@ -1,24 +1,22 @@
 """A camera or a marker that is not as its file says: stated, it is in the covariance; not stated, two markers show it.
 
-Usage: ``python bench/sensing/doubts.py [--pictures 40] [--jobs N] [--out bench/reports/doubts.md]``
-
 Pictures are rendered by `stress_pictures`; their seeds are held out.
 """
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from typer import Option
 
 from bench.sensing.stress import CAMERA, DICTIONARY, LENS, NEAR, SEED, SLANTED, judged
 from bench.sensing.stress_pictures import SIDE, Trouble, facing, taken
-from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.machine import processes
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -116,18 +114,12 @@ def _picture(places: tuple[Any, ...], k: int) -> tuple[Any, NDArray[np.uint8]]:
             return truth, taken(CAMERA, prints, DICTIONARY, Trouble(), rng)
 
 
-def main() -> None:
-    """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pictures", type=int, default=40, help="of each case")
-    add_options(parser, "doubts.md")
-    options = parser.parse_args()
-    command = f"python bench/sensing/doubts.py --pictures {options.pictures} --jobs {options.jobs}"
-    report = Report("Cameras and markers that are not as their files say", command, processes(options.jobs), INTRO)
-    cases = [(wrong, markers, stated, options.pictures) for wrong in range(len(WRONGS)) for markers in PLACES
+def main(run: Run, parts: Parts, *, pictures: Annotated[int, Option(help="Of each case.")] = 40) -> Report:
+    """Measure."""
+    report = run.report("Cameras and markers that are not as their files say", intro=INTRO)
+    cases = [(wrong, markers, stated, pictures) for wrong in range(len(WRONGS)) for markers in PLACES
              for stated in ((False,) if wrong == 0 else (True, False))]  # fmt: skip
-    with Parts(options.out, options.jobs) as parts:
-        rows = parts(measured, cases)
+    rows = parts(measured, cases)
     for (wrong, markers, stated, _), row in zip(cases, rows, strict=True):
         name = f"{WRONGS[wrong].name} wrong, {markers}"
         if stated or wrong == 0:
@@ -135,8 +127,4 @@ def main() -> None:
         elif len(PLACES[markers]) > 1:
             report.bar(f"{name}, not stated", "refused", f"{row.refused:.0f} % refused", row.refused == 100.0)
     report.table("Cases", HEADS, [row.cells for row in rows])
-    report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+    return report

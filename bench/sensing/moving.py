@@ -1,26 +1,24 @@
 """Targets that move, and photographs that are no film: how far off what the sensor says is, and whether it says so.
 
-Usage: ``python bench/sensing/moving.py [--pictures 90] [--jobs N] [--out bench/reports/moving.md]``
-
 Pictures are rendered by `stress_pictures`; their seeds are held out.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from typer import Option
 
 from bench.sensing.stress import CAMERA, DICTIONARY, NEAR, SEED, SLANTED, Outcome, judged, marker_map
 from bench.sensing.stress_pictures import Trouble, facing, taken
-from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.machine import processes
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.arrays import TAU
 from rrtik_ompl.sensing.cameras.pictures import Picture
@@ -109,25 +107,17 @@ def photographs(count: int) -> Report:
     return report
 
 
-def main() -> None:
-    """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pictures", type=int, default=90, help="of each target, and photographs")
-    add_options(parser, "moving.md")
-    options = parser.parse_args()
-    command = f"python bench/sensing/moving.py --pictures {options.pictures} --jobs {options.jobs}"
-    report = Report("Targets that move, photographs that do not", command, processes(options.jobs))
-    with Parts(options.out, options.jobs) as parts:
-        rows = parts(moving, [(name, options.pictures) for name in TARGETS])
-        middle = float(rows[0][4])
-        report.bar(f"{rows[0][0]}: median error over time", "<= 1.5 mm", f"{middle:.2f} mm", middle <= 1.5)
-        for row in rows:
-            report.bar(f"{row[0]}: within 3 sigma over time", ">= 95 %", f"{row[6]} %", float(row[6]) >= 95.0)
-        (part,) = parts(photographs, [(options.pictures,)])
-        report.add(part)
-        report.table(f"Targets, {RATE:g} pictures a second", HEADS, rows)
-        report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+def main(
+    run: Run, parts: Parts, *, pictures: Annotated[int, Option(help="Of each target, and photographs.")] = 90
+) -> Report:
+    """Measure."""
+    report = run.report("Targets that move, photographs that do not")
+    rows = parts(moving, [(name, pictures) for name in TARGETS])
+    middle = float(rows[0][4])
+    report.bar(f"{rows[0][0]}: median error over time", "<= 1.5 mm", f"{middle:.2f} mm", middle <= 1.5)
+    for row in rows:
+        report.bar(f"{row[0]}: within 3 sigma over time", ">= 95 %", f"{row[6]} %", float(row[6]) >= 95.0)
+    (part,) = parts(photographs, [(pictures,)])
+    report.add(part)
+    report.table(f"Targets, {RATE:g} pictures a second", HEADS, rows)
+    return report

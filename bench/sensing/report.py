@@ -1,6 +1,4 @@
-"""Measure the acceptance rows of marker sensing and of the overlay, and write them as Markdown.
-
-Usage: ``python bench/sensing/report.py [--share S] [--jobs N] [--out bench/reports/sensing.md]``
+"""Marker sensing and the overlay, on rendered pictures: published series, rendered scenes.
 
 All pictures are rendered: no camera, print or water was there. Times are processor time of one process alone, which is
 why the last section is measured when the others are done.
@@ -8,16 +6,17 @@ why the last section is measured when the others are done.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
+from typing import Annotated
 
 import cv2
+from typer import Option
 
 from bench.sensing import overlay_frames, rendered_scenes
 from bench.sensing import rows as sensing_rows
 from bench.sensing import series as sensing_series
-from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.machine import processes
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 
 PICTURES = (
@@ -46,20 +45,16 @@ SECTIONS: tuple[tuple[Section, int], ...] = (  # and how many observations, pose
 )
 
 
-def main() -> None:
-    """Run everything and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--share", type=float, default=1.0, help="of all counts; 0.1 for a first look")
-    add_options(parser, "sensing.md")
-    options = parser.parse_args()
-    command = f"python bench/sensing/report.py --share {options.share:g} --jobs {options.jobs}"
-    report = Report("Marker sensing and overlay, on rendered pictures", command, processes(options.jobs))
+def main(
+    run: Run, parts: Parts, *, share: Annotated[float, Option(help="Of all counts; 0.1 for a first look.")] = 1.0
+) -> Report:
+    """Measure."""
+    report = run.report("Marker sensing and overlay, on rendered pictures")
     report.note("Pictures", PICTURES)
-    pieces = [(number, options.share) for number in range(len(SECTIONS))]
-    with Parts(options.out, options.jobs) as measure:
-        for part in (*measure(measured, pieces[:-1]), measured(*pieces[-1])):
-            report.add(part)
-        report.finish(options.out)
+    pieces = [(number, share) for number in range(len(SECTIONS))]
+    for part in (*parts(measured, pieces[:-1]), measured(*pieces[-1])):
+        report.add(part)
+    return report
 
 
 def measured(number: int, share: float) -> Report:
@@ -69,7 +64,3 @@ def measured(number: int, share: float) -> Report:
     report = Report("", "")
     run(report, max(round(share * count), 2))
     return report
-
-
-if __name__ == "__main__":
-    main()

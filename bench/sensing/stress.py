@@ -1,22 +1,20 @@
 """Markers under stress: 26 conditions, who is found, how far off, and whether the covariance says so.
 
-Usage: ``python bench/sensing/stress.py [--pictures 40] [--jobs N] [--out bench/reports/stress.md]``
-
 Pictures are rendered by `stress_pictures`. Their seeds are held out: nothing was tuned on them.
 """
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
+from typer import Option
 
 from bench.sensing.stress_pictures import SIDE, Trouble, facing, taken
-from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.machine import processes
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -149,26 +147,18 @@ def measured(number: int, count: int) -> Measured:
     return Measured(cells, found, within)
 
 
-def main() -> None:
-    """Measure all conditions and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pictures", type=int, default=40, help="of each condition")
-    add_options(parser, "stress.md")
-    options = parser.parse_args()
-    command = f"python bench/sensing/stress.py --pictures {options.pictures} --jobs {options.jobs}"
-    report = Report("Markers under stress", command, processes(options.jobs), INTRO)
-    with Parts(options.out, options.jobs) as parts:
-        rows = parts(measured, [(number, options.pictures) for number in range(len(CONDITIONS))])
-        for condition, row in zip(CONDITIONS, rows, strict=True):
-            report.bar(f"{condition.name}: found and accepted", f">= {max(condition.before, condition.wanted):g} %",
-                       f"{row.found:.0f} %", row.found >= max(condition.before, condition.wanted))  # fmt: skip
-            report.bar(f"{condition.name}: of those within 3 sigma", ">= 95 %",
-                       f"{row.within:.0f} %" if row.found else "none accepted", row.within >= 95.0)  # fmt: skip
-        median = float(rows[1].cells[4])
-        report.bar("clean (sRGB): median error", "<= 0.5 mm", f"{median:.2f} mm", median <= 0.5)
-        report.table("Conditions", COLUMNS, [row.cells for row in rows])
-        report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+def main(run: Run, parts: Parts, *, pictures: Annotated[int, Option(help="Of each condition.")] = 40) -> Report:
+    """Measure all conditions."""
+    report = run.report("Markers under stress", intro=INTRO)
+    rows = parts(measured, [(number, pictures) for number in range(len(CONDITIONS))])
+    for condition, row in zip(CONDITIONS, rows, strict=True):
+        wanted = max(condition.before, condition.wanted)
+        report.bar(
+            f"{condition.name}: found and accepted", f">= {wanted:g} %", f"{row.found:.0f} %", row.found >= wanted
+        )
+        report.bar(f"{condition.name}: of those within 3 sigma", ">= 95 %",
+                   f"{row.within:.0f} %" if row.found else "none accepted", row.within >= 95.0)  # fmt: skip
+    median = float(rows[1].cells[4])
+    report.bar("clean (sRGB): median error", "<= 0.5 mm", f"{median:.2f} mm", median <= 0.5)
+    report.table("Conditions", COLUMNS, [row.cells for row in rows])
+    return report

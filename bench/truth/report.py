@@ -1,25 +1,25 @@
-"""Whatever is called free, proven or exact, judged by independent means; makes `bench/reports/truth.md`.
-
-    python bench/truth/report.py [--size 1.0] [--only SECTION ...] [--jobs N]
+"""Whatever is called free, proven or exact, judged by independent means.
 
 Each module beside this one that has a function ``section(parts, size)`` is a section: it returns a `Report` whose
-acceptance rows and tables are added to the page. ``size`` scales the numbers of cases; 1 is the full size. What is done
-stands beside the page until that is written: an interrupted run goes on where it was.
+acceptance rows and tables are added to the page. What is done stands beside the page until that is written: an
+interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
 import pkgutil
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import Annotated
 
-from bench.shared.parts import Parts, add_options
-from rrtik_bench.report.machine import processes
+from typer import Option
+
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.page import Report
+from rrtik_ompl.base.choices import one_of
 
-PAGE = "truth.md"
 Section = Callable[[Parts, float], Report]
 
 
@@ -30,24 +30,18 @@ def sections() -> dict[str, Section]:
     return {name: module.section for name, module in modules.items() if hasattr(module, "section")}
 
 
-def main() -> int:
-    """Judge, and write the page."""
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    size: Annotated[float, Option(help="Share of the full numbers of cases.")] = 1.0,
+    only: Annotated[list[str] | None, Option(help="This section; may be repeated.")] = None,
+) -> Report:
+    """Judge."""
     known = sections()
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    add_options(parser, PAGE)
-    parser.add_argument("--size", type=float, default=1.0, help="share of the full numbers of cases")
-    parser.add_argument("--only", nargs="+", choices=list(known), default=list(known), help="sections")
-    given = parser.parse_args()
+    wanted = [one_of(known, name, "section") for name in only or known]
 
-    command = f"python bench/truth/report.py --size {given.size:g}"
-    if given.only != list(known):
-        command += f" --only {' '.join(given.only)}"
-    report = Report("Nothing is called free that is not", command, processes(given.jobs))
-    with Parts(given.out, given.jobs) as parts:
-        for name in given.only:
-            report.add(known[name](parts, given.size))
-    return report.finish(given.out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    report = run.report("Nothing is called free that is not")
+    for name in wanted:
+        report.add(known[name](parts, size))
+    return report

@@ -51,7 +51,6 @@ MARGIN, RATE, SPEED = 0.02, 50.0, 0.2
 ROOM = 0.05  # [m] around the arm at the beginning
 LOOKS = 6  # of the second judge in a tick
 SECONDS = 4.0
-HORIZON = 10.0  # [s] of plans in time
 SMALL = 1e-3  # [m]: of plates and needles
 ELL = np.array([[0, 0], [0.4, 0], [0.4, 0.15], [0.15, 0.15], [0.15, 0.4], [0, 0.4]])
 CORNERS = np.array([[0, 0, 0], [0.4, 0, 0], [0, 0.4, 0], [0.12, 0.12, 0.4], [0.12, 0.12, 0.06]])

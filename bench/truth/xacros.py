@@ -1,22 +1,21 @@
 """Files of macros of public repositories, expanded by the package xacro itself and by us; prints both counts.
 
-    python bench/truth/xacros.py FOLDER [FOLDER ...]
-
-Each folder is a copy of a repository. Each of its files named ``.xacro`` is expanded without arguments: in this process
-by the package alone, which can run anything (so only for folders that you trust), and by `robot_text`.
+Each file named ``.xacro`` is expanded without arguments: in this process by the package alone, which can run anything
+(so only for folders that you trust), and by `robot_text`.
 """
 
 from __future__ import annotations
 
 import io
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import redirect_stderr
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import xacro
+from typer import Argument
 from xacro import substitution_args
 
 from rrtik_ompl.base.errors import InputError
@@ -69,20 +68,16 @@ def _by_xacro(file: Path, packages: list[Path]) -> str | None:
             return None
 
 
-def main(folders: list[str]) -> int:
+def main(folders: Annotated[list[Path], Argument(help="Copies of repositories.")]) -> int:
     """Count, and print what differs."""
     total: Counter[str] = Counter()
-    for name in folders:
+    for folder in folders:
         counts: Counter[str] = Counter()
-        for outcome in outcomes(Path(name).resolve()):
+        for outcome in outcomes(folder.resolve()):
             counts[outcome.kind] += 1
             if outcome.kind not in ("equal", "by neither"):
                 print(f"{outcome.file}: {outcome.kind}: {outcome.said}")
-        print(f"{Path(name).name}: {dict(counts)}")
+        print(f"{folder.name}: {dict(counts)}")
         total += counts
     print(f"all: {dict(total)}")
     return 1 if total["refused by us"] or total["other text"] else 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))

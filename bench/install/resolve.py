@@ -1,14 +1,11 @@
 """Whether a resolver finds all that the wheel needs, for machines other than this one.
 
-Usage: ``pip install uv``, then ``python bench/install/resolve_report.py [--out bench/reports/resolve.md]``; a minute.
-
-uv resolves for a named platform and version of Python, wheels alone, without installing anything. The page tells of the
-day on which it was made.
+uv (``pip install uv``) resolves for a named platform and version of Python, wheels alone, without installing anything.
+The page tells of the day on which it was made. A minute.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
@@ -20,7 +17,7 @@ from email.parser import Parser
 from pathlib import Path
 from zipfile import ZipFile
 
-from bench.shared.pages import add_out
+from bench.shared.run import Run
 from rrtik_bench.report.machine import package_version
 from rrtik_bench.report.page import Report
 
@@ -91,9 +88,8 @@ def requirements(wheel: Path) -> list[str]:
     return [line for line in said if "extra ==" not in line]
 
 
-def report(wheel: Path) -> Report:
-    """The page."""
-    page = Report("What the wheel needs, resolved for other machines", "python bench/install/resolve_report.py")
+def fill(page: Report, wheel: Path) -> None:
+    """What uv says."""
     page.intro = f"{date.today()}, {package_version('uv')}, wheels alone."
     itself = [f"rrtik-ompl @ {wheel.as_uri()}"]
     answers = {
@@ -125,17 +121,11 @@ def report(wheel: Path) -> Report:
     later = [(name, resolved(needed, PLATFORMS[name], NEXT_PYTHON).shown) for name in WANTED]
     text = "The dependencies alone; `requires-python` is raised when they resolve."
     page.table(f"Python {NEXT_PYTHON}", ("platform", ""), later, text=text)
-    return page
 
 
-def main() -> int:
-    """Write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    add_out(parser, "resolve.md")
-    out = parser.parse_args().out
+def main(run: Run) -> Report:
+    """Ask."""
+    report = run.report("What the wheel needs, resolved for other machines")
     with tempfile.TemporaryDirectory() as folder:
-        return report(built_wheel(Path(folder))).finish(out)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+        fill(report, built_wheel(Path(folder)))
+    return report

@@ -1,21 +1,20 @@
-"""The moving picture of the README and the sheet of the arms that ship with problems. Needs Chromium.
-
-Run it as ``python bench/page/pictures.py``; it writes ``panda_shelf.gif`` and ``arms.png`` to ``bench/reports``.
-"""
+"""The README's film, `panda_shelf.gif`, and its sheet of arms, `arms.png`. Needs Chromium."""
 
 from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
+from typer import Option
 
 import rrtik_ompl as rrtik
+from bench.shared.run import REPORTS
 from rrtik_ompl.viewer.film import film
 
 SEED = 1
-REPORTS = Path(__file__).parents[1] / "reports"
 ARMS = ("panda_shelf", "ur5_table", "ur10_bin", "xarm7_cage", "kinova_table", "so101_bin")
 COLUMNS, WIDTH = 3, 400  # of the sheet; of one of its pictures [px]
 
@@ -42,11 +41,7 @@ def sheet(file: Path) -> None:
     cv2.imwrite(str(file), np.vstack(rows), [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
-def main() -> None:
-    """Write both."""
-    film(*planned(ARMS[0]), REPORTS / "panda_shelf.gif", seconds=3.5, rate=10.0)
-    sheet(REPORTS / "arms.png")
-
-
-if __name__ == "__main__":
-    main()
+def main(folder: Annotated[Path, Option(help="Of the pictures.")] = REPORTS) -> None:
+    """Draw both."""
+    film(*planned(ARMS[0]), folder / "panda_shelf.gif", seconds=3.5, rate=10.0)
+    sheet(folder / "arms.png")

@@ -1,21 +1,19 @@
-"""Measure the acceptance rows of C-RDT [1, ch. 6.3] and write them as Markdown.
-
-Usage: ``python bench/moves/crdt_report.py [--runs 1000] [--arm-runs 200] [--quick] [--out bench/reports/crdt.md]``
-"""
+"""Acceptance rows of C-RDT [1, ch. 6.3] and BiCRDT."""
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
+from typer import Option
 
 import rrtik_ompl as rrtik
-from bench.shared.pages import add_out
 from bench.shared.problems import goal_joints
+from bench.shared.run import Run
 from rrtik_bench.crdt.baseline import TreeRun, crdt_run, rrt_run
 from rrtik_bench.crdt.published import CRDT_TABLE, PRISM_LIST, RRT_TABLE, SDU_LIST
 from rrtik_bench.crdt.runs import STAGES, RouteRun, best_of_groups, histogram, joints_of, route_run, share
@@ -202,28 +200,21 @@ def _share_bar(report: Report, what: str, value: float, least: float) -> None:
     report.bar(what, f">= {100 * least:.0f} %" if least < 1.0 else "always", f"{100 * value:.1f} %", value >= least)
 
 
-def main() -> None:
-    """Run everything and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=1000, help="runs in environment E")
-    parser.add_argument("--arm-runs", type=int, default=200, help="runs of each arm problem")
-    parser.add_argument("--quick", action="store_true", help="50 runs in E, 20 of each arm problem")
-    add_out(parser, "crdt.md")
-    options = parser.parse_args()
-    count, arm_count = (50, 20) if options.quick else (options.runs, options.arm_runs)
-    report = Report("C-RDT and BiCRDT: the published method, measured", "python bench/moves/crdt_report.py")
+def main(
+    run: Run,
+    *,
+    runs: Annotated[int, Option(help="In environment E.")] = 1000,
+    arm_runs: Annotated[int, Option(help="Of each arm problem.")] = 200,
+) -> Report:
+    """Measure."""
+    report = run.report("C-RDT and BiCRDT: the published method, measured")
     measured: dict[str, Measured] = {}
-    environment_e(report, rrtik.load_problem("env_e"), count)
+    environment_e(report, rrtik.load_problem("env_e"), runs)
     for name in OPTIMA:
         problem = case_a_with_room(rrtik.load_problem("planar3_a")) if name == WITH_ROOM else rrtik.load_problem(name)
-        most = count if name == "env_e" else arm_count * MORE_RUNS.get(name, 1)
-        runs = [route_run(problem, seed) for seed in range(most)]
-        measured[name] = Measured(name, problem, runs)
+        most = runs if name == "env_e" else arm_runs * MORE_RUNS.get(name, 1)
+        measured[name] = Measured(name, problem, [route_run(problem, seed) for seed in range(most)])
     route_bars(report, measured)
     routes_table(report, list(measured.values()))
     counter_bars(report)
-    report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+    return report

@@ -1,21 +1,19 @@
-"""Measure the fewest-moves planner against proven optima, the double axis cut beside it, and write them as Markdown.
-
-Usage: ``python bench/moves/fewest_moves_report.py [--runs 100] [--quick] [--out bench/reports/fewest_moves.md]``
-"""
+"""The fewest-moves planner against proven optima, and the double axis cut beside it."""
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
 import rrtik_ompl as rrtik
-from bench.moves.crdt_report import WITH_ROOM, case_a_with_room
-from bench.shared.pages import add_out
+from bench.moves.crdt import WITH_ROOM, case_a_with_room
 from bench.shared.problems import goal_joints
+from bench.shared.run import Run
 from rrtik_bench.crdt.runs import histogram, joints_of, share, sound
 from rrtik_bench.report.page import Report
 from rrtik_ompl.model.transitions import lower_bound, transitions
@@ -182,21 +180,12 @@ def tables(report: Report, results: dict[str, Measured]) -> None:
     report.note("How the bounds are proven", BOUND)
 
 
-def main() -> None:
-    """Run everything and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=100)
-    parser.add_argument("--quick", action="store_true", help="5 runs of each problem")
-    add_out(parser, "fewest_moves.md")
-    options = parser.parse_args()
-    report = Report("Fewest moves, measured", "python bench/moves/fewest_moves_report.py")
+def main(run: Run, *, runs: Annotated[int, Option(help="Of each problem.")] = 100) -> Report:
+    """Measure."""
+    report = run.report("Fewest moves, measured")
     rrtik.plan(rrtik.load_problem("titan4_sdu"), FewestMoves, seed=0)  # compiles, if need be
-    results = {name: measured(name, 5 if options.quick else options.runs) for name in NAMES}
+    results = {name: measured(name, runs) for name in NAMES}
     bars(report, results)
     tables(report, results)
     report.note("Case A", CASE_A)
-    report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+    return report

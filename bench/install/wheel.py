@@ -1,13 +1,11 @@
-"""What the built wheel holds, how long its installation takes, and what importing it costs.
+"""What the built wheel holds, how long its installation takes, and what importing it costs. For Linux.
 
-Usage: ``python bench/install/wheel_report.py [--wheel FILE] [--out bench/reports/wheel.md]``; without a wheel it makes
-one with all kernels, some minutes. The installation goes to a fresh environment, from pip's own cache: run it twice,
-and the second run is what the page should tell of. For Linux.
+Without a wheel it makes one with all kernels, some minutes. The installation goes to a fresh environment, from pip's
+own cache: run it twice, and the second run is what the page should tell of.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import subprocess
@@ -16,9 +14,12 @@ import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 from zipfile import ZipFile
 
-from bench.shared.pages import add_out
+from typer import Option
+
+from bench.shared.run import Run
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
 
@@ -49,25 +50,23 @@ FIRST_COMMAND = (
 )  # of README
 
 
-def main() -> int:
-    """Write the page."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--wheel", type=Path, help="a wheel that was built already")
-    add_out(parser, "wheel.md")
-    given = parser.parse_args()
-    report = Report("The wheel", "python bench/install/wheel_report.py")
+def main(
+    run: Run, *, built_wheel: Annotated[Path | None, Option("--wheel", help="One that was built already.")] = None
+) -> Report:
+    """Measure."""
+    report = run.report("The wheel")
     report.intro = (
         f"{versions('numpy', 'llvmlite')}. Times are processor times of all processes together; imports the least of "
         f"{ROUNDS}, memory the most that the process held."
     )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        wheel = given.wheel or built(folder)
+        wheel = built_wheel or built(folder)
         contents(report, wheel)
         python = installed(report, wheel, folder / "fresh")
         imports(report, python)
         first_command(report, python, folder)
-    return report.finish(given.out)
+    return report
 
 
 def built(folder: Path) -> Path:
@@ -180,7 +179,3 @@ def run(command: Sequence[str], **environment: str) -> float:
     subprocess.run(command, check=True, env={**os.environ, **environment})
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -1,17 +1,18 @@
-"""Proofs beside exact judges: paths in the plane, falsified certificates, free postures, singular poses; see report.py.
-
-Usage: ``python -m bench.proofs.exact [--plane 24] [--certificates 200] [--postures 20000] [--poses 1000] [--out FILE]``
+"""Proofs beside exact judges: paths in the plane, falsified certificates, free postures, singular poses.
 
 An interrupted run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
+from typing import Annotated
+
+from typer import Option
 
 from bench.proofs.postures import Free, free_postures, singular_answers
 from bench.proofs.report import ARMS, certificates, in_the_plane
-from bench.shared.parts import Parts, add_options
+from bench.shared.parts import Parts
+from bench.shared.run import Run
 from rrtik_bench.report.machine import processes, processor
 from rrtik_bench.report.page import Report
 from rrtik_robots.titan4.singular_samples import CASES
@@ -57,24 +58,19 @@ def singular(report: Report, measure: Parts, count: int) -> None:
     report.bar("TITAN-4: singular poses of every family answered inside the limits", "all", text, missed == 0)
 
 
-def main() -> None:
-    """Run everything and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--plane", type=int, default=24, help="arms in the plane whose paths are shortened")
-    parser.add_argument("--certificates", type=int, default=200, help="paths whose certificates are falsified")
-    parser.add_argument("--postures", type=int, default=20_000, help="drawn of each arm")
-    parser.add_argument("--poses", type=int, default=1000, help="singular ones of each family")
-    add_options(parser, "proofs_exact.md")
-    options = parser.parse_args()
-    where = f"{processes(options.jobs)}, {processor()}"
-    report = Report("Proofs beside exact judges", "python -m bench.proofs.exact", where)
-    with Parts(options.out, options.jobs) as measure:
-        postures(report, measure, options.postures)
-        singular(report, measure, options.poses)
-        certificates(report, measure, options.certificates)
-        in_the_plane(report, measure, options.plane)
-        report.finish(options.out)
-
-
-if __name__ == "__main__":
-    main()
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    plane: Annotated[int, Option(help="Arms in the plane whose paths are shortened.")] = 24,
+    certified: Annotated[int, Option("--certificates", help="Paths whose certificates are falsified.")] = 200,
+    drawn: Annotated[int, Option("--postures", help="Drawn of each arm.")] = 20_000,
+    poses: Annotated[int, Option(help="Singular ones of each family.")] = 1000,
+) -> Report:
+    """Measure."""
+    report = run.report("Proofs beside exact judges", f"{processes(run.jobs)}, {processor()}")
+    postures(report, parts, drawn)
+    singular(report, parts, poses)
+    certificates(report, parts, certified)
+    in_the_plane(report, parts, plane)
+    return report
