@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -14,22 +13,15 @@ from typing import Any, TextIO, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from bench.shared.pages import add_out
 from rrtik_ompl.files.text import write_text
 
 Part = Sequence[Any]  # what the work is given: plain words and numbers, files, None
 
 
-def add_options(parser: argparse.ArgumentParser, page: str) -> None:
-    """``--jobs`` and ``--out`` of a script that writes this page of `bench/reports`."""
-    parser.add_argument("--jobs", type=int, default=1, help="processes; more than one make wall times longer")
-    add_out(parser, page, "the page; what is done is kept beside it till the end")
-
-
 class Parts:
     """Calls functions for many parts of a measurement; an interrupted measurement goes on where it was.
 
-    Used with ``with``: at the end of that, unless by an error, the file is removed.
+    Used with ``with``: at the end of that the file is removed, unless an error came after something was done.
 
     Args:
         out: The page. What is done stands in `.parts.jsonl` beside it, one line each, and is not done again.
@@ -52,7 +44,7 @@ class Parts:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._file.close()
-        if kind is None:
+        if kind is None or not self._known:
             self._kept.unlink()
 
     def __call__(self, work: Callable[..., Any], parts: Sequence[Part]) -> list[Any]:

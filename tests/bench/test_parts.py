@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from bench.shared import parts
-from rrtik_tests.places import BENCH
 
 
 @dataclass
@@ -54,13 +53,10 @@ def test_several_processes_give_results_in_order_and_an_error_keeps_what_is_done
         assert len(kept.read_text().splitlines()) == 4
 
 
-def test_the_reports_share_their_options():
-    import argparse
-
-    parser = argparse.ArgumentParser()
-    parts.add_options(parser, "ikurt.md")
-    given = parser.parse_args(["--jobs", "3"])
-    assert (given.jobs, given.out) == (3, BENCH / "reports" / "ikurt.md")
+def test_an_error_before_anything_is_done_leaves_no_file(tmp_path):
+    with pytest.raises(TypeError), parts.Parts(tmp_path / "page.md", jobs=1) as measure:
+        measure(cube, [("word",)])
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_part_that_another_version_has_kept_is_measured_again(tmp_path, capsys):

@@ -55,14 +55,13 @@ def test_the_page_needs_no_other_file_but_the_views_that_it_links_to(campaign):
         assert "<svg" in (campaign / f"{name}.svg").read_text()
 
 
-def test_the_results_of_the_readme_are_written_from_campaigns(campaign, tmp_path, monkeypatch, capsys):
+def test_the_results_of_the_readme_are_written_from_campaigns(campaign, tmp_path):
     from bench.planning import results_page
 
     readme = tmp_path / "README.md"
     readme.write_text(f"before\n{results_page.BEGIN}\nold\n{results_page.END}\nafter\n")
     for _ in range(2):  # a second time it takes the place of the first
-        monkeypatch.setattr("sys.argv", ["results_page.py", str(campaign), "--readme", str(readme)])
-        results_page.main()
+        results_page.main([campaign], readme)
     text = readme.read_text()
     assert text.startswith("before\n<!--")
     assert text.endswith("-->\nafter\n")

@@ -42,4 +42,4 @@ def test_pages_that_plan_are_linked_where_the_workflow_publishes_them():
     linked = [name for text in texts for name in re.findall(rf"\({re.escape(url)}pages/(\w+)\.html\)", text)]
     assert len(linked) >= len(texts)
     assert set(linked) <= {name for name, _, _ in pages()}
-    assert "bench.page.gallery build/site/pages" in (ROOT / ".github/workflows/docs.yml").read_text()
+    assert "bench gallery build/site/pages" in (ROOT / ".github/workflows/docs.yml").read_text()

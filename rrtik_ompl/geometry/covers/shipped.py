@@ -1,6 +1,6 @@
 """Covers of the robots that come along, in a file of the package, so that nobody waits for them on a new machine.
 
-``python bench/ship_covers.py`` writes the file. A cover is found by the hash of its geometry and of the algorithm that
+``python -m bench ship_covers`` writes the file. A cover is found by the hash of its geometry and of the algorithm that
 made it, so that one of another version is never taken.
 """
 

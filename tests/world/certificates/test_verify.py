@@ -225,7 +225,7 @@ def test_a_verifier_needs_neither_kernels_nor_planners():
 
 
 def test_the_measurement_finds_nothing_wrong(capsys):
-    assert main(["--paths", "6", "--seed", "3"]) == 0
+    assert main(paths=6, seed=3) == 0
     out = capsys.readouterr().out
     assert "6  accepted" in out
     assert "WRONG" not in out
