@@ -1,1 +1,1 @@
-"""Measurements: scripts that write the pages in `reports`, and `rrtik_bench`, the published tables; see README.md."""
+"""Measurements: what makes the pages in `reports`, and `rrtik_bench`, the published tables; see README.md."""

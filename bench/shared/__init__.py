@@ -1,1 +1,1 @@
-"""What scripts of several folders use."""
+"""What reports of several folders use."""

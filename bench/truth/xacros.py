@@ -68,7 +68,7 @@ def _by_xacro(file: Path, packages: list[Path]) -> str | None:
             return None
 
 
-def main(folders: Annotated[list[Path], Argument(help="Copies of repositories.")]) -> int:
+def main(folders: Annotated[list[Path], Argument(help="Copies of repositories.", exists=True)]) -> int:
     """Count, and print what differs."""
     total: Counter[str] = Counter()
     for folder in folders:

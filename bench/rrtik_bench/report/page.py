@@ -81,7 +81,7 @@ class Report:
         """Write the page and print it.
 
         Returns:
-            Exit code of a script: 1 if an acceptance row is missed, else 0.
+            Exit code: 1 if an acceptance row is missed, else 0.
         """
         self.save(file)
         print(self.markdown())
