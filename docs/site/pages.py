@@ -17,18 +17,18 @@ PICTURES = ROOT / "bench" / "reports"
 PICTURE = re.compile(
     r"\]\((?:https://raw\.githubusercontent\.com/rrtik-ompl/rrtik-ompl/main|\.\.)/bench/reports/([\w.-]+\.(?:png|gif))\)"
 )
-# The pages of the public names, and the modules that each of them is of, by how their names begin.
+# The pages of the public names, and the rooms or modules that each of them is of; the longest that fits counts.
 REFERENCE = {
-    "Robots and scenes": ("catalog", "robot", "description", "scene", "shapes", "files", "poses", "world"),
-    "Goals and problems": ("goal", "task_region", "constraints", "problem", "problem_files"),
-    "Plans and paths": ("planning", "path", "shortening", "moves", "search", "benchmark", "viewer", "plots"),
-    "Certificates": ("certificates",),
-    "Inverse kinematics": ("ik", "reach"),
-    "Lines of the tip and tasks": ("tip_motion", "tasks"),
-    "Trajectories and following": ("trajectory", "following"),
+    "Robots and scenes": ("description", "model", "files", "base.poses", "world"),
+    "Goals and problems": ("model.goal", "model.task_region", "constraints", "world.problem", "problem_files"),
+    "Plans and paths": ("planning", "world.path", "benchmark", "viewer"),
+    "Certificates": ("world.certificates",),
+    "Inverse kinematics": ("ik",),
+    "Lines of the tip and tasks": ("planning.tip_motion", "tasks"),
+    "Trajectories and following": ("motion",),
     "Moving obstacles": ("replanning",),
     "Own OMPL code": ("ompl_bridge",),
-    "Errors": ("errors",),
+    "Errors": ("base.errors",),
 }
 
 
@@ -88,12 +88,16 @@ def _groups() -> dict[str, list[str]]:
         home = value.__module__ if hasattr(value, "__module__") else value.__name__.rpartition(".")[0]
         full = f"{home}.{name}"
         assert getattr(import_module(home), name) is value
-        part = full.split(".")[1]
-        title = next((title for title, parts in REFERENCE.items() if part in parts), None)
-        if title is None:
-            raise ValueError(f"{full} is on no page: give '{part}' one in REFERENCE of docs/site/pages.py")
-        groups[title].append(full)
+        fitting = {part: title for part, title in _homes().items() if full.startswith(f"rrtik_ompl.{part}.")}
+        if not fitting:
+            raise ValueError(f"{full} is on no page: give its room one in REFERENCE of docs/site/pages.py")
+        groups[fitting[max(fitting, key=len)]].append(full)
     return groups
+
+
+def _homes() -> dict[str, str]:
+    """The page of each room or module."""
+    return {part: title for title, parts in REFERENCE.items() for part in parts}
 
 
 def _reference_file(title: str) -> str:
