@@ -8,7 +8,7 @@ ARCHITECTURE.md in the repository says where what is, docs/README.md how it is u
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.2.0"
+from rrtik_ompl.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from rrtik_ompl.base.errors import InputError as InputError

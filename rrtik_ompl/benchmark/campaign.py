@@ -106,7 +106,7 @@ def all_jobs(suite: Suite) -> Iterator[dict[str, Any]]:
 
 def machine(jobs: int, scheduler: str | None) -> dict[str, Any]:
     """What a reader must know to compare times."""
-    from rrtik_ompl import __version__
+    from rrtik_ompl.base.version import __version__
 
     return {
         "rrtik-ompl": __version__,

@@ -79,13 +79,13 @@ def _remote(job: Job) -> Done:
 
 
 def _version() -> str:
-    from rrtik_ompl import __version__
+    from rrtik_ompl.base.version import __version__
 
     return __version__
 
 
 def _check_workers(client: Client, address: str) -> None:
-    from rrtik_ompl import __version__
+    from rrtik_ompl.base.version import __version__
 
     versions = client.run(_version)
     if not versions:

@@ -56,7 +56,7 @@ class Kind(str, Enum):
 
 def _print_version(asked: bool) -> None:
     if asked:
-        from rrtik_ompl import __version__
+        from rrtik_ompl.base.version import __version__
 
         print(f"rrtik {__version__}")
         raise typer.Exit

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rrtik_ompl import __version__
+from rrtik_ompl.base.version import __version__
 from rrtik_ompl.cli.published.page import KEYS, Row, Table, plain
 from rrtik_ompl.files.text import read_text, write_text
 

@@ -106,7 +106,7 @@ def page(done: Done, quick: bool) -> str:
     """The whole comparison as Markdown."""
     import platform
 
-    from rrtik_ompl import __version__
+    from rrtik_ompl.base.version import __version__
     from rrtik_ompl.benchmark.tables import markdown_table
 
     command = f"rrtik reproduce {'--all' if len(done) > 1 else done[0][0].name}{' --quick' if quick else ''}"
