@@ -86,8 +86,8 @@ def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
     """What is shown, its robot, and why its start is no start, "" if it is one."""
     from rrtik_ompl import Scene, World, list_problems, list_robots, load_problem, load_robot, load_scene
     from rrtik_ompl.problem_files.problem import load_unchecked
-    from rrtik_ompl.viewer.path_contacts import contacts_along
     from rrtik_ompl.viewer.subject import Shown
+    from rrtik_ompl.world.path_contacts import contacts_along
 
     if Path(name).suffix.lower() in ROBOT_FILES or (name in list_robots() and name not in list_problems()):
         robot = load_robot(name)

@@ -24,7 +24,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.description.joint_ranges import narrowed
 from rrtik_ompl.description.joint_weights import weighted
 from rrtik_ompl.description.padding import padded
@@ -185,6 +185,15 @@ def load_robot(
         files = [recipe.target, *recipe.beside, *_paths(given), *_paths(robot.source)]
         cached = _cache.put(key, replace(robot, source=recipe.source(given)), files)
     return cached
+
+
+def robot_called(name: str, joint_names: tuple[str, ...]) -> Robot | None:
+    """The robot that a path names, if it can be loaded by that name and has these joints."""
+    try:
+        robot = load_robot(name)
+    except RrtikError:
+        return None
+    return robot if robot.joint_names == joint_names else None
 
 
 def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Robot:

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,9 @@ from rrtik_ompl.replanning.judge import RunViolation, run_violations
 from rrtik_ompl.replanning.scenes_file import scenes_data, scenes_of
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.world.problem import Problem
+
+if TYPE_CHECKING:
+    from rrtik_ompl.world.played import Judged
 
 KIND = "replan_run"
 MOST_POINTS = 2_000_000  # of all clouds that a record keeps
@@ -119,6 +122,16 @@ class ReplanRun:
             raise InputError(f"run: its clouds were too large to be kept after {self.scenes_end:g} s; give the truth")
         beside = self.margin + (self.clearance or 0.0)
         return run_violations(self.ticks, self.scenes, problem, beside=beside, truth=truth)
+
+    def judged(self, problem: Problem | None) -> Judged:
+        """What is said of the run where it is replayed: what its record calls proven, and :meth:`violations`.
+
+        Args:
+            problem: That was run; None if it is not known, and nothing is judged anew.
+        """
+        from rrtik_ompl.replanning.verdict import judged_run
+
+        return judged_run(self, problem)
 
     @property
     def arrived(self) -> bool:

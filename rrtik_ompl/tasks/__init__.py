@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +33,9 @@ from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.route_check import Violation
 from rrtik_ompl.world.world import World
+
+if TYPE_CHECKING:
+    from rrtik_ompl.tasks.played import PlayedTask
 
 SECONDS = 10.0
 
@@ -118,6 +121,16 @@ class TaskPlan:
                 wrong += rest.violations(world_from(world, stood_on, until))
             found.append(tuple(wrong))
         return tuple(found)
+
+    def played(self) -> PlayedTask:
+        """The plan as a picture plays it: timed by :func:`time_task`, and what is said of it, see :meth:`faults`.
+
+        Raises:
+            InputError: If there is no motion.
+        """
+        from rrtik_ompl.tasks.played import played_task
+
+        return played_task(self)
 
     def _stood_on(self) -> tuple[tuple[MotionContact, ...], ...]:
         return self.contacts or ((),) * len(self.paths)

@@ -6,8 +6,7 @@ import html
 import sys
 from dataclasses import dataclass
 
-from rrtik_ompl.base.errors import RrtikError
-from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.description.catalog import robot_called
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.planning.plan import Plan
 from rrtik_ompl.viewer.page import page
@@ -51,12 +50,11 @@ def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | Non
         shown: Showable = value.problem
         path: JointPath | Trajectory | None = value.path
     elif isinstance(value, (JointPath, Trajectory)):
-        try:
-            shown, path = load_robot(value.robot_name), value
-        except RrtikError:
+        robot = robot_called(value.robot_name, value.joint_names)
+        if robot is None:
             return None
-        if shown.joint_names != value.joint_names:
-            return None
+        shown = robot
+        path = value
     else:
         shown, path = value, None
     planning = isinstance(value, (Plan, Problem))

@@ -1,4 +1,4 @@
-"""A second opinion on what a page has found: this process proves the path in the scene that the page was left with."""
+"""What a page asks about a path that it has found, read, and asked of the scene that the page was left with."""
 
 from __future__ import annotations
 
@@ -13,10 +13,8 @@ from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.files.sections import Name, Number, Section
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import SHAPES, Box, Shape
-from rrtik_ompl.world.clearance_curve import clearance_along
-from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.opinion import opinion_on
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.route_check import how_checked
 
 Row = list[Number]
 
@@ -53,18 +51,8 @@ def opinion(problem: Problem, asked: bytes) -> dict[str, Any]:
     try:
         found = _Found.model_validate_json(asked)
         world = problem.world.with_scene(_scene(problem, found.obstacles))
-        Problem(world, found.start, found.goal)
-        path = JointPath.of(problem.robot, np.array(found.waypoints))
-        faults = path.violations(world)
-        if faults:
-            return {"verdict": "refused", "text": f"refused: move {faults[0].edge + 1}: {faults[0].reason}"}
-        ends = np.stack([path.start, path.end]) - np.array([found.start, found.goal])
-        if np.abs(ends).max() > 0.0:
-            return {"verdict": "refused", "text": "refused: the path does not lead from the start to the goal"}
-        proof = world.prove(path.waypoints)
-        how = how_checked(world, path.waypoints, proof)
-        words = f"{how}; {clearance_along(world, path.waypoints)}" if world.scene.obstacles else how
-        return {"verdict": "proven" if proof.proven else "checked", "text": words}
+        said = opinion_on(world, found.start, found.goal, np.array(found.waypoints))
+        return {"verdict": said.verdict, "text": said.text}
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

@@ -82,7 +82,7 @@ def page(
         InputError: If that cannot be shown, or the page asks and cannot plan.
     """
     if isinstance(path, TaskPlan):
-        subject = subject_of_task(shown, path)
+        subject = subject_of_task(shown, path.played())
     else:
         more = listed(marks, "marks")
         subject = subject_of(shown, path, before, ghosts, more) if run is None else subject_of_run(shown, run)

@@ -22,11 +22,11 @@ from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name, node
 from rrtik_ompl.viewer.drawing.trail import pieces
 from rrtik_ompl.viewer.drawing.viewpoint import overview
 from rrtik_ompl.viewer.page_tips import tip_entry
-from rrtik_ompl.viewer.path_contacts import PathContact
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
-from rrtik_ompl.viewer.verdict import Verdict
 from rrtik_ompl.world.clearance_curve import FARTHEST, ClearanceCurve
+from rrtik_ompl.world.path_contacts import PathContact
+from rrtik_ompl.world.played import Verdict
 
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path
@@ -81,8 +81,9 @@ def _clearance(curve: ClearanceCurve) -> dict[str, Any]:
 
 
 def _proof(verdict: Verdict) -> dict[str, Any]:
-    """What is proven, and the numbers of the moves that are not."""
-    return {"proven": verdict.proven, "text": verdict.text, "unproven": list(verdict.unproven)}
+    """What is proven, and the numbers of the moves that are not; a doubt names their colour, ``palette.UNPROVEN``."""
+    text = f"{verdict.doubt} (violet){verdict.text}" if verdict.doubt else verdict.text
+    return {"proven": verdict.proven, "text": text, "unproven": list(verdict.unproven)}
 
 
 def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]:

@@ -18,11 +18,11 @@ from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.fingers import Fingers
-from rrtik_ompl.viewer.path_contacts import PathContact
-from rrtik_ompl.viewer.run_verdict import judged_run
-from rrtik_ompl.viewer.verdict import Judged, Verdict, frames_of, judged_motion, judged_path
 from rrtik_ompl.world.clearance_curve import ClearanceCurve
 from rrtik_ompl.world.path import JointPath, fitted
+from rrtik_ompl.world.path_contacts import PathContact
+from rrtik_ompl.world.played import Verdict
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
 
@@ -170,11 +170,11 @@ def subject_of(
         robot, scene = world.robot, world.scene
     subject = _posture(shown, robot, scene)
     if ghosts is not None:
-        subject = replace(subject, ghosts=_waypoints(robot, ghosts))
+        subject = replace(subject, ghosts=_path(robot, ghosts).waypoints)
     subject = replace(subject, marks=marks)
     if path is None:
         return subject
-    earlier = None if before is None else _waypoints(robot, before)
+    earlier = None if before is None else _path(robot, before).waypoints
     return replace(_moving(subject, getattr(shown, "world", shown), path), before=earlier)
 
 
@@ -199,28 +199,23 @@ def _posture(shown: Showable, robot: Robot, scene: Scene) -> Subject:
 
 
 def _moving(subject: Subject, world: object, path: ShownPath) -> Subject:
-    """A subject on a path or a timed motion, and what is proven of that in its world, if it has one."""
+    """A subject on a path or a timed motion, and what is said of that in its world, if it has one."""
     robot = subject.robot
     assert robot is not None, "a path has one"
-    judged: Judged | None = None
-    times: Vector | None = None
     if isinstance(path, Trajectory):
         require_joints(robot, path.joint_names, "trajectory")
-        if isinstance(world, World):
-            times, judged = judged_motion(world, path)
-        else:
-            times = frames_of(path, np.empty(0))
-        rows = frozen(path(times).positions)
+        motion: JointPath | Trajectory = path
     else:
-        rows = _waypoints(robot, path)
-        judged = judged_path(world, rows) if isinstance(world, World) else None
+        motion = _path(robot, path)
+    played = motion.played(world if isinstance(world, World) else None)
     found = replace(
         subject,
-        waypoints=rows,
+        waypoints=played.waypoints,
         is_path=True,
-        times=times,
-        held=tuple((region, rows[0]) for region, _ in subject.held),
+        times=played.times,
+        held=tuple((region, played.waypoints[0]) for region, _ in subject.held),
     )
+    judged = played.judged
     if judged is None:
         return found
     return replace(found, verdict=judged.verdict, curve=judged.curve, contacts=judged.contacts)
@@ -232,17 +227,17 @@ def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
     Raises:
         InputError: If it is no run, or not one of that problem's robot.
     """
-    subject = played(problem, run)
+    subject = replayed(problem, run)
     scene = run.scenes[0].scene if run.scenes else subject.scene  # a feed may begin elsewhere than the problem
     still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
     for name in {obstacle.name for obstacle in still}.union(*(tick.poses for tick in run.ticks)):
         subject.scene.obstacle(name)  # or it is a run of another problem
     scene = replace(subject.scene, obstacles=still)
-    judged = judged_run(problem, run)
+    judged = run.judged(problem if isinstance(problem, Problem) else None)
     return replace(subject, scene=scene, verdict=judged.verdict, contacts=judged.contacts)
 
 
-def played(shown: Showable, run: ReplanRun) -> Subject:
+def replayed(shown: Showable, run: ReplanRun) -> Subject:
     """A robot that is where it was in each tick of a run, in the scene that it is shown in.
 
     Raises:
@@ -257,11 +252,11 @@ def played(shown: Showable, run: ReplanRun) -> Subject:
     if robot is None or robot.joint_names != run.joint_names:
         raise InputError(f"run to show: one of robot '{run.robot}' with other joints; give the problem that was run")
     held = tuple((region, rows[0]) for region, _ in subject.held)
-    return replace(subject, waypoints=_waypoints(robot, rows), is_path=True, run=run, held=held)
+    return replace(subject, waypoints=_path(robot, rows).waypoints, is_path=True, run=run, held=held)
 
 
-def _waypoints(robot: Robot, path: ShownPath) -> Matrix:
-    """The waypoints of a path, shape (k, dof); one that names its joints names those of the robot."""
+def _path(robot: Robot, path: ShownPath) -> JointPath:
+    """A path of a robot: one that names its joints names those of the robot."""
     given: Any = path
     for part in ("path", "trajectory", "run"):
         if isinstance(getattr(given, part, None), JointPath | Trajectory | ReplanRun):
@@ -272,4 +267,6 @@ def _waypoints(robot: Robot, path: ShownPath) -> Matrix:
             f"path: robot '{robot.name}' has {robot.dof} joints ({', '.join(robot.joint_names)}), "
             f"but the path has shape {rows.shape}"
         )
-    return fitted(path, robot).waypoints if isinstance(path, JointPath) else frozen(rows)
+    if isinstance(path, JointPath):
+        return fitted(path, robot)
+    return JointPath(rows, robot.joint_names, robot.prismatic, robot.name, robot.continuous)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,6 +42,9 @@ from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY as VERIFICATION_DENSITY
 from rrtik_ompl.world.route_check import Violation, route_violations, verification_resolution
 from rrtik_ompl.world.world import Proof, World
+
+if TYPE_CHECKING:
+    from rrtik_ompl.world.played import Played
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -216,6 +219,22 @@ class JointPath:
     def with_proof(self, proof: Proof) -> JointPath:
         """The same path with what somebody else has proven of its motions."""
         return changed(self, proof=proof)
+
+    def played(self, world: World | None) -> Played:
+        """The path as a picture plays it, and what is said of it there: by :meth:`proved` and :meth:`violations`.
+
+        Args:
+            world: In which it is judged; None where there is none.
+
+        Raises:
+            InputError: If the path moves other joints than the world's robot, or these in another order.
+        """
+        from rrtik_ompl.world.played import played_path
+
+        require(world, World | None, "world of a path to play")
+        if world is not None:
+            require_joints(world.robot, self.joint_names, "path")
+        return played_path(self.waypoints, world)
 
     @property
     def proven(self) -> bool:

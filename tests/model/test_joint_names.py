@@ -38,6 +38,8 @@ def _of_a_file(names, task, file, write, read):
 TAKERS = {  # what takes a motion and a robot: how it is called
     "JointPath.violations": lambda names, task, file: path(names).violations(task.world),
     "JointPath.proved": lambda names, task, file: path(names).proved(task.world),
+    "JointPath.played": lambda names, task, file: path(names).played(task.world),
+    "Trajectory.played": lambda names, task, file: motion(names).played(task.world),
     "Trajectory.faults": lambda names, task, file: motion(names).faults(task.world),
     "Trajectory.prove": lambda names, task, file: motion(names).prove(task.world),
     "certificate_of": lambda names, task, file: rrtik.certificate_of(task.world, path(names)),

@@ -15,7 +15,6 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.problem_files.path_constraints import constraint_data
 from rrtik_ompl.tasks.task_file import stage_data
 from rrtik_ompl.viewer.page import page
-from rrtik_ompl.viewer.task_story import held_in
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +68,7 @@ def test_a_plan_with_constraints_comes_back_from_its_file(served, tmp_path):
 
 @pytest.mark.kernels
 def test_the_page_draws_the_regions_of_stages_where_they_begin(served):
-    ((region, begin),) = held_in(served)
+    ((region, begin),) = served.played().held
     stage = served.stages.index(next(each for each in served.stages if getattr(each, "constraints", ())))
     assert region.frame == "cup"
     assert (begin == served.paths[stage].start).all()

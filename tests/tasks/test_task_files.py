@@ -106,14 +106,15 @@ def test_the_commands_write_what_they_say(small, tmp_path, capsys):
 def test_the_page_carries_the_object_with_the_hand(small):
     loaded = rrtik.load_task(small)
     plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
-    ticks = run_of(plan).ticks
+    shown = run_of(plan.played())
+    ticks = shown.ticks
     second = [tick for tick in ticks if tick.reason.startswith("motion 2")]
     robot, held = plan.worlds[1].robot, plan.worlds[1].scene.attached[0]
     for tick in second[:: len(second) // 4]:
         assert np.allclose(tick.poses["part"][:3], (robot.fk(tick.q, held.link) * held.pose).translation)
     still = [tick.poses["part"] for tick in ticks if tick.reason.startswith("motion 4")]
     assert np.allclose(still, still[0])
-    farthest = rrtik.RateLimits.of(robot).velocity / run_of(plan).rate
+    farthest = rrtik.RateLimits.of(robot).velocity / shown.rate
     assert all((np.abs(b.q - a.q) <= farthest + 1e-6).all() for a, b in pairwise(ticks))
 
 
@@ -121,7 +122,7 @@ def test_the_page_carries_the_object_with_the_hand(small):
 def test_the_page_plays_a_task_in_the_time_that_it_takes(small):
     loaded = rrtik.load_task(small)
     plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
-    shown, timed = run_of(plan), rrtik.time_task(plan)
+    shown, timed = run_of(plan.played()), rrtik.time_task(plan)
     duration = timed.trajectory.duration
     assert shown.times[-1] == pytest.approx(duration, abs=2.0 / shown.rate)
     for tick in shown.ticks[:-1:20]:
@@ -171,7 +172,7 @@ def test_what_is_no_task_and_what_is_no_plan(tmp_path, small, capsys):
     with pytest.raises(InputError, match="stage 1 failed"):
         rrtik.save_task_plan(failed, tmp_path / "plan.json")
     with pytest.raises(InputError, match="no motion"):
-        run_of(failed)
+        failed.played()
     broken = tmp_path / "broken.json"
     broken.write_text('{"version": 1, "kind": "task_plan", "motions": []}')
     with pytest.raises(InputError, match=r"broken\.json"):

@@ -13,10 +13,10 @@ from rrtik_ompl.description.catalog import find_problem
 from rrtik_ompl.problem_files.problem import load_unchecked
 from rrtik_ompl.viewer import film as module
 from rrtik_ompl.viewer.film import BROWSERS, film
-from rrtik_ompl.viewer.path_contacts import contacts_along
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
 from rrtik_ompl.viewer.subject import Shown, subject_of
+from rrtik_ompl.world.path_contacts import contacts_along
 
 WAYPOINTS = [[0.0, 0.0, 0.0], [1.0, 0.5, 0.5]]
 

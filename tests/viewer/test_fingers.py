@@ -39,7 +39,7 @@ def closing(tmp_path_factory):
 def test_fingers_are_where_the_robot_of_each_motion_has_them(closing):
     world, plan = closing
     assert plan.found, plan.reason
-    subject = subject_of_task(world, plan)
+    subject = subject_of_task(world, plan.played())
     poses = {name: rows for (_, name), rows in subject.fingers.poses.items()}
     assert poses.keys() == {":left_0", ":right_0"}
     for name, sign in ((":left_0", 1.0), (":right_0", -1.0)):
@@ -57,7 +57,8 @@ def test_fingers_are_where_the_robot_of_each_motion_has_them(closing):
 
 def test_a_task_without_gripper_has_no_fingers_that_move():
     loaded = rrtik.load_task("titan4_drawer")
-    subject = subject_of_task(loaded.world, loaded.task.plan(loaded.world, loaded.start, seed=1))
+    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    subject = subject_of_task(loaded.world, plan.played())
     assert subject.fingers.poses == {}
 
 

@@ -163,7 +163,7 @@ def planned(request: pytest.FixtureRequest, arm: rrtik.Robot) -> tuple[rrtik.Wor
 
 def test_things_are_where_the_world_of_each_motion_has_them(planned: tuple[rrtik.World, TaskPlan]) -> None:
     world, plan = planned
-    page = Page.of(subject_of_task(world, plan))
+    page = Page.of(subject_of_task(world, plan.played()))
     numbers = numbers_of(page.story)
     assert set(numbers) == set(range(len(plan.paths)))
     check_things(page, plan, numbers)
@@ -171,7 +171,7 @@ def test_things_are_where_the_world_of_each_motion_has_them(planned: tuple[rrtik
 
 def test_fingers_are_where_the_robot_of_each_motion_has_them(planned: tuple[rrtik.World, TaskPlan]) -> None:
     world, plan = planned
-    page = Page.of(subject_of_task(world, plan))
+    page = Page.of(subject_of_task(world, plan.played()))
     recorded = page.transforms
     at = np.array(page.story["fingers"]["at"])
     bodies = page.story["fingers"]["bodies"]
@@ -197,7 +197,7 @@ def test_the_page_of_a_plan_shows_its_first_world_whatever_world_it_is_shown_wit
     plan = Task(stages).plan(rrtik.World(arm, scene(held_by)), [0.0, 0.0], seed=1)
     assert plan.end is not None
     for shown in (arm, plan.end, plan.worlds[-1], rrtik.World(arm)):
-        page = Page.of(subject_of_task(shown, plan))
+        page = Page.of(subject_of_task(shown, plan.played()))
         check_things(page, plan, numbers_of(page.story))
 
 

@@ -51,7 +51,7 @@ def test_motions_that_are_not_proven_are_named():
 
 def test_nothing_near_is_said():
     robot = rrtik.load_robot("planar3")
-    world = rrtik.World(robot, Scene((Obstacle("far", Sphere(0.1), rrtik.poses.pose([50.0, 0.0, 0.0])),)))
+    world = rrtik.World(robot, Scene((Obstacle("far", Sphere(0.1), rrtik.pose([50.0, 0.0, 0.0])),)))
     curve = clearance_along(world, np.zeros((1, 3)))
     assert (curve.distances == FARTHEST).all()
     assert str(curve) == "no obstacle within 2 m"

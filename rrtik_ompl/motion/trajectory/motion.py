@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,11 +16,10 @@ from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.text import write_text
 from rrtik_ompl.model.robot import require_joints
-from rrtik_ompl.motion.trajectory.chords import proof_by_chords
+from rrtik_ompl.motion.trajectory.checks import faults_of, proof_of_pieces
 from rrtik_ompl.motion.trajectory.cubics import (
     cubic_peaks,
     ends_of,
-    even_parts,
     hermite_accelerations,
     jerks_of,
     places,
@@ -29,8 +28,10 @@ from rrtik_ompl.motion.trajectory.cubics import (
 from rrtik_ompl.motion.trajectory.messages import write_mcap
 from rrtik_ompl.motion.trajectory.text import dumps, written_ending
 from rrtik_ompl.world.path import JointPath
-from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, not_proven
 from rrtik_ompl.world.world import Proof, World
+
+if TYPE_CHECKING:
+    from rrtik_ompl.world.played import Played
 
 END_ERROR = 1e-6  # [s] before the end; a tick there is the end, for no drive takes two points at once
 FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it
@@ -228,6 +229,22 @@ class Trajectory:
         require_joints(world.robot, self.joint_names, "trajectory")
         return proof_of_pieces(self, world, clearance, 0, len(self.times) - 1)
 
+    def played(self, world: World | None) -> Played:
+        """The motion as a picture plays it, and what is said of it there: by :meth:`prove` and :meth:`faults`.
+
+        Args:
+            world: In which it is judged; None where there is none.
+
+        Raises:
+            InputError: If it moves other joints than the world's robot, or these in another order.
+        """
+        from rrtik_ompl.motion.trajectory.played import played_motion
+
+        require(world, World | None, "world of a trajectory to play")
+        if world is not None:
+            require_joints(world.robot, self.joint_names, "trajectory")
+        return played_motion(self, world)
+
     def jumps(self) -> Matrix:
         """How much the acceleration jumps at each knot, shape (m, n): from rest at the first, to rest at the last."""
         a = self.accelerations
@@ -277,43 +294,3 @@ class Trajectory:
 
     def _names(self) -> dict[str, Any]:
         return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}
-
-
-def proof_of_pieces(motion: Trajectory, world: World, clearance: float | None, first: int, end: int) -> Proof:
-    """A proof of the pieces from ``first`` up to ``end``; see :meth:`Trajectory.prove`."""
-    h, begin = np.diff(motion.times)[first:end], motion.accelerations[first:end]
-    pushes = np.maximum(np.abs(begin), np.abs(begin + h[:, None] * motion.jerks[first:end]))
-    times = motion.times[first : end + 1]
-    return proof_by_chords(times, pushes @ world.weights, lambda clock: motion(clock).positions, world, clearance)
-
-
-def greatest_speeds(motion: Trajectory) -> Matrix:
-    """Bounds of the rates of all joints on each piece, shape (m, n) [rad/s or m/s]."""
-    h = np.diff(motion.times)[:, None]
-    peak = np.abs(motion.velocities)
-    found: Matrix = np.maximum(peak[1:], peak[:-1]) + h * np.abs(motion.jerks * h) / 8.0
-    return found
-
-
-def faults_of(motion: Trajectory, world: World) -> list[tuple[float, str]]:
-    """The first fault of every piece that has one, time [s] and reason; see :meth:`Trajectory.faults`."""
-    clock = bad_moments(motion, world)
-    rows = motion(clock).positions
-    return [(moment, world.explain(q) or not_proven(world)) for moment, q in zip(clock.tolist(), rows, strict=True)]
-
-
-def bad_moments(motion: Trajectory, world: World) -> Vector:
-    """Times of the first fault of every piece that has one; see :meth:`Trajectory.faults`."""
-    h = np.diff(motion.times)
-    ways = h * (greatest_speeds(motion) @ world.weights)
-    counts = np.ceil(ways * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
-    pieces, shares = even_parts(counts)
-    clock = np.append(motion.times[pieces] + shares * h[pieces], motion.duration)
-    bad = np.flatnonzero(~world.certify(motion(clock).positions))
-    touching, where = np.unique(np.append(pieces, len(h) - 1)[bad], return_index=True)
-    moments = np.asarray(clock[bad[where]])
-    if world.settings.proving is None:
-        return moments
-    gaps = proof_of_pieces(motion, world, world.settings.proving, 0, len(h)).unproven
-    unproven = np.setdiff1d([gap.motion for gap in gaps], touching).astype(np.int64)
-    return np.sort(np.concatenate([moments, motion.times[unproven]]))

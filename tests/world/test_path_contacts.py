@@ -3,8 +3,7 @@
 import numpy as np
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.viewer.path_contacts import contacts_along
-from rrtik_ompl.viewer.subject import subject_of
+from rrtik_ompl.world.path_contacts import contacts_along
 
 
 def test_the_stretches_of_a_path_in_which_bodies_touch_are_those_that_the_world_names():
@@ -23,15 +22,17 @@ def test_the_stretches_of_a_path_in_which_bodies_touch_are_those_that_the_world_
         near = any(contact.begin - 0.01 < share < contact.end + 0.01 for contact in found)
         within = any(contact.begin < share < contact.end for contact in found)
         assert within <= bool(world.contacts((1.0 - share) * route[0] + share * route[1])) <= near
-    assert len(subject_of(world, route).contacts) == len(found)
+    judged = rrtik.JointPath.of(world.robot, route).played(world).judged
+    assert judged is not None
+    assert len(judged.contacts) == len(found)
 
 
 def test_a_free_path_and_one_without_a_world_have_no_contacts():
     problem = rrtik.load_problem("planar3_boxes")
     path = rrtik.plan(problem, seed=1).path
     assert contacts_along(problem.world, path.waypoints) == ()
-    assert subject_of(problem, path).contacts == ()
-    assert subject_of(problem.robot, path).contacts == ()
+    assert path.played(problem.world).judged.contacts == ()
+    assert path.played(None).judged is None
 
 
 def test_a_posture_that_touches_is_a_stretch_without_length():

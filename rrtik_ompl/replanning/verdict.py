@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.contacts import Contact
 from rrtik_ompl.replanning.judge import RunViolation
-from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.viewer.path_contacts import PathContact
-from rrtik_ompl.viewer.verdict import Judged, Verdict
+from rrtik_ompl.world.path_contacts import PathContact
+from rrtik_ompl.world.played import Judged, Verdict
 from rrtik_ompl.world.problem import Problem
+
+if TYPE_CHECKING:
+    from rrtik_ompl.replanning.record import ReplanRun
 
 NOWHERE = np.full(3, np.nan)
 
 
-def judged_run(problem: object, run: ReplanRun) -> Judged:
-    """The verdict on a run: only a problem has the world in which it is judged anew."""
+def judged_run(run: ReplanRun, problem: Problem | None) -> Judged:
+    """The verdict on a run, by its ticks; see :meth:`rrtik_ompl.ReplanRun.judged`."""
     made, proven = run.moves
     unproven = {k for k, tick in enumerate(run.ticks) if tick.proven is False}
     text = f"{proven} of {made} moves proven free when they were made" if made else "no move of it is called proven"
     found: tuple[RunViolation, ...] = ()
-    if isinstance(problem, Problem):
+    if problem is not None:
         try:
             found = run.violations(problem)
             text += "; judged anew: " + (f"{len(found)} faults, the first: {found[0]}" if found else "no fault")

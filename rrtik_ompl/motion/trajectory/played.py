@@ -1,0 +1,124 @@
+"""A timed motion as a picture plays it, and what the library says of it between all its knots."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Vector, frozen
+from rrtik_ompl.motion.trajectory.checks import faults_of, greatest_speeds
+from rrtik_ompl.world.clearance_curve import PLACES, ClearanceCurve, Course
+from rrtik_ompl.world.path_contacts import PathContact
+from rrtik_ompl.world.played import Fault, Judged, Played, Verdict, judged_course, with_reason
+from rrtik_ompl.world.world import World
+
+if TYPE_CHECKING:
+    from rrtik_ompl.motion.trajectory.motion import Trajectory
+
+MOST_KNOTS = 900  # of a timed motion, that are all looked at
+FRAME_RATE = 30.0  # [1/s] of a timed motion
+MOST_FRAMES = 900  # beside what is looked at
+TIME_DIGITS = 9  # of a page's times [s]
+
+
+def played_motion(motion: Trajectory, world: World | None) -> Played:
+    """A timed motion as it is played in a world; see :meth:`Trajectory.played`."""
+    if world is None:
+        clock = _frames_of(motion, np.empty(0))
+        judged = None
+    else:
+        clock, judged = _judged_motion(motion, world)
+    return Played(frozen(motion(clock).positions), clock, judged)
+
+
+def _judged_motion(motion: Trajectory, world: World) -> tuple[Vector, Judged]:
+    """Times at which a timed motion is drawn [s], shape (k,), and the verdict on it, by the moves between these.
+
+    Everything that is looked at is drawn too: a motion of some tenths of a second is not lost between two pictures.
+    """
+    course = _course_of(world, motion)
+    found, faults = judged_course(world, course, partial(_faults_of_motion, world, motion))
+    doubtful = found.verdict.unproven
+    doubt = f"not proven free in {len(doubtful)} of {len(motion.times) - 1} pieces" if doubtful else ""
+    text = "" if doubtful else "the whole motion is proven free"
+    seen = course if found.curve is None else found.curve
+    touched = [end for contact in found.contacts for end in (contact.begin, contact.end)]
+    clock = _frames_of(motion, np.append(_clock(motion, seen.motions, seen.shares), _times(motion, np.array(touched))))
+    where = [f"after {_clock(motion, np.array([k]), np.array([x]))[0]:.3f} s: {why}" for k, x, why in faults or ()]
+    drawn = _drawn_moves(motion, doubtful, clock)
+    said = Verdict(not doubtful, text, drawn, doubt)
+    verdict = with_reason(said, world, where, checked=faults is not None)
+    curve = None if found.curve is None else _on_frames(motion, found.curve, clock, drawn)
+    contacts = tuple(_contact_on_frames(motion, each, clock) for each in found.contacts)
+    return clock, Judged(verdict, curve, contacts)
+
+
+def _frames_of(motion: Trajectory, more: Vector) -> Vector:
+    """Times at which a motion is drawn [s], shape (k,): at an even rate, at its knots, and at some more."""
+    count = int(np.clip(np.ceil(FRAME_RATE * motion.duration), 2, MOST_FRAMES))
+    knots = motion.times if len(motion.times) <= MOST_KNOTS else motion.times[[0, -1]]
+    clock = np.concatenate([np.linspace(0.0, motion.duration, count + 1), knots, more])
+    return frozen(np.unique(np.round(clock, TIME_DIGITS)))  # the page rounds them, and no two may be the same
+
+
+def _faults_of_motion(world: World, motion: Trajectory) -> list[Fault]:
+    """The first fault of each piece of a timed motion."""
+    found = faults_of(motion, world)
+    pieces, shares = _places_at(motion.times, np.array([moment for moment, _ in found]))
+    return [(k, x, reason) for k, x, (_, reason) in zip(pieces.tolist(), shares.tolist(), found, strict=True)]
+
+
+def _course_of(world: World, motion: Trajectory) -> Course:
+    """A timed motion as a course: its places are spread over how far the arm moves, and at its knots."""
+    h = np.diff(motion.times)
+    speed = greatest_speeds(motion)
+    ways = np.append(0.0, np.cumsum(h * np.maximum(speed @ world.weights, 1e-12)))
+    clock = np.interp(np.linspace(0.0, ways[-1], PLACES + 1), ways, motion.times)
+    if len(motion.times) <= MOST_KNOTS:
+        clock = np.unique(np.append(clock, motion.times))
+    return Course(
+        *_places_at(motion.times, clock),
+        at=lambda pieces, shares: motion(_clock(motion, pieces, shares)).positions,
+        prove=lambda clearance: motion.prove(world, clearance=clearance),
+    )
+
+
+def _places_at(times: Vector, clock: Vector) -> tuple[NDArray[np.int64], Vector]:
+    """Numbers of the pieces between some times on which others are, and where on these, from 0 to 1."""
+    pieces = np.clip(np.searchsorted(times, clock, side="right") - 1, 0, len(times) - 2)
+    return pieces, np.clip((clock - times[pieces]) / np.diff(times)[pieces], 0.0, 1.0)
+
+
+def _clock(motion: Trajectory, pieces: NDArray[np.int64], shares: Vector) -> Vector:
+    """Times of places on pieces [s]."""
+    return np.asarray(motion.times[pieces] + shares * np.diff(motion.times)[pieces])
+
+
+def _times(motion: Trajectory, at: Vector) -> Vector:
+    """Times of places that are written as the number of a piece plus the share of it [s]."""
+    pieces = np.clip(at.astype(np.int64), 0, len(motion.times) - 2)
+    return _clock(motion, pieces, at - pieces)
+
+
+def _drawn_moves(motion: Trajectory, pieces: tuple[int, ...], clock: Vector) -> tuple[int, ...]:
+    """Numbers of the moves between drawn times that lie on some pieces, at least in part."""
+    first = np.searchsorted(clock, motion.times[list(pieces)] + 10.0**-TIME_DIGITS, side="right") - 1
+    end = np.searchsorted(clock, motion.times[[k + 1 for k in pieces]] - 10.0**-TIME_DIGITS, side="left")
+    found = {k for a, b in zip(first.tolist(), end.tolist(), strict=True) for k in range(a, max(b, a + 1))}
+    return tuple(sorted(k for k in found if k < len(clock) - 1))
+
+
+def _on_frames(motion: Trajectory, curve: ClearanceCurve, clock: Vector, unproven: tuple[int, ...]) -> ClearanceCurve:
+    """A curve by pieces as one by the moves between drawn times."""
+    moves, shares = _places_at(clock, _clock(motion, curve.motions, curve.shares))
+    return replace(curve, motions=moves, shares=frozen(shares), unproven=unproven)
+
+
+def _contact_on_frames(motion: Trajectory, contact: PathContact, clock: Vector) -> PathContact:
+    ends = _places_at(clock, _times(motion, np.array([contact.begin, contact.end])))
+    begin, end = (ends[0] + ends[1]).tolist()
+    return replace(contact, begin=begin, end=end)

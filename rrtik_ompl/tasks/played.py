@@ -1,0 +1,126 @@
+"""The plan of a task as a picture plays it: timed, tick by tick, and what is proven of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.constraints.held_region import HeldRegion
+from rrtik_ompl.constraints.held_regions import held_regions
+from rrtik_ompl.tasks import MoveTo, TaskPlan
+from rrtik_ompl.tasks.setting import world_of_motion
+from rrtik_ompl.tasks.timed import time_task
+from rrtik_ompl.world.path_contacts import PathContact, contacts_at
+from rrtik_ompl.world.played import Judged, Verdict
+from rrtik_ompl.world.route_check import as_it_stands
+from rrtik_ompl.world.world import World
+
+RATE = 25.0  # ticks per second
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlayedTask:
+    """A plan over time, as :func:`time_task` times it: at the robot's own limits, with rests between motions.
+
+    Attributes:
+        plan: The plan, of which each motion has a tick at least.
+        rate: Ticks a second.
+        motions: Number of the motion of each tick, shape (ticks,).
+        waypoints: The configurations, shape (ticks, dof).
+        rests: How much is over in each tick of a rest before the next motion, 0 outside of rests, shape (ticks,).
+        judged: What is said of it, by the ticks.
+        held: The regions of path constraints, and where the motion that keeps each begins, shape (dof,).
+    """
+
+    plan: TaskPlan
+    rate: float
+    motions: NDArray[np.int64]
+    waypoints: Matrix
+    rests: Vector
+    judged: Judged
+    held: tuple[tuple[HeldRegion, Vector], ...]
+
+
+def played_task(plan: TaskPlan) -> PlayedTask:
+    """A plan as it is played; see :meth:`TaskPlan.played`."""
+    if not plan.paths:
+        raise InputError("task plan to show: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
+    motions, rows, rests = _ticks(plan)
+    return PlayedTask(plan, RATE, motions, frozen(rows), frozen(rests), _judged(plan, motions, rows), _held(plan))
+
+
+def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
+    """For each tick its motion, its configuration, and how much is over of a rest before the next motion.
+
+    A motion that leads nowhere takes no time, and has a tick too.
+    """
+    numbers = np.arange(len(plan.paths))
+    starts = np.array([path.start for path in plan.paths])
+    if not any(path.length > 0.0 for path in plan.paths):
+        return numbers, starts, np.zeros(len(numbers))
+    timed = time_task(plan)
+    clock, states = timed.trajectory.sampled(RATE)
+    motions = np.searchsorted(timed.begins, clock, side="right") - 1
+    rests = np.array([_share_of_rest(timed.pauses, time) for time in clock.tolist()])
+
+    without = np.setdiff1d(numbers, motions)
+    motions = np.append(motions, without)
+    rows = np.vstack([states.positions, starts[without]])
+    rests = np.append(rests, np.zeros(len(without)))
+    order = np.argsort(motions, kind="stable")
+    return motions[order], rows[order], rests[order]
+
+
+def _share_of_rest(pauses: Matrix, time: float) -> float:
+    """How much is over of the rest, of some rests (begin, end), in which a time lies; 0 between them."""
+    resting = pauses[(pauses[:, 0] < time) & (time < pauses[:, 1])]
+    return float((time - resting[0, 0]) / (resting[0, 1] - resting[0, 0])) if len(resting) else 0.0
+
+
+def _judged(plan: TaskPlan, motions: NDArray[np.int64], rows: Matrix) -> Judged:
+    """The verdict on a plan, by its ticks."""
+    faults = plan.faults()
+    parts = zip(plan.paths, plan.worlds, plan.stages, strict=True)
+    worlds = [world_of_motion(path, world, stage) for path, world, stage in parts]
+    proofs = zip(plan.paths, worlds, strict=True)
+    proven = [path.proven if path.proof is not None else path.proved(world).proven for path, world in proofs]
+    doubtful = [k for k, fine in enumerate(proven) if not fine or faults[k]]
+    unproven = tuple(np.flatnonzero(np.isin(motions[:-1], doubtful)).tolist())
+
+    if doubtful:
+        doubt = f"{len(doubtful)} of {len(proven)} motions not proven free"
+        text = next((f"; motion {k + 1}: {found[0].reason}" for k, found in enumerate(faults) if found), "")
+    else:
+        doubt = ""
+        text = "every motion is proven free" + (", on the contacts that it stands on" if any(plan.contacts) else "")
+    text += as_it_stands(plan.worlds[0].scene)
+
+    contacts: list[PathContact] = []
+    for k in doubtful:
+        ticks = np.flatnonzero(motions == k)
+        contacts += _contacts(worlds[k], ticks, rows[ticks], [fault.q for fault in faults[k]])
+    return Judged(Verdict(not doubtful, text, unproven, doubt), None, tuple(contacts))
+
+
+def _contacts(world: World, ticks: NDArray[np.int64], rows: Matrix, faults: list[Vector]) -> Iterator[PathContact]:
+    """What touches in the ticks of a motion, and at the library's faults of it, each in the tick that is nearest."""
+    yield from contacts_at(world, ticks.astype(np.float64), rows)
+    for q in faults:
+        tick = float(ticks[np.abs(rows - q).sum(axis=1).argmin()])
+        for contact in contacts_at(world, np.array([tick]), q[None]):
+            yield replace(contact, end=tick + 1.0)
+
+
+def _held(plan: TaskPlan) -> tuple[tuple[HeldRegion, Vector], ...]:
+    """The regions of the path constraints of all motions, and where each motion begins, shape (dof,)."""
+    found: list[tuple[HeldRegion, Vector]] = []
+    for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True):
+        if isinstance(stage, MoveTo):
+            held = held_regions(world.robot, world.scene, stage.constraints, path.start)
+            found += [(region, path.start) for region in held.regions]
+    return tuple(found)

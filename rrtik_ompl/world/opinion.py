@@ -1,0 +1,56 @@
+"""What the library says of a path that somebody else has found: proven, free in steps, or refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.world.clearance_curve import clearance_along
+from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.route_check import how_checked
+from rrtik_ompl.world.world import World
+
+Said: TypeAlias = Literal["proven", "checked", "refused"]
+
+
+@dataclass(frozen=True, slots=True)
+class Opinion:
+    """An opinion on a path.
+
+    Attributes:
+        verdict: "proven", "checked" (free in steps, but not proven) or "refused".
+        text: The same for a person, in one line.
+    """
+
+    verdict: Said
+    text: str
+
+
+def opinion_on(world: World, start: ArrayLike, goal: ArrayLike, waypoints: ArrayLike) -> Opinion:
+    """An opinion on a path.
+
+    Args:
+        world: In which it has to be free.
+        start: Where it has to begin, shape (dof,).
+        goal: Where it has to end, shape (dof,).
+        waypoints: Of the path, shape (k, dof).
+
+    Raises:
+        InputError: If rows do not have one value per joint, or are no numbers.
+        ProblemError: If an end is in collision or outside the limits.
+    """
+    Problem(world, start, goal)
+    path = JointPath.of(world.robot, waypoints)
+    faults = path.violations(world)
+    if faults:
+        return Opinion("refused", f"refused: move {faults[0].edge + 1}: {faults[0].reason}")
+    if (path.start != start).any() or (path.end != goal).any():
+        return Opinion("refused", "refused: the path does not lead from the start to the goal")
+    proof = world.prove(path.waypoints)
+    text = how_checked(world, path.waypoints, proof)
+    if world.scene.obstacles:
+        text += f"; {clearance_along(world, path.waypoints)}"
+    return Opinion("proven" if proof.proven else "checked", text)
