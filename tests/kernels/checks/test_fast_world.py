@@ -5,10 +5,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl import fast
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld
+from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld, needs_covers
 from rrtik_tests.random_cases import KINDS, Case, arm, joint_values, random_solid
 
 pytestmark = pytest.mark.kernels
@@ -126,5 +125,5 @@ def test_solids_with_a_formula_need_no_covers():
     for kind, expected in (("box", (False, False)), ("convex", (False, True)), ("mesh", (True, True))):
         solid = random_solid(kind, np.random.default_rng(0), 1.0)
         solid.computeLocalAABB()
-        assert fast.needs_covers(Body("x", 0, pin.SE3.Identity(), solid, "obstacle")) == expected
-        assert fast.needs_covers(Body("x", 1, pin.SE3.Identity(), solid, "link")) == (True, True)
+        assert needs_covers(Body("x", 0, pin.SE3.Identity(), solid, "obstacle")) == expected
+        assert needs_covers(Body("x", 1, pin.SE3.Identity(), solid, "link")) == (True, True)
