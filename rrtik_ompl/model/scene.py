@@ -300,12 +300,6 @@ class Scene:
             tuple(contact for contact in self.contacts if not contact.pair & set(names)),
         )
 
-    def moved(self, number: int, obstacle: Obstacle) -> Scene:
-        """The scene with an obstacle in the place of one of the same name and shape; nothing else is checked again."""
-        obstacles = list(self.obstacles)
-        obstacles[number] = obstacle
-        return changed(self, obstacles=tuple(obstacles))
-
     def attaching(
         self,
         name: str,
@@ -379,3 +373,10 @@ def pairs_that_may_touch(scene: Scene) -> frozenset[tuple[frozenset[str], float 
     """The pairs of names that a scene allows to touch, and how near those in contact may come [m]."""
     allowed = ((frozenset(pair), None) for pair in scene.allowed_collisions)
     return frozenset([*allowed, *((each.pair, each.distance) for each in scene.contacts)])
+
+
+def exchanged(scene: Scene, number: int, obstacle: Obstacle) -> Scene:
+    """The scene with an obstacle in the place of one of the same name and shape; nothing else is checked again."""
+    obstacles = list(scene.obstacles)
+    obstacles[number] = obstacle
+    return changed(scene, obstacles=tuple(obstacles))

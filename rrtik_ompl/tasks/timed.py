@@ -77,6 +77,7 @@ def time_task(
     """
     require(plan, TaskPlan, "plan of a task", "use Task(stages).plan(world, start)")
     rest = not_negative(pause, "pause")
+    radius = not_negative(blend, "blend")
     if not any(path.length > 0.0 for path in plan.paths):
         raise InputError("task plan to time: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
     used = RateLimits.of(plan.worlds[0].robot) if limits is None else limits
@@ -93,7 +94,7 @@ def time_task(
         if path.length == 0.0:
             continue
         held = world_of_motion(path, world, stage)
-        part = _timed(path, held, plan.contacts[number] if plan.contacts else (), used, blend, options)
+        part = _timed(path, held, plan.contacts[number] if plan.contacts else (), used, radius, options)
         parts.append(part)
         gaps.append(waiting)
         waiting, now = 0.0, now + part.duration

@@ -29,7 +29,7 @@ from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights, displacement_weights
 from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.scene import Obstacle, Scene, exchanged
 from rrtik_ompl.model.shapes import Mesh
 from rrtik_ompl.world.arm_cache import Spheres, arm_cache
 
@@ -99,7 +99,7 @@ class Arrangement:
         still = numbers.standing(None if self.always_colliding else placements)
         other = replace(
             self,
-            scene=self.scene.moved(place, obstacle),
+            scene=exchanged(self.scene, place, obstacle),
             bodies=bodies,
             always_colliding=_touching(self.robot, bodies, still),
         )

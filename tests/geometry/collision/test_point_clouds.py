@@ -75,7 +75,7 @@ def test_kernels_agree_with_the_reference_and_leave_next_to_nothing_open(name):
     kernels, fast._kernels = fast._kernels, None
     expected, fast._kernels = fast.clearance(V), kernels
     assert np.abs(bounds.lower - expected.lower)[expected.lower > 0.0].max(initial=0.0) < NEARLY
-    answers, certain = fast.classify(V), cloud._certificate().free(Q)
+    answers, certain = fast.classify(V), cloud._certificate.free(Q)
     assert certain[answers == FREE].all()
     assert not certain[answers == COLLIDING].any()
     assert ((answers != FREE) & (answers != COLLIDING)).mean() < 0.05
@@ -112,7 +112,7 @@ def test_kernels_are_right_at_contact_with_walls_of_points(name):
         )
         if world.fast is None:  # the walls stand in the base
             continue
-        found, certain = world.fast.classify(robot.joint_values(near)), world._certificate().free(near)
+        found, certain = world.fast.classify(robot.joint_values(near)), world._certificate.free(near)
         assert certain[found == FREE].all()
         assert not certain[found == COLLIDING].any()
         answers.extend(zip(found, certain, strict=True))
