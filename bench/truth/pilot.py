@@ -122,6 +122,7 @@ def _way(arm: Any, since: Any) -> float:
 def released(delay: float, seed: int) -> Case:
     """A joint is driven for a second over a line, and let go."""
     with hostile.Pilot(delay=delay, line=True) as pilot:
+        pilot.look(0.3 + 2.0 * delay)  # nobody drives before the page has shown picture and arm
         direction, begin = _ready(pilot, seed), pilot.arm._q.copy()
         pilot.hold(1.0 + 2.0 * delay, direction=direction)
         there, at = pilot.arm._q.copy(), time.monotonic()
