@@ -241,11 +241,3 @@ class ThreadOwn(Generic[Kept]):
 
     def __set__(self, thing: object, value: Kept) -> None:
         vars(thing)[self._name] = _Cell(value, threading.get_ident())
-
-
-class KeptHere(dict[Any, Any]):
-    """What is kept from one call to the next by this thread; other threads begin with nothing."""
-
-    def for_thread(self) -> KeptHere:
-        """Nothing."""
-        return KeptHere()

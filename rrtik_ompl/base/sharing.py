@@ -56,7 +56,7 @@ class Shared(Generic[Part]):
         return own
 
     def keep(self, part: Part, *values: object) -> Part:
-        """Make a part that somebody has made that of some values; returns it."""
+        """Take a part that somebody has made as that of some values; returns it."""
         key = _key(values)
         self._values[part] = values
         self._parts[key] = part

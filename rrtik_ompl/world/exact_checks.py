@@ -43,7 +43,6 @@ class ExactChecker:
         room: What is kept from obstacles on top of their margins [m].
         bodies: Those of ``solids``, obstacles with that room.
         tables: The checked pairs for the kernels; for one thread at a time.
-        conservative: Whether nothing falls back to coal: what kernels leave undecided then counts as colliding.
         motions: Tables of motions that :func:`rrtik_ompl.kernels.search.motions.motion_table.motions_of` keeps.
     """
 
@@ -51,7 +50,6 @@ class ExactChecker:
     room: float
     bodies: Items[Body]
     tables: TakenTables
-    conservative: bool = False
     motions: dict[tuple[bool, float], FastMotions] = field(default_factory=dict)
     _data: Any = None
 
@@ -67,10 +65,6 @@ class ExactChecker:
     def fast(self) -> FastWorld:
         """The tables; made anew where another checker has taken them over."""
         return self.tables.get(self._packed)
-
-    def as_conservative(self) -> ExactChecker:
-        """The same checker, which never asks coal; shares the tables."""
-        return replace(self, conservative=True)
 
     def for_thread(self) -> ExactChecker:
         """The same checker for another thread."""
@@ -115,11 +109,14 @@ class ExactChecker:
         """Proves of the pairs in contact that they overlap no deeper than they may."""
         return Prover(self._robot, self.bodies, self.solids.in_contact)
 
-    def free(self, rows: Matrix) -> Mask:
-        """Which rows, shape (m, dof), are free of collision. Shape (m,)."""
+    def free(self, rows: Matrix, *, exact: bool = True) -> Mask:
+        """Which rows, shape (m, dof), are free of collision. Shape (m,).
+
+        Without ``exact`` nothing falls back to coal: what kernels leave undecided then counts as colliding.
+        """
         answers = self.fast.classify(self._robot.joint_values(rows))
         free: Mask = answers == FREE
-        if not self.conservative and not free.all():
+        if exact and not free.all():
             undecided = rows[answers == UNDECIDED]
             doubtful = self.fast.undecided_pairs(self._robot.joint_values(undecided))
             configurations = self._robot.pinocchio_configuration(undecided)
@@ -138,19 +135,25 @@ class ExactChecker:
         return frozenset(pair for pair in doubtful if Prover(self._robot, self.bodies, (pair,)).proven(row, row).all())
 
     def motions_free(
-        self, starts: Matrix, ends: Matrix, steps: NDArray[np.int64], *, to_be_proven: bool = False
+        self,
+        starts: Matrix,
+        ends: Matrix,
+        steps: NDArray[np.int64],
+        *,
+        exact: bool = True,
+        to_be_proven: bool = False,
     ) -> Mask:
         """Which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,).
 
-        Of those that have to be proven too, what the kernels leave undecided counts as free: coal takes longer to say
-        so than a proof, which settles it.
+        ``exact`` as in :meth:`free`. Of those that have to be proven too, what the kernels leave undecided counts as
+        free: coal takes longer to say so than a proof, which settles it.
         """
         sides = self._robot.joint_values(starts), self._robot.joint_values(ends)
         answers = self.fast.classify_edges(*sides, steps)
         free: Mask = answers == FREE
-        if not self.conservative and to_be_proven:
+        if exact and to_be_proven:
             free |= answers == UNDECIDED
-        elif not self.conservative:
+        elif exact:
             for k in np.flatnonzero(answers == UNDECIDED):
                 free[k] = self._motion_free_by_coal(starts[k], ends[k], int(steps[k]))
         if self.solids.in_contact:

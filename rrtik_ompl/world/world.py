@@ -134,8 +134,7 @@ class World:
         while self._solids.doubts:  # each is said once
             warnings.warn(self._solids.doubts.pop(0), MeshWarning, stacklevel=2)
 
-        checks = CHECKERS.of(self._solids, settings.clearance + settings.inflation)
-        self._checks = checks.as_conservative() if settings.accuracy == "conservative" else checks
+        self._checks = CHECKERS.of(self._solids, settings.clearance + settings.inflation)
         self.constraints: HeldRegions | None = None
         if settings.constraints:
             self.constraints = HELD.of(robot, settings.scene.attached, settings.constraints)
@@ -264,7 +263,7 @@ class World:
         return World.of(settings) if changed else self
 
     def with_scene(self, scene: Scene) -> World:
-        """A world of the same robot in another scene, made anew with the same settings.
+        """A world of the same robot in another scene, with the same settings.
 
         Raises:
             InputError: If it is no scene, or does not fit the robot or the path constraints.
@@ -336,9 +335,10 @@ class World:
         settings = self._settings
         moved, numbers = self._solids.moved(name, pose)
         solids = ARRANGEMENTS.keep(moved, settings.robot, moved.scene, settings.self_margin)
-        free = PROVERS.of(self._solids, None)
-        prover = free.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
-        PROVERS.keep(prover, solids, None)
+
+        # These names hold the parts until the new world has found them.
+        prover = self.prover.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
+        PROVERS.keep(prover, solids, self.constraints)
         checks = self._checks.moved(solids, numbers)
         if checks is not None:
             CHECKERS.keep(checks, solids, checks.room)
@@ -502,12 +502,16 @@ class World:
             rows = self.robot.configuration(Q) if dimensions == 1 else finite_array(Q, (None, self.robot.dof), what)
         return np.atleast_2d(rows)
 
+    @property
+    def _exact(self) -> bool:
+        return self._settings.accuracy == "exact"
+
     def _free(self, rows: Matrix) -> Mask:
         mask = self.robot.within_limits(rows) & (not self._solids.always_colliding)
         if mask.all():
-            mask = self._checks.free(rows)
+            mask = self._checks.free(rows, exact=self._exact)
         else:
-            mask[mask] = self._checks.free(rows[mask])
+            mask[mask] = self._checks.free(rows[mask], exact=self._exact)
         if self.constraints is not None:
             mask[mask] = self.constraints.held(rows[mask])
         return mask
@@ -517,7 +521,9 @@ class World:
         A, B = one_way(starts[mask], ends[mask])
         counts = step_counts(A, B, self.weights, self.motion_resolution)
         clearance = self._settings.proving
-        mask[mask] = free = self._checks.motions_free(A, B, counts, to_be_proven=clearance is not None)
+        mask[mask] = free = self._checks.motions_free(
+            A, B, counts, exact=self._exact, to_be_proven=clearance is not None
+        )
         if clearance is not None:
             mask[mask] = self.prover.proven(A[free], B[free], clearance=clearance)
         elif self.constraints is not None:  # a prover says that too

@@ -82,3 +82,14 @@ def test_worlds_of_the_same_values_share_what_depends_on_them():
     assert world.proving().prover is world.prover
     assert world.with_clearance(0.03).with_clearance(0.0).fast is world.fast
     assert rrtik.World(robot, rrtik.Scene(scene.obstacles)).fast is not world.fast
+
+
+@pytest.mark.parametrize("first", ["exact", "conservative"])
+def test_both_accuracies_share_tables_in_either_order_also_when_moved(first):
+    robot = rrtik.load_robot("planar3")
+    ball = rrtik.Obstacle("ball", rrtik.Sphere(0.1), rrtik.pose([0.9, 0.0, 0.0]))
+    other = {"exact": "conservative", "conservative": "exact"}[first]
+    world = rrtik.World(robot, rrtik.Scene((ball,)), accuracy=first)
+    for each in (world, world.moved("ball", [0.8, 0.1, 0.0])):
+        assert each.accuracy == first
+        assert each.with_accuracy(other).fast is each.fast
