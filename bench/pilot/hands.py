@@ -49,7 +49,7 @@ def follow_route(session: Session, arm: WrongArm, *, hasty: bool = False) -> Fol
         press += 1
         refused += "is not driven" in session.message
         rows.append(arm.links())
-        if "off the route" in session.message or session.guide.withdrawn:
+        if "off the route" in session.message or session.state.way.withdrawn:
             plans += 1
             _plan(session, "replan")
     return Followed(np.array(rows), plans, press, moving, refused)
@@ -67,7 +67,7 @@ def hold_next(session: Session, arm: WrongArm, press: int, *, early: bool = Fals
     still, end, moving = 0, session.time + HOLD_SECONDS, 0
     while still < STILL and session.time < end and not (early and _near(session)):
         session.command("next", session.time, press=press)
-        if session.held.over:
+        if session.state.press.over:
             break
         moved = _pass(session, arm)
         still, moving = (0 if moved else still + 1), moving + moved

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,7 +42,7 @@ def panel_routes(count: int) -> PanelRoutes:
     green = green_grasps(session)
     for number in range(count + 1):
         kind, level = green[number % len(green)]
-        session.seed = number
+        session.means = replace(session.means, seed=number)
         session.command("grasp", session.time, type=kind, level=level)
         clock, processor = time.perf_counter(), time.process_time()
         session.command("plan", session.time)

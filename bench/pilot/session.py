@@ -44,7 +44,7 @@ def _drive(record: Path) -> tuple[Any, list[str]]:
         modes.append(session.mode)
     press = 0
     while session.mode == "following" and now < 600.0:
-        press += session.held.over  # a press makes one move
+        press += session.state.press.over  # a press makes one move
         engine.execute({"name": "next", "press": press}, now)
         now += 0.03
         engine.update(now)
@@ -78,7 +78,7 @@ def color_logic(count: int) -> Lamps:
     surroundings, start = Surroundings(WORLD), np.array(PROBLEM.start)
     for _ in range(count):
         T = pin.SE3(pin.exp3(rng.normal(0.0, 0.5, 3)) @ PLACE.rotation, rng.uniform([0.9, -0.6, -0.2], [1.6, 0.8, 0.8]))
-        surroundings.see([seen_at(T)])
+        surroundings = surroundings.see([seen_at(T)])
         for lamp in lamps(surroundings.world, VALVE, T, start, holding=surroundings.holding("valve")):
             grasp = stage_poses(T, VALVE.grasp(lamp.type), lamp.level)[1]
             wrong += (lamp.color == RED) != (not solutions(ROBOT, grasp.homogeneous[None]).valid.any())

@@ -113,7 +113,7 @@ def pilot_server(first: int, count: int) -> list[str]:
     when the pilot is silent and when the pilot has gone; the session goes on; nothing is printed.
     """
     opened, faults = open_session(SessionOptions("titan4_sdu")), list[str]()
-    problem, perception = opened.engine.session.problem, opened.engine.perception
+    problem, perception = opened.engine.session.means.problem, opened.engine.perception
     arm = Witness(problem.robot, problem.start)
     session = Session(problem, arm, seed=first)
     engine, done = UndrawnEngine(session, perception, simulated=(arm,)), threading.Event()

@@ -91,8 +91,8 @@ def draw_aids(
         return
     tip = session.robot.fk(session.q)
     at = tip.translation
-    if session.choice is not None:
-        goal = seen.grasp_pose(*session.choice)
+    if session.state.choice is not None:
+        goal = seen.grasp_pose(*session.state.choice)
         view.line(at, at + AXIS * tip.rotation[:, 2], TOOL_AXIS)
         view.line(goal.translation - AXIS * goal.rotation[:, 2], goal.translation, GRASP_AXIS)
     else:

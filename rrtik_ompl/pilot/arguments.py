@@ -10,7 +10,6 @@ import numpy as np
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.messages import quoted
 
-NUMBERS = ("joint", "target", "level", "direction", "share", "press")  # arguments of commands; all others are words
 MAX_NUMBER, MAX_WORD_LENGTH = 1e6, 100  # a number, and a word, that a command may hold
 
 
@@ -26,21 +25,28 @@ def number(value: object, name: str) -> float:
     return float(plain)
 
 
-def fitting(command: Callable[..., object], name: str, arguments: Mapping[str, object]) -> dict[str, float | str]:
-    """The arguments, if they are those that a command takes.
+def fitting(act: Callable[..., object], name: str, arguments: Mapping[str, object]) -> dict[str, float | str]:
+    """The arguments of a command, if they are those that are taken by what executes it.
+
+    Args:
+        act: Its first two parameters are not of the command; the others are words, ``str``, or numbers.
+        name: Of the command.
+        arguments: By their names.
 
     Raises:
         InputError: If one is missing, unknown, or of another kind.
     """
-    wanted = tuple(inspect.signature(command).parameters)
-    if set(arguments) != set(wanted):
+    wanted = list(inspect.signature(act).parameters.values())[2:]
+    if set(arguments) != {each.name for each in wanted}:
         given = ", ".join(arguments)[:MAX_WORD_LENGTH] or "none"
-        raise InputError(f"{name} takes {', '.join(wanted) or 'no arguments'}, got {given}")
-    return {word: _value(f"{name}: {word}", word, value) for word, value in arguments.items()}
+        takes = ", ".join(each.name for each in wanted) or "no arguments"
+        raise InputError(f"{name} takes {takes}, got {given}")
+    words = {each.name for each in wanted if each.annotation in (str, "str")}
+    return {each: _value(f"{name}: {each}", each in words, value) for each, value in arguments.items()}
 
 
-def _value(place: str, word: str, value: object) -> float | str:
-    if word in NUMBERS:
+def _value(place: str, word: bool, value: object) -> float | str:
+    if not word:
         return number(value, place)
     if not isinstance(value, str) or len(value) > MAX_WORD_LENGTH:
         raise InputError(f"{place} must be a word, got {quoted(value)!r}")

@@ -18,11 +18,11 @@ from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.arguments import number
 from rrtik_ompl.pilot.devices.camera_feed import ENDED
 from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera
+from rrtik_ompl.pilot.document import state_document
 from rrtik_ompl.pilot.interlock import PROPOSED, Sight
 from rrtik_ompl.pilot.perception import Perception
 from rrtik_ompl.pilot.records.pictures import PictureRecord
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.pilot.state import state_document
 from rrtik_ompl.pilot.views import PRESETS, CameraView, OutsideView
 
 JPEG_QUALITY = 80
@@ -79,8 +79,7 @@ class Engine:
         if "object" in arguments:  # which one, for "name" is that of the command
             arguments["name"] = arguments.pop("object")
         if name not in VIEW_COMMANDS:
-            self.session.sight = sight
-            self.session.command(name, time, **arguments)
+            self.session.command(name, time, sight, **arguments)
             self._return_to_now()
             return
         try:
@@ -139,7 +138,7 @@ class Engine:
 
     def _return_to_now(self) -> None:
         """A preview shows a route that is proposed; whatever comes after is shown as it is."""
-        if self.session.mode != PROPOSED or self.session.held.drive.active:
+        if self.session.mode != PROPOSED or self.session.driving:
             self.outside.share = None
 
     def _advance(self, time: float) -> None:

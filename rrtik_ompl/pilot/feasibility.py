@@ -17,47 +17,45 @@ PATIENT_SECONDS = 0.05  # for a pose, when a route is asked for
 
 
 class FeasibilityCache:
-    """What the arm can do from its configuration; the last results are kept."""
+    """What the arm can do from its configuration in some surroundings; the last results are kept."""
 
-    def __init__(self, surroundings: Surroundings) -> None:
+    def __init__(self) -> None:
         """Begin empty."""
-        self._surroundings = surroundings
         self._lamps: tuple[Hashable, tuple[Lamp, ...]] = ((), ())
         self._fault: tuple[Hashable, str] = ((), "")
         self._range: tuple[Hashable, JointRange | None] = ((), None)
 
-    def lamps(self, target: str | None, q: Vector) -> tuple[Lamp, ...]:
+    def lamps(self, around: Surroundings, target: str | None, q: Vector) -> tuple[Lamp, ...]:
         """Lamps of an object where it is; none if it was never seen."""
-        around = self._surroundings
         seen = None if target is None else around.named(target)
         if seen is None:
             return ()
-        key = (target, around.version, around.world_at(q, target).valid(q))
+        key = (target, around, around.world_at(q, target).valid(q))
         if key != self._lamps[0]:
             holding = around.holding(seen.object.name)
             self._lamps = (key, lamps(around.world, seen.object, seen.T_base_object, q, holding=holding))
         return self._lamps[1]
 
-    def patient_lamp(self, target: str | None, choice: tuple[str, int] | None, q: Vector) -> Lamp | None:
+    def patient_lamp(
+        self, around: Surroundings, target: str | None, choice: tuple[str, int] | None, q: Vector
+    ) -> Lamp | None:
         """The lamp of a grasp; where the arm has no closed form and nothing was found, after a longer search."""
-        lamp = self._lamp(target, choice, q)
-        seen = None if target is None else self._surroundings.named(target)
-        if lamp is None or seen is None or len(lamp.grasps) or has_closed_form(self._surroundings.world.robot):
+        lamp = self._lamp(around, target, choice, q)
+        seen = None if target is None else around.named(target)
+        if lamp is None or seen is None or len(lamp.grasps) or has_closed_form(around.world.robot):
             return lamp
-        around = self._surroundings
         holding, key = around.holding(seen.object.name), self._lamps[0]
         again = lamps(
             around.world, seen.object, seen.T_base_object, q, holding=holding, seconds=PATIENT_SECONDS
         )  # fmt: skip
         self._lamps, self._fault = (key, again), ((), "")
-        return self._lamp(target, choice, q)
+        return self._lamp(around, target, choice, q)
 
-    def _lamp(self, target: str | None, choice: tuple[str, int] | None, q: Vector) -> Lamp | None:
-        return next((lamp for lamp in self.lamps(target, q) if (lamp.type, lamp.level) == choice), None)
+    def _lamp(self, around: Surroundings, target: str | None, choice: tuple[str, int] | None, q: Vector) -> Lamp | None:
+        return next((lamp for lamp in self.lamps(around, target, q) if (lamp.type, lamp.level) == choice), None)
 
-    def fault(self, target: str, lamp: Lamp, q: Vector) -> str:
+    def fault(self, around: Surroundings, target: str, lamp: Lamp, q: Vector) -> str:
         """What is wrong with a grasp: how far out of reach it is, or what would touch; "" if it can be made."""
-        around = self._surroundings
         seen = around.named(target)
         if seen is None or lamp.stage is None:
             return ""
@@ -67,9 +65,9 @@ class FeasibilityCache:
             self._fault = (key, diagnose(lamp, seen.object, seen.T_base_object, q, *worlds))
         return self._fault[1]
 
-    def joint_range(self, world: World, q: Vector, joint: int) -> JointRange:
-        """The range of a joint in a world now; it stays the same while that joint alone moves."""
-        key = (joint, np.delete(q, joint).tobytes(), self._surroundings.version, id(world))
+    def joint_range(self, around: Surroundings, world: World, q: Vector, joint: int) -> JointRange:
+        """The range of a joint in a world of some surroundings now; it stays the same while that joint alone moves."""
+        key = (joint, np.delete(q, joint).tobytes(), around, id(world))
         kept = self._range[1]
         if kept is None or key != self._range[0] or not kept.low <= q[joint] <= kept.high:
             kept = joint_range(world, q, joint)

@@ -7,8 +7,9 @@ seen lately; driving by hand remains. Commands that stop, choose or leave are ne
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
 MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
@@ -17,28 +18,33 @@ UNSEEN_SECONDS = 2.0  # what has been out of view for longer is no basis of a ro
 LATE_SECONDS = 0.3  # a pilot who sees what the arm does later than that does not drive it
 
 ACKNOWLEDGE: Final = "STOP acknowledges that"
-MOVING: Final = ("jog", "go", "next", "servo", "lead")  # held: the arm moves only as long as they are renewed
-# What needs the arm and a picture of now:
-PRESENT: Final = (*MOVING, "move", "plan", "replan", "accept", "back", "close", "open", "lift", "together")
-# What leads past things without the pilot's judgement, and so needs all of them seen:
-GUIDED: Final = ("plan", "replan", "accept", "back", "together", "lift", "next", "servo")
-ALWAYS: Final = ("stop", "release", "halt", "select", "speed", "object", "grasp", "reject", "settle")
 
-_MANUAL = (MANOEUVRE, CHOOSING, PROPOSED), "a route is being followed: 'next' makes its next move, 'stop' leaves it"
-_ONLY_IN: Final = {
-    "jog": _MANUAL,
-    "go": _MANUAL,
-    "move": _MANUAL,
-    "close": _MANUAL,
-    "open": _MANUAL,
-    "lift": _MANUAL,
-    "servo": _MANUAL,
-    "lead": _MANUAL,
-    "together": ((PROPOSED,), "there is no route that is proposed; 'plan' proposes one"),
-    "accept": ((PROPOSED,), "there is no route to accept; 'plan' proposes one"),
-    "settle": ((FOLLOWING,), "no route is being followed"),
-    "next": ((FOLLOWING,), "no route is being followed; 'plan' and 'accept' one first"),
-}
+BY_HAND: Final = (MANOEUVRE, CHOOSING, PROPOSED)
+ON_A_ROUTE: Final = "a route is being followed: 'next' makes its next move, 'stop' leaves it"
+
+
+@dataclass(frozen=True, slots=True)
+class Verb:
+    """A command of the pilot: what executes it, and what it needs. A verb that stops, chooses or leaves needs nothing.
+
+    Attributes:
+        act: Called with the `Means`, the `State`, and the command's arguments by their names, numbers as ``float`` and
+            words as ``str``; returns the next `State`.
+        present: It needs the arm and a picture of now.
+        held: The arm moves only as long as the command is renewed; the pilot has to see it.
+        guided: It leads past things without the pilot's judgement, and so needs all of them seen.
+        gripping: It is given even while the gripper is closed on something fixed; asked only where ``present``.
+        modes: In which it is given.
+        otherwise: Why it is refused in the others.
+    """
+
+    act: Callable[..., Any]
+    present: bool = False
+    held: bool = False
+    guided: bool = False
+    gripping: bool = False
+    modes: tuple[str, ...] = MODES
+    otherwise: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,23 +108,22 @@ class Knowledge:
         return f"the picture on the page is stale: {sight.picture:.2g} s"
 
 
-def refusal(verb: str, mode: str, known: Knowledge) -> str:
+def refusal(verb: Verb, mode: str, known: Knowledge) -> str:
     """Why a command is refused, in one line; "" if it is not.
 
     Args:
-        verb: One of `PRESENT` or `ALWAYS`.
+        verb: The command.
         mode: One of `MODES`.
         known: Of the moment.
 
     Example:
-        >>> refusal("next", FOLLOWING, Knowledge("", picture_age=60.0))
+        >>> refusal(Verb(print, present=True), FOLLOWING, Knowledge("", picture_age=60.0))
         'refused: the picture is stale'
     """
-    modes, otherwise = _ONLY_IN.get(verb, (MODES, ""))
-    if mode not in modes:
-        return otherwise
-    if verb in PRESENT and known.trouble:
+    if mode not in verb.modes:
+        return verb.otherwise
+    if verb.present and known.trouble:
         return f"refused: {known.trouble}" + (f"; {ACKNOWLEDGE}" if known.trouble == known.fault else "")
-    if verb in GUIDED and known.unseen:
+    if verb.guided and known.unseen:
         return f"refused: {known.unseen}; bring it into view, or drive by hand"
-    return f"refused: {known.blind}" if verb in MOVING and known.blind else ""
+    return f"refused: {known.blind}" if verb.held and known.blind else ""

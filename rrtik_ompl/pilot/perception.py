@@ -77,15 +77,15 @@ class LivePerception:
             taken = self.source.latest()
             if taken is None:
                 return
-            if self._frozen(taken) and not session.past:
-                self.lost = REPEATS if session.time - session.picture_time > STALE_SECONDS else self.lost
+            if self._frozen(taken) and not session.means.past:
+                self.lost = REPEATS if session.time - session.state.pictures.time > STALE_SECONDS else self.lost
                 return
             others = [Picture(each.pixels, each.name, time) for each in taken.others]
             view = self._sensor.view(Picture(taken.pixels, taken.name, time), *others)
         except RrtikError as error:
             self.lost = str(error)
             if self.lost != ENDED:  # the last picture of a film was a good one
-                session.unusable = self.lost
+                session.see_no_use(self.lost)
             return
         self.lost, self.picture = "", taken.pixels
         self.others = tuple(each.pixels for each in taken.others)

@@ -13,7 +13,8 @@ import numpy as np
 from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
-from rrtik_ompl.pilot.interlock import MOVING, Sight
+from rrtik_ompl.pilot.interlock import Sight
+from rrtik_ompl.pilot.machine import VERBS
 from rrtik_ompl.pilot.web.handlers import MAX_PAGES
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.world.motion_queries import Stop, no_stop
@@ -29,7 +30,7 @@ def _renews(after: Sent, before: Sent) -> bool:
     """Whether a command that is held is the one before it once more, which then need not be executed."""
     names = quoted(after[1].get("name")), quoted(before[1].get("name"))
     same = after[0] == before[0] and names[0] == names[1] and after[1].get("press") == before[1].get("press")
-    return same and names[0] in MOVING
+    return same and names[0] in VERBS and VERBS[names[0]].held
 
 
 class Loop:
@@ -81,7 +82,7 @@ class Loop:
         audience, self._audience = self._audience, len(server.clients)
         if not self._audience:
             return
-        server.show_frame(CAMERA, engine.session.picture_time, engine.camera_picture())
+        server.show_frame(CAMERA, engine.session.state.pictures.time, engine.camera_picture())
         self._execute_all()
         self._outside_too = not self._outside_too
         if not self._outside_too and self._audience == audience:

@@ -2,60 +2,53 @@
 
 Source: [1, ch. 6] (flow chart). Two modes: assisted manoeuvre moves one joint at a time and refuses moves that are not
 free; assisted teleoperation chooses a grasp, plans a route, and guides the pilot through its moves.
+
+What the session decides stands in `machine`: a function of values. Here it is carried out: a `Session` has the arm, the
+record and the `State` of now.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+import time as clock
+from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
-from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError
-from rrtik_ompl.pilot.answers import Answer, Level, alarm, news, refused
-from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
-from rrtik_ompl.pilot.arm_check import ArmCheck
+from rrtik_ompl.base.errors import InputError, RrtikError
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.pilot import events, queries
+from rrtik_ompl.pilot.answers import Answer, Level, alarm
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
-from rrtik_ompl.pilot.feasibility import FeasibilityCache
-from rrtik_ompl.pilot.guide import Guide
-from rrtik_ompl.pilot.interlock import (
-    ACKNOWLEDGE,
-    CHOOSING,
-    FOLLOWING,
-    MANOEUVRE,
-    MOVING,
-    PROPOSED,
-    UNSEEN_SECONDS,
-    Knowledge,
-    Sight,
-    refusal,
-)
-from rrtik_ompl.pilot.motion.hand import Hand
-from rrtik_ompl.pilot.motion.held import Held
-from rrtik_ompl.pilot.motion.leading import Leading
+from rrtik_ompl.pilot.devices.line_arm import LineArm
+from rrtik_ompl.pilot.interlock import UNSEEN_SECONDS, Knowledge, Sight
+from rrtik_ompl.pilot.machine import handle
+from rrtik_ompl.pilot.motion.leading import GraspServo
+from rrtik_ompl.pilot.motion.supervisor import Supervisor
 from rrtik_ompl.pilot.records.record import Record
 from rrtik_ompl.pilot.routes.follower import Follower, Progress
-from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, Lamp
+from rrtik_ompl.pilot.routes.lamps import Lamp
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange
 from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.pilot.routes.track import Track
+from rrtik_ompl.pilot.state import Means, State
 from rrtik_ompl.pilot.surroundings import Structure, Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
-
-READ_SECONDS = 1.0  # a stop so soon after a fault is against the fault: it does not acknowledge it
 
 
 class Session:
     """One pilot, one arm, one scene.
 
     Attributes:
-        answer: What was said last, and its level.
-        sight: What the page of the pilot had shown when the command of now was given; None without a page.
+        means: What the session works with, the same from its begin to its end.
+        state: All that it knows and has decided; each event makes the next one.
+        arm: The arm that is moved.
+        master: An arm whose joints `lead` follows; None without one.
+        supervisor: Compares what the arm does with what it was told.
     """
 
     def __init__(
@@ -87,283 +80,224 @@ class Session:
             patience: For how long routes stand on what is out of view [s]; None for 2 s with a structure, and for ever
                 without one, where the vehicle stands still.
         """
-        self.problem, self.robot, self.arm, self.seed = problem, problem.robot, arm, seed
-        self.rates: Vector = joint_rates(self.robot, rates)
-        self.surroundings = Surroundings(problem.world, structure)
-        self.mode, self.selected, self.speed = MANOEUVRE, 0, 1.0
-        self.target: str | None = None
-        self.choice: tuple[str, int] | None = None
-        self.answer = news("")
-        self.sight: Sight | None = None
-        self.q: Vector = frozen(arm.read())
-        self.desired: Vector = self.q
-        self.time = 0.0
-        self.picture_time, self.unusable = -np.inf, ""  # of the last picture, and why it could not be used
-        self.feasibility = FeasibilityCache(self.surroundings)
-        self.guide = Guide(self)
-        self.held, self.hand = Held(self), Hand(self)
-        self.leading = Leading(self, master)
-        self._check = ArmCheck()
-        self.past, self._recorded = past, recorded
-        self._trouble = ""
-        self._unseen = ""
-        self._seen_at = dict[str, float]()
-        self._patience = (np.inf if structure is None else UNSEEN_SECONDS) if patience is None else patience
-        self._fault, self._fault_at = "", -np.inf  # what the arm has done that it was not told, as of the last tick
+        if patience is None:
+            patience = np.inf if structure is None else UNSEEN_SECONDS
+        self.means = Means(
+            problem,
+            joint_rates(problem.robot, rates),
+            seed=seed,
+            past=past,
+            recorded=recorded,
+            patience=patience,
+        )
+        self.arm = arm
+        self.master = master
+        self.supervisor = Supervisor(problem.robot, self.means.rates)
+        q = frozen(arm.read())
+        self.state = State(Surroundings(problem.world, structure), q, q)
+        self._grasp_servo = GraspServo(problem.robot)
         self._record = record or Record(None)
-        self._commands: dict[str, Callable[..., Answer]] = {
-            "select": self._select, "jog": self.held.jog, "move": self.held.move, "go": self.held.go,
-            "next": self.held.next, "release": self.held.release, "speed": self.held.set_speed, "stop": self._stop,
-            "object": self._object, "grasp": self._grasp, "plan": self.guide.plan, "replan": self.guide.plan,
-            "accept": self.guide.accept, "reject": self.guide.reject, "back": self.guide.back,
-            "settle": self.guide.settle, "close": self.hand.close, "open": self.hand.open,
-            "lift": self.hand.lift, "halt": self._halt, "servo": self.leading.servo, "lead": self.leading.lead,
-            "together": self.guide.together,
-        }  # fmt: skip
+        self._read_by_arm = isinstance(arm, LineArm)  # its own thread gives its readings to the supervisor
+        if isinstance(arm, LineArm):
+            arm.judge = self.supervisor
 
-    # --- input -------------------------------------------------------------------------------------------
+    # --- events ---------------------------------------------------------------------------------------------------
 
     def see(self, objects: Sequence[SeenObject], time: float) -> None:
         """Update the surroundings by the objects of a picture."""
-        self.time, self.picture_time, self.unusable = max(self.time, time), time, ""
-        self._seen_at |= {each.object.name: time for each in objects}
-        if self.hand.holds:
-            self._seen_at[self.hand.holds] = time  # it is where the arm is
-        if self.surroundings.see(objects):
-            self._record.write("seen", time, objects=self.surroundings.places())
-            if self.target is None:
-                targets = [o.object.name for o in objects if o.object.role == "target" and o.object.grasps]
-                self.target = targets[0] if targets else None
-            self._check_motion()
+        self._take(events.Seen(objects, time))
 
     def see_arm(self, T_base_tip: pin.SE3, covariance: Matrix, time: float) -> None:
         """Where a picture shows the tip, with its covariance (6, 6); nothing moves where the joints say otherwise."""
-        if not self.past:
-            self._check.see(T_base_tip, covariance, self.robot.fk(self.q), time)
+        self._take(events.TipSeen(T_base_tip, covariance, time))
+
+    def see_no_use(self, why: str) -> None:
+        """A photograph, or picture of a film, could not be used."""
+        self._take(events.Unusable(why))
 
     def tick(self, time: float) -> None:
         """Read the arm and update its progress along the route; stop it where the present is not known any more."""
-        self.time = max(self.time, time)
-        before, self.q = self.q, frozen(self.arm.read())
-        if not np.array_equal(before, self.q):
-            self._record.write("joints", time, q=self.q.tolist())
-            if self.surroundings.settle(self.q):
-                self._check_motion()
-        self._check.read(self.q, time)
-        expired = self.held.expire()
-        if not self._recorded:
-            self.say(expired)
-            self.say(self.held.watch())
-        self._fault = self.held.drive.supervisor.fault
-        self._watch()
-        self._watch_view()
-        self.say(self.guide.watch())
+        self._take(events.Measured(self.arm.read(), time, self.arm.lost))
+        standing = None
+        if not self.means.recorded:
+            now = self._arms_time()
+            if not self._read_by_arm:
+                self.supervisor.read(self.state.q, now)
+            standing = self.supervisor.standing(now)
+        self._take(events.Judged(self.supervisor.fault, standing))
         if ended := self._record.news():
             self.say(alarm(ended))
 
     def say(self, answer: Answer | None) -> None:
         """Show an answer to the pilot; None leaves the last one."""
-        self.answer = answer or self.answer
+        if answer is not None:
+            self._take(events.Said(answer))
 
-    def command(self, verb: str, time: float, /, **arguments: object) -> str:
+    def stand_still(self) -> None:
+        """Stop the arm, and end what is held."""
+        self._take(events.Broken())
+
+    def command(self, verb: str, time: float, sight: Sight | None = None, /, **arguments: object) -> str:
         """Execute a command of the pilot; returns a line for a person, which is `message` from then on.
 
-        A command that cannot be executed in this mode, or on what is known, says so and moves nothing. Those of
-        `MOVING` are held: they are repeated as long as the arm shall move. Any other command ends the motion.
+        A command that cannot be executed in this mode, or on what is known, says so and moves nothing. Those that are
+        held are repeated as long as the arm shall move. Any other command ends the motion.
+
+        Args:
+            verb: One of `machine.VERBS`.
+            time: Now [s].
+            sight: What the page of the pilot had shown; None without a page.
+            **arguments: Of the command.
         """
-        self.time = max(self.time, time)
-        goes_on = self.held.goes_on(verb, arguments)
-        if goes_on and self.held.over:
-            return self.message  # of what ended the press
-        try:
-            if verb not in self._commands:
-                raise UnknownNameError("command", verb[:MAX_WORD_LENGTH], self._commands)
-            act = self._commands[verb]
-            given = fitting(act, verb, arguments)
-            if verb not in (*MOVING, "release"):
-                self.held.end()
-            why = self.guide.over(verb) or refusal(verb, self.mode, self.known) or self.hand.refusal(verb)
-            if why:
-                raise InputError(why)
-            if not goes_on:
-                self._record.write("command", time, name=verb, arguments=given)
-            self.say(act(**given))
-        except RrtikError as error:
-            self.held.refuse(verb, arguments.get("press"))
-            self.say(refused(str(error)))
-        if not goes_on:
-            self._record.write("answer", time, text=self.message, level=self.answer.level.value, mode=self.mode)
+        self._take(events.Command(verb, time, self.arm.lost, sight, arguments))
         return self.message
 
-    # --- output -------------------------------------------------------------------------------------------
+    # --- effects --------------------------------------------------------------------------------------------------
+
+    def _take(self, event: events.Event) -> None:
+        """Go on to the next state, and carry out what is to be done; an answer to that is the next event, at once."""
+        self.state, effects = handle(self.means, self.state, event)
+        for effect in effects:
+            try:
+                following = self._carry_out(effect)
+            except RrtikError as error:
+                following = events.Failed(str(error))
+            if following is not None:
+                self._take(following)
+
+    def _carry_out(self, effect: events.Effect) -> events.Event | None:
+        match effect:
+            case events.Stop():
+                self.supervisor.stopped(self._arms_time())
+                self.arm.stop()
+            case events.SetPoint(aim, ahead, joint):
+                self.supervisor.told(aim, ahead, self.state.q, self._arms_time())
+                if joint is None:
+                    self.arm.follow(aim)
+                else:
+                    self.arm.move(joint, float(aim[joint]))
+            case events.Grip(closed, then):
+                self.arm.grip(closed)
+                return events.Reply(then, self.arm.read())
+            case events.Read(then):
+                return events.Reply(then, self.arm.read())
+            case events.ReadMaster(then):
+                return events.Reply(then, self._read_master())
+            case events.FindRoute(search, then):
+                return events.Reply(then, search())
+            case events.StepToGrasp(world, goal, seconds, begins, then):
+                step = self._grasp_servo.step(self.state.q, world, goal, seconds, begins=begins)
+                return events.Reply(then, step)
+            case events.Acknowledge():
+                self.supervisor.acknowledge()
+            case events.Give(verb):
+                return events.Command(verb, self.time, self.arm.lost, self.state.sight)
+            case events.Write(kind, time, values):
+                self._record.write(kind, time, **values)
+            case events.WriteAnswer(time):
+                said = self.state.answer
+                self._record.write("answer", time, text=said.text, level=said.level.value, mode=self.mode)
+        return None
+
+    def _read_master(self) -> Vector:
+        if self.master is None:
+            raise InputError("there is no master arm: --master HOST:PORT names one")
+        if self.master.lost:
+            raise InputError(f"master arm: {self.master.lost}")
+        return self.master.read()
+
+    def _arms_time(self) -> float:
+        """Now, by the clock of whoever reads the arm [s]."""
+        return clock.monotonic() if self._read_by_arm else self.time
+
+    # --- what it is like now --------------------------------------------------------------------------------------
 
     @property
-    def known(self) -> Knowledge:
-        """What is known now of the arm and of the picture."""
-        age = self.time - self.picture_time
-        fault = self._fault
-        off = self._check.off
-        unseen = self._out_of_view()
-        return Knowledge(self.arm.lost, age, self.past, off, self.unusable, fault, self.sight, unseen)
+    def robot(self) -> Robot:
+        """The arm that is moved."""
+        return self.means.robot
+
+    @property
+    def time(self) -> float:
+        """Of the last event [s]."""
+        return self.state.time
+
+    @property
+    def q(self) -> Vector:
+        """Where the arm is, shape (dof,) [rad or m]."""
+        return self.state.q
+
+    @property
+    def mode(self) -> str:
+        """One of `interlock.MODES`."""
+        return self.state.mode
 
     @property
     def message(self) -> str:
         """The line that was said last."""
-        return self.answer.text
+        return self.state.answer.text
 
     @property
     def level(self) -> Level:
         """Of that line."""
-        return self.answer.level
+        return self.state.answer.level
 
     @property
     def driving(self) -> bool:
-        """Whether a joint is driven."""
-        return self.held.drive.active
+        """Whether the arm is driven."""
+        return self.state.drive.active
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """The objects as they were seen last, and what the gripper holds."""
+        return self.state.around
+
+    @property
+    def target(self) -> str | None:
+        """Name of the object that is chosen."""
+        return self.state.target
 
     @property
     def route(self) -> Route | None:
         """The route that was planned last."""
-        return self.guide.route
+        return self.state.way.route
 
     @property
     def follower(self) -> Follower | Track | None:
         """Of the route, or of the way back."""
-        return self.guide.follower
+        return self.state.way.follower
 
     @property
     def progress(self) -> Progress | None:
         """Where the arm is on its route."""
-        return self.guide.progress
+        return self.state.way.progress
+
+    @property
+    def known(self) -> Knowledge:
+        """What is known now of the arm and of the picture."""
+        return queries.known(self.means, self.state)
 
     @property
     def world(self) -> World:
         """The world for moves by hand: the gripper may touch what it holds, as long as it does."""
-        return self.surroundings.world_at(self.q, self.target)
+        return queries.world_by_hand(self.state)
 
     def lamps(self) -> tuple[Lamp, ...]:
         """Lamps of the chosen object where it is and for where the arm is; none is green if no route can be led."""
-        found = self.feasibility.lamps(self.target, self.q)
-        unseen = self.known.unseen
-        if not unseen:
-            return found
-        return tuple(replace(each, color=AMBER, reason=unseen) if each.color == GREEN else each for each in found)
+        return queries.lamps(self.means, self.state)
 
     def lamp(self) -> Lamp | None:
         """The lamp of the grasp that is chosen."""
-        return next((lamp for lamp in self.lamps() if (lamp.type, lamp.level) == self.choice), None)
+        return queries.chosen_lamp(self.means, self.state)
 
     def fault(self) -> str:
         """What is wrong with the grasp that is chosen: by how much it is out of reach, what touches; "" if nothing."""
-        lamp = self.lamp()
-        return "" if lamp is None else self.known.unseen or self.feasibility.fault(str(self.target), lamp, self.q)
+        return queries.grasp_fault(self.means, self.state)
 
     def joint_range(self) -> JointRange:
         """The range in which the selected joint can be driven now."""
-        return self.feasibility.joint_range(self.world, self.q, self.selected)
+        return queries.joint_range(self.means, self.state)
 
     def unseen(self, name: str) -> float:
         """For how long an object has not been in view, by the pictures taken since [s]."""
-        return max(self.picture_time - self._seen_at.get(name, self.picture_time), 0.0)
-
-    def _out_of_view(self) -> str:
-        """What the world stands on and was not seen for longer than patience allows, in words; "" if nothing."""
-        if self.past or self._patience == np.inf or self.picture_time == -np.inf:
-            return ""
-        for name in self.surroundings.basis:
-            if name not in self._seen_at:
-                return f"'{name}' was not seen yet"
-            if self.unseen(name) > self._patience:
-                return f"'{name}' has not been in view for {self.unseen(name):.0f} s"
-        return ""
-
-    # --- commands ------------------------------------------------------------------------------------------------
-
-    def _select(self, joint: int) -> Answer:
-        if not 0 <= int(joint) < self.robot.dof:
-            raise InputError(f"joint must be 1 to {self.robot.dof}, got {int(joint) + 1}")
-        self.selected = int(joint)
-        return news(f"{self.robot.joint_names[self.selected]} selected")
-
-    def stand_still(self) -> None:
-        """Stop the arm, and end what is held."""
-        self.held.end()
-        self.arm.stop()
-
-    def _stop(self) -> Answer:
-        """Stop the arm; a fault that the pilot has had time to read is acknowledged."""
-        said = self._end_motion()
-        if self._fault and self.time - self._fault_at <= READ_SECONDS:
-            return alarm(f"stopped; {self._fault}; {ACKNOWLEDGE}")
-        if self._fault:  # one of this moment, which nobody has read, stays
-            self._fault = ""
-            self.held.drive.supervisor.acknowledge()
-        return news(said)
-
-    def _end_motion(self) -> str:
-        """Stop the arm, and take back that a route is followed; what there is to say."""
-        self.stand_still()
-        self.desired = self.q
-        if self.mode == FOLLOWING:
-            self.mode = PROPOSED
-            return "stopped; 'accept' goes on with the route, 'reject' leaves it"
-        return "stopped"
-
-    def _halt(self) -> Answer:
-        """Stop the arm, for no page has the pilot any more."""
-        self._end_motion()
-        return alarm("the pilot has left; the arm stands still")
-
-    def _object(self, name: str) -> Answer:
-        if self.surroundings.named(name) is None:
-            raise UnknownNameError("object in view", name, [o.object.name for o in self.surroundings.seen])
-        self.target, self.choice, self.mode = name, None, CHOOSING
-        return news(f"{name} chosen; now a grasp")
-
-    def _grasp(self, type: str, level: int) -> Answer:
-        self.surroundings.check_grasp(self.target, type, int(level))
-        self.choice, self.mode = (type, int(level)), CHOOSING
-        fault, place = self.fault(), f"{type} at level {int(level) + 1}"
-        return refused(f"{place}: {fault}") if fault else news(f"{place}: can be reached")
-
-    # --- what ends a motion ---------------------------------------------------------------------------------------
-
-    def _watch(self) -> None:
-        """Stop when picture or arm are not known any more, and leave the route; say when they are known again."""
-        trouble, before = self.known.trouble, self._trouble
-        self._trouble = trouble
-        if trouble == before:
-            return
-        how = f"; {ACKNOWLEDGE}" if self._fault == trouble else ""
-        if self._fault == trouble:
-            self._fault_at = self.time
-        if not trouble:
-            self.say(news("picture and arm are known again; the arm stands still"))
-        elif self.mode == FOLLOWING or self.held.drive.active:
-            self._record.write("command", self.time, name="stop", arguments={})
-            self.say(alarm(f"{trouble}: {self._end_motion()}{how}"))
-        else:
-            self.arm.stop()
-            self.say(alarm(trouble + how))
-
-    def _watch_view(self) -> None:
-        """Leave the route when something that it stands on has been out of view for too long, and say so."""
-        unseen = self.known.unseen
-        before = self._unseen
-        self._unseen = unseen
-        if bool(unseen) == bool(before):
-            return
-        if not unseen:
-            self.say(news("all that routes stand on is in view"))
-        elif self.mode == FOLLOWING:
-            self._record.write("command", self.time, name="stop", arguments={})
-            self.say(alarm(f"{unseen}: {self._end_motion()}"))
-        else:
-            self.say(alarm(f"{unseen}: no route is led past it, and by hand it may be elsewhere"))
-
-    def _check_motion(self) -> None:
-        """After a change of the scene: stop if what is driven, followed or proposed is not free any more."""
-        if self.mode != FOLLOWING and not self.held.still_free():
-            self.held.end()
-            self.say(alarm("stopped: something has come into the way"))
-        self.say(self.guide.check())
+        return queries.unseen_for(self.state, name)

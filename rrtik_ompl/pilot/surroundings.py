@@ -1,9 +1,9 @@
-"""The world of a session: the problem's scene with the objects that the camera sees; rebuilt only when they move."""
+"""The world of a session: the problem's scene with the objects that the camera sees; made anew only when they move."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -65,25 +65,31 @@ class Grip(NamedTuple):
     buried: tuple[tuple[str, str], ...]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """Worlds with the objects as they were seen last.
+    """Worlds with the objects as they were seen last, as a value: what changes them gives another one.
 
     Attributes:
-        world: The world in which nothing may be touched.
-        version: Counts how often the world became another one.
+        given: The problem's world.
+        structure: To what its obstacles are fixed; None if they move with the arm's base.
         held: What the gripper holds, as part of the arm; None if nothing.
+        version: Counts how often the world became another one.
     """
 
-    def __init__(self, world: World, structure: Structure | None = None) -> None:
-        """Begin with a world without objects."""
-        self._given, self._structure = world, structure
-        self.world = world
-        self.version = 0
-        self.held: HeldObject | None = None
-        self._seen: dict[str, SeenObject] = {}
-        self._holding: dict[str, World] = {}
-        self._grips: dict[str, Grip] = {}
-        self._let_go: dict[str, pin.SE3] = {}  # where the tip stood in what was put down, T_object_tip
+    given: World
+    structure: Structure | None = None
+    held: HeldObject | None = None
+    version: int = 0
+    _seen: Mapping[str, SeenObject] = field(default_factory=dict)
+    _let_go: Mapping[str, pin.SE3] = field(default_factory=dict)  # where the tip was in what was put down, T_object_tip
+    _made: World | None = None  # of what was seen and is held; None before there was anything
+    _holding: dict[str, World] = field(default_factory=dict)  # kept results, of these surroundings
+    _grips: dict[str, Grip] = field(default_factory=dict)  # kept results, as long as the same thing is held
+
+    @property
+    def world(self) -> World:
+        """The world in which nothing may be touched."""
+        return self.given if self._made is None else self._made
 
     @property
     def seen(self) -> tuple[SeenObject, ...]:
@@ -93,7 +99,7 @@ class Surroundings:
     @property
     def basis(self) -> tuple[str, ...]:
         """Names of the objects by whose places the world is made: the structure, and all that was seen."""
-        fixed = () if self._structure is None else (self._structure.name,)
+        fixed = () if self.structure is None else (self.structure.name,)
         return tuple(dict.fromkeys((*fixed, *self._seen)))
 
     def named(self, name: str) -> SeenObject | None:
@@ -122,56 +128,46 @@ class Surroundings:
         """
         return [_plain(each) for each in self.seen]
 
-    def see(self, objects: Sequence[SeenObject]) -> bool:
-        """Update by the objects that the camera sees; True if one moved or is new, so that the world changed."""
+    def see(self, objects: Sequence[SeenObject]) -> Surroundings:
+        """With the objects that the camera sees; these surroundings themselves if none of them is new or has moved."""
         held = "" if self.held is None else self.held.seen.object.name
         news = [each for each in objects if each.object.name != held and self._moved(each)]
         if not news:
-            return False
-        self._seen |= {each.object.name: each for each in news}
-        self._renew()
-        return True
+            return self
+        seen = {**self._seen, **{each.object.name: each for each in news}}
+        return self._renewed(_seen=seen)
 
-    def hold(self, seen: SeenObject, T_tip_object: pin.SE3, q: Vector) -> tuple[Touching, ...]:
-        """An object moves with the gripper from now on; what it touches at q, (dof,), it may until the two have parted.
+    def hold(self, seen: SeenObject, T_tip_object: pin.SE3, q: Vector) -> Surroundings:
+        """With an object in the gripper; what it touches at q, shape (dof,), it may until the two have parted.
 
-        Returns:
-            How far it and what it touches may overlap: a millimetre more than now.
+        How far they may overlap says `held`: a millimetre more than now.
         """
-        self._seen.pop(seen.object.name, None)
-        self.held = HeldObject(seen, T_tip_object, ())
-        self._grips.clear()
-        world = self._with(())
+        others = {name: each for name, each in self._seen.items() if name != seen.object.name}
+        taken = HeldObject(seen, T_tip_object, ())
+        world = replace(self, held=taken, _seen=others, _grips={}).world_with(())
         mine = seen.object.solid_names
         near = [frozenset((contact.first, contact.second)) for contact in world.contacts(q)]
         rests = {pair: allowed(world.bodies, *sorted(pair)) for pair in near if pair & set(mine)}
         rests |= {each.pair: each.going_on() for name in mine for each in touching_at(world, q, name)}
-        self.held = HeldObject(seen, T_tip_object, tuple(rests.values()))
-        self._renew()
-        return self.held.rests
+        return self._renewed(held=taken._replace(rests=tuple(rests.values())), _seen=others, _grips={})
 
-    def release(self, T_base_tip: pin.SE3) -> None:
-        """What is held stays where it is for a pose of the tip."""
-        if self.held is None:
-            return
-        held, self.held = self.held, None
-        place = T_base_tip * held.T_tip_object
-        self._seen[held.seen.object.name] = replace(held.seen, T_base_object=place, sighting=None)
-        self._let_go[held.seen.object.name] = held.T_tip_object.inverse()
-        self._grips.clear()
-        self._renew()
+    def release(self, T_base_tip: pin.SE3) -> Surroundings:
+        """With what is held where it is for a pose of the tip."""
+        held = self.held
+        if held is None:
+            return self
+        name = held.seen.object.name
+        placed = replace(held.seen, T_base_object=T_base_tip * held.T_tip_object, sighting=None)
+        let_go = {**self._let_go, name: held.T_tip_object.inverse()}
+        return self._renewed(held=None, _seen={**self._seen, name: placed}, _let_go=let_go, _grips={})
 
-    def settle(self, q: Vector) -> bool:
-        """What is held may not touch again what it has parted from with an arm at q, shape (dof,); True if it has."""
+    def settle(self, q: Vector) -> Surroundings:
+        """What is held may not touch again what it has parted from with an arm at q, shape (dof,)."""
         held = self.held
         if held is None or not held.rests:
-            return False
+            return self
         rests = tuple(contact for contact in held.rests if not parted(self.world, q, contact))
-        if rests == held.rests:
-            return False
-        self.held = held._replace(rests=rests)
-        self._renew()
-        return True
+        return self if rests == held.rests else self._renewed(held=held._replace(rests=rests))
 
     def left_inside(self, q: Vector) -> str:
         """What is held would be left deep inside something by an arm at q, shape (dof,), in words; "" if not."""
@@ -190,7 +186,7 @@ class Surroundings:
         """The world in which the gripper may touch an object."""
         if name not in self._holding:
             grip = self._grip(name)
-            self._holding[name] = self._with((*grip.contacts, *self._rests()), grip.buried)
+            self._holding[name] = self.world_with((*grip.contacts, *self.rests), grip.buried)
         return self._holding[name]
 
     def not_compared(self, name: str) -> str:
@@ -207,7 +203,7 @@ class Surroundings:
         if name in self._grips:
             return self._grips[name]
         near = self._at_grasps(name)
-        links = gripper_links(self._given.robot)
+        links = gripper_links(self.given.robot)
         contacts = []
         buried = []
         for pair, each in near.items():
@@ -223,7 +219,7 @@ class Surroundings:
     def _at_grasps(self, name: str) -> dict[tuple[str, str], Nearness]:
         """How near each part of the gripper, and of what it holds, comes to each solid of an object at its grasps."""
         seen = self._seen[name]
-        robot = self._given.robot
+        robot = self.given.robot
         attached = tuple(self._attached())
         thing = seen.object
         parts = (*gripper_links(robot), *(item.name for item in attached))
@@ -233,7 +229,7 @@ class Surroundings:
         found: dict[tuple[str, str], Nearness] = {}
         for T_object_tip in (*tips, *([self._let_go[name]] if name in self._let_go else [])):
             there = replace(seen, T_base_object=tip * T_object_tip.inverse())
-            world = self._given.with_scene(Scene(there.solids(), attached))
+            world = self.given.with_scene(Scene(there.solids(), attached))
             for part, solid in product(parts, thing.solid_names):
                 apart = Nearness(part, solid, np.inf, deepest_contact(world.bodies, part, solid))
                 found.setdefault((part, solid), apart)
@@ -261,25 +257,32 @@ class Surroundings:
         wider = max(_margins(new), default=0.0) - max(_margins(old), default=0.0)
         return shifted > MIN_SHIFT or turned > MIN_ROTATION or abs(wider) > MIN_SHIFT
 
-    def _with(self, contacts: Sequence[Touching], buried: Sequence[tuple[str, str]] = ()) -> World:
+    def world_with(self, contacts: Sequence[Touching], buried: Sequence[tuple[str, str]] = ()) -> World:
+        """The world of what is given, seen and held.
+
+        Args:
+            contacts: Pairs that may overlap, and how far.
+            buried: Pairs that are not compared.
+        """
         given = self._fixed_scene()
         scene = scene_with(given, [solid for each in self._seen.values() for solid in each.solids()])
         attached = (*given.attached, *self._attached())
         changed = replace(scene, attached=attached, allowed_collisions=(*given.allowed_collisions, *buried))
-        return self._given.with_accuracy("exact").with_scene(with_contacts(changed, contacts))
+        return self.given.with_accuracy("exact").with_scene(with_contacts(changed, contacts))
 
-    def _renew(self) -> None:
-        """After a change: worlds are made anew."""
-        self.world = self._with(self._rests())
-        self._holding.clear()
-        self.version += 1
+    def _renewed(self, **changes: Any) -> Surroundings:
+        """With changes, the world made of them, and none of those kept."""
+        changed = replace(self, version=self.version + 1, _holding={}, **changes)
+        return replace(changed, _made=changed.world_with(changed.rests))
 
-    def _rests(self) -> tuple[Touching, ...]:
+    @property
+    def rests(self) -> tuple[Touching, ...]:
+        """How far what is held and what it has not parted from may overlap."""
         return () if self.held is None else self.held.rests
 
     def _attached(self) -> list[AttachedObject]:
         """What is held, as part of the arm; how far its place is uncertain adds to its margin."""
-        held, robot = self.held, self._given.robot
+        held, robot = self.held, self.given.robot
         if held is None:
             return []
         near, thing = gripper_links(robot), held.seen.object
@@ -297,7 +300,7 @@ class Surroundings:
 
     def _fixed_scene(self) -> Scene:
         """The problem's scene where the structure is seen; how far that is uncertain is the margin of its obstacles."""
-        given, fixed = self._given.scene, self._structure
+        given, fixed = self.given.scene, self.structure
         seen = None if fixed is None else self._seen.get(fixed.name)
         if fixed is None or seen is None:
             return given

@@ -95,7 +95,7 @@ class OutsideView:
         session = self._session
         shown = session.q.tobytes() if self.share is None else along(session, self.share).tobytes()
         moves = None if session.follower is None else (id(session.follower), session.follower.current)
-        chosen = (session.mode, session.target, session.choice, session.surroundings.version)
+        chosen = (session.mode, session.target, session.state.choice, session.surroundings.version)
         return shown, moves, chosen, self.distance, self.azimuth, self.elevation
 
     def draw(self) -> NDArray[np.uint8]:
@@ -145,9 +145,9 @@ def along(session: Session, share: float) -> Vector:
 def _chosen(session: Session) -> list[pin.SE3]:
     """``T_base_tip`` of the grasp that is chosen, in reach or not."""
     seen = None if session.target is None else session.surroundings.named(session.target)
-    if seen is None or session.choice is None:
+    if seen is None or session.state.choice is None:
         return []
-    return [seen.grasp_pose(*session.choice)]
+    return [seen.grasp_pose(*session.state.choice)]
 
 
 def _objects(session: Session) -> Sequence[pin.SE3]:

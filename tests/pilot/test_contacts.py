@@ -114,7 +114,7 @@ def test_who_lets_go_of_something_deep_in_something_else_is_told(there):
     made.command("close", 0.1)
     said = made.command("open", 0.2)
     assert said == ("open: 'bar' would be left 4 mm inside 'plate'; 1 mm at most" if there else "open: bar is put down")
-    assert made.hand.holds == ""
+    assert made.state.holds == ""
     assert made.world.scene.attached == ()
 
 
@@ -123,10 +123,10 @@ def tool_and_rack(q):
     around, marker_map = Surroundings(WORLD), TOOL.marker_map
     tool, rack = marker_map.named("tool"), marker_map.named("rack")
     seen = SeenObject(tool, ROBOT.fk(q) * tool.grasp("straight").levels[0].inverse(), 1e-10 * np.eye(6), None)
-    around.see([seen])
-    around.hold(seen, ROBOT.fk(q).actInv(seen.T_base_object), q)
+    around = around.see([seen])
+    around = around.hold(seen, ROBOT.fk(q).actInv(seen.T_base_object), q)
     place = ROBOT.fk(q) * rack.grasp("put").levels[0].inverse()
-    around.see([SeenObject(rack, place, 1e-10 * np.eye(6), None)])
+    around = around.see([SeenObject(rack, place, 1e-10 * np.eye(6), None)])
     return around
 
 
@@ -157,7 +157,7 @@ def test_what_is_put_down_gets_a_millimetre_deeper_into_its_place_than_there_and
 def test_the_gripper_gets_no_deeper_into_what_it_is_to_grasp_than_at_a_grasp_and_a_little():
     around, tool = Surroundings(WORLD), TOOL.marker_map.named("tool")
     levels = tool.grasp("straight").levels
-    around.see([SeenObject(tool, ROBOT.fk(Q) * levels[0].inverse(), 1e-10 * np.eye(6), None)])
+    around = around.see([SeenObject(tool, ROBOT.fk(Q) * levels[0].inverse(), 1e-10 * np.eye(6), None)])
     world = around.holding("tool")
     assert world.scene.allowed_collisions == WORLD.scene.allowed_collisions
     places = [ROBOT.fk(Q) * level.inverse() for level in levels]
@@ -177,7 +177,7 @@ def test_the_gripper_gets_no_deeper_into_what_it_is_to_grasp_than_at_a_grasp_and
 def test_nothing_but_what_is_buried_in_the_gripper_is_ever_left_out_of_the_comparison():
     around, marker_map = tool_and_rack(Q), TOOL.marker_map
     worlds = [around.world, around.holding("rack"), around.world_at(Q, "rack")]
-    around.release(ROBOT.fk(Q))
+    around = around.release(ROBOT.fk(Q))
     worlds += [around.world, around.holding("tool"), around.holding("rack"), around.world_at(Q, "tool")]
     links, solids = set(gripper_links(ROBOT)), {name for each in marker_map.objects for name in each.solid_names}
     for world in worlds:

@@ -20,9 +20,9 @@ class Driver:
         self.opened = open_session(SessionOptions("titan4_sdu", vehicle=TOOL, record=record, seed=1))
         self.engine, self.time, self.presses = self.opened.engine, 0.0, 0
         self.session = self.engine.session
-        for rates in (self.session.rates, self.session.arm._rates):
+        for rates in (self.session.means.rates, self.session.arm._rates):
             rates.flags.writeable = True
-        self.session.rates[:] = self.session.arm._rates[:] = 1.5
+        self.session.means.rates[:] = self.session.arm._rates[:] = 1.5
         self.passes(2)
 
     def passes(self, steps, **command):
@@ -54,7 +54,7 @@ class Driver:
             assert self.presses < 60
             for _ in range(60):
                 self.passes(1, name="next", press=self.presses)
-                if self.session.held.over or self.session.mode != "following":
+                if self.session.state.press.over or self.session.mode != "following":
                     break
             self.session.command("release", self.time)
             self.passes(1)
@@ -96,7 +96,7 @@ def test_a_tool_is_picked_lifted_carried_and_placed(tmp_path):
     again = open_session(SessionOptions("titan4_sdu", vehicle=TOOL, replay=tmp_path / "record.jsonl"))
     again.engine.update(hands.time + 1.0)
     assert again.engine.session.q == pytest.approx(end)
-    assert again.engine.session.hand.closed is False
+    assert again.engine.session.state.gripper.closed is False
     placed = again.engine.session.surroundings.named("tool").T_base_object.translation
     assert placed == pytest.approx(wanted.translation, abs=2e-3)
     again.close()

@@ -1,5 +1,6 @@
 """Nothing moves on a stale picture, a lost arm or a route that was not accepted; what is let go stops."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -7,11 +8,12 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import DEFAULT_RATE, SimulatedArm
-from rrtik_ompl.pilot.interlock import ALWAYS, FOLLOWING, MODES, MOVING, PRESENT, PROPOSED
-from rrtik_ompl.pilot.motion.drive import LEASH_SECONDS
+from rrtik_ompl.pilot.interlock import FOLLOWING, MODES, PROPOSED
+from rrtik_ompl.pilot.motion.drive import LEASH_SECONDS, Press
 from rrtik_ompl.pilot.routes.follower import Follower
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
-from rrtik_tests.pilot_session import PROBLEM, session
+from rrtik_ompl.pilot.state import Gripper, Way
+from rrtik_tests.pilot_session import ALWAYS, MOVING, PRESENT, PROBLEM, session
 
 ARGUMENTS = {
     "jog": {"direction": 1.0, "press": 1},
@@ -33,32 +35,41 @@ LEASH = max(LEASH_SECONDS * DEFAULT_RATE, ONE_DEGREE) + 1e-9
 @pytest.fixture(scope="module")
 def planned():
     made, arm = session()
-    made.leading.master = SimulatedArm(PROBLEM.robot, PROBLEM.start - 0.04)
+    made.master = SimulatedArm(PROBLEM.robot, PROBLEM.start - 0.04)
     made.command("grasp", 0.0, type="front", level=0)
     made.command("plan", 0.0)
     assert made.mode == PROPOSED
     return made, arm
 
 
-def put_into(planned, mode, link, picture):
+def put_into(planned, route, mode, link, picture):
     """A session in a state, at time 100."""
     made, arm = planned
     arm._q, arm._goal, arm.lost = PROBLEM.start.copy(), None, link
-    made.held.end()
-    made.mode, made.selected, made.choice, made.speed = mode, 0, ("front", 0), 1.0
-    made.guide.follower, made.guide.progress = Follower(made.route.path, made.rates), None
-    made.time, made.picture_time, made._trouble = 100.0, 100.0 + PICTURES[picture], ""
-    made.q = arm.read()
-    made.desired = made.q.copy()
-    made.desired[0] += 0.2
-    made.held._press, made.hand.closed = ("", -1.0), False
+    made.stand_still()
+    q = arm.read()
+    made.state = replace(
+        made.state,
+        mode=mode,
+        selected=0,
+        choice=("front", 0),
+        speed=1.0,
+        way=Way(route, Follower(route.path, made.means.rates), list_of_moves=route),
+        time=100.0,
+        pictures=replace(made.state.pictures, time=100.0 + PICTURES[picture]),
+        trouble="",
+        q=q,
+        desired=q + 0.2 * np.eye(PROBLEM.robot.dof)[0],
+        press=Press(),
+        gripper=Gripper(),
+    )
     return made, arm
 
 
 def test_no_command_in_no_state_moves_the_arm_where_it_may_not(planned):
     route, count = planned[0].route, 0
     for mode, link, picture, verb in product(MODES, ("", "the line is cut"), PICTURES, (*PRESENT, *ALWAYS)):
-        made, arm = put_into(planned, mode, link, picture)
+        made, arm = put_into(planned, route, mode, link, picture)
         made.command(verb, 100.0, **ARGUMENTS.get(verb, {}))
         after = made.mode
         travel = 0.0
@@ -77,7 +88,7 @@ def test_no_command_in_no_state_moves_the_arm_where_it_may_not(planned):
         if not known:
             assert made.mode != FOLLOWING, state
             assert verb in ALWAYS or after == mode, state
-        made.guide.route, count = route, count + 1
+        count += 1
     assert count == len(MODES) * 2 * len(PICTURES) * len((*PRESENT, *ALWAYS))
 
 
@@ -110,7 +121,7 @@ def test_an_arm_that_is_let_go_travels_a_degree_at_most(how):
     if how == "released":
         made.command("release", time)
     assert coast(made, arm, time) <= ONE_DEGREE + 1e-9
-    assert not made.held.drive.active
+    assert not made.driving
 
 
 def test_a_stop_outlasts_the_key_that_is_still_held():

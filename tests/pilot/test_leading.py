@@ -5,9 +5,9 @@ import pytest
 
 from rrtik_ompl.base.poses import apart, pose
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.document import state_document
 from rrtik_ompl.pilot.motion.leading import ALIGNED, NEAR
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.pilot.state import state_document
 from rrtik_tests.pilot_session import PLACE, PROBLEM, ROBOT, WORLD, follow, hold, seen_at, session
 
 
@@ -120,5 +120,5 @@ def test_a_master_arm_leads_into_nothing():
         master._q = arm.read()
         made.command("lead", made.time, press=press)
         master._q = goal
-        hold(made, arm, "lead", made.time, lambda: made.held.over, seconds=3.0, step=0.05, press=press)
+        hold(made, arm, "lead", made.time, lambda: made.state.press.over, seconds=3.0, step=0.05, press=press)
         assert made.world.valid(arm.read())

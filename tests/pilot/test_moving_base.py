@@ -40,7 +40,7 @@ def test_obstacles_stay_with_the_structure_that_they_are_fixed_to():
         Surroundings(WORLD, Structure("valve", PLACE)),
         pose_from_rpy([0.02, -0.03, 0.01], [0.0, 0.02, 0.05]),
     )
-    around.see([seen_at(shift * PLACE)])
+    around = around.see([seen_at(shift * PLACE)])
     for before in WORLD.scene.obstacles:
         after = around.world.scene.obstacle(before.name)
         assert after.pose.isApprox(shift * before.pose)
@@ -80,12 +80,12 @@ def test_a_route_is_withdrawn_when_the_vehicle_has_drifted_and_the_arm_stands_st
     passes(0.5, name="next", press=1)
     assert session.driving
     passes(2.0, name="next", press=1)
-    assert "valve has moved by" in session.guide.withdrawn
+    assert "valve has moved by" in session.state.way.withdrawn
     assert session.mode == PROPOSED
     there = session.arm.read()
     passes(0.5, name="next", press=2)
     assert np.array_equal(session.arm.read(), there)
-    assert engine.state()["route"]["withdrawn"] == session.guide.withdrawn
+    assert engine.state()["route"]["withdrawn"] == session.state.way.withdrawn
     truth = engine.perception.source._motion.at(time).actInv(load_vehicle(file).places["valve"])
     assert np.linalg.norm(session.surroundings.named("valve").T_base_object.translation - truth.translation) < 3e-3
     opened.close()

@@ -76,7 +76,7 @@ def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
 def type_a_value(browser, running):
     """By M, a number and Enter, from where the arm is free; letters commanded again after that."""
     session = running.opened.engine.session
-    session.arm._q[:] = session.problem.start
+    session.arm._q[:] = session.means.problem.start
     browser.press("5")
     browser.wait("state.selected === 4 && document.getElementById('range').textContent.includes('meets')")
     browser.press("m")
@@ -91,8 +91,8 @@ def type_a_value(browser, running):
 
 def follow(browser, running):
     """Hold N for one move after the other until the arm, which is made fast, has made all of them."""
-    running.opened.engine.session.rates.flags.writeable = True
-    running.opened.engine.session.rates[:] = running.opened.engine.session.arm._rates[:] = 3.0
+    running.opened.engine.session.means.rates.flags.writeable = True
+    running.opened.engine.session.means.rates[:] = running.opened.engine.session.arm._rates[:] = 3.0
     for _ in range(40):
         if browser.ask("state.mode") != "following":
             return

@@ -34,7 +34,7 @@ def tab(browser, running):
 def page(tab, running):
     session = running.opened.engine.session
     session.arm.stop()
-    session.arm._q[:] = session.problem.start
+    session.arm._q[:] = session.means.problem.start
     tab.call("Page.reload")
     time.sleep(0.3)
     tab.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble && picture")
@@ -191,9 +191,9 @@ def enable(page):
 @pytest.mark.slow
 def test_a_whole_route_by_a_gamepad_alone(page, running):
     session = running.opened.engine.session
-    session.rates.flags.writeable = True
-    usual = session.rates.copy()
-    session.rates[:] = session.arm._rates[:] = 3.0
+    session.means.rates.flags.writeable = True
+    usual = session.means.rates.copy()
+    session.means.rates[:] = session.arm._rates[:] = 3.0
     page.ask(PAD)
 
     def tap(button, until):
@@ -218,4 +218,4 @@ def test_a_whole_route_by_a_gamepad_alone(page, running):
         page.wait("state.mode !== 'following' || state.route.moves.some(m => m.status === 'current')")
     page.wait("state.message === 'all moves are done'")
     assert page.ask("state.aim.distance") < 0.002
-    session.rates[:] = session.arm._rates[:] = usual
+    session.means.rates[:] = session.arm._rates[:] = usual

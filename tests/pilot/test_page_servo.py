@@ -71,7 +71,7 @@ def test_a_target_that_has_moved_is_reached_by_sight_and_a_lost_one_is_not(brows
 
 
 def seen_grasp(session):
-    return session.surroundings.named("valve").grasp_pose(*session.choice)
+    return session.surroundings.named("valve").grasp_pose(*session.state.choice)
 
 
 def wait_until_unseen(session):

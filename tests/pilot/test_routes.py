@@ -31,8 +31,7 @@ VALVE, PLACE = SCENARIO.marker_map.named("valve"), SCENARIO.places["valve"]
 
 
 def surroundings():
-    made = Surroundings(PROBLEM.world)
-    made.see([SeenObject(VALVE, PLACE, 1e-8 * np.eye(6), None)])
+    made = Surroundings(PROBLEM.world).see([SeenObject(VALVE, PLACE, 1e-8 * np.eye(6), None)])
     return made.world, made.holding("valve")
 
 

@@ -103,7 +103,7 @@ def test_an_object_that_comes_into_the_way_blocks_the_next_move():
     made.see([SeenObject(blocker, pose(ROBOT.fk(middle).translation), 1e-8 * np.eye(6), None)], 0.4)
     assert "withdrawn" in made.message
     assert made.mode == PROPOSED
-    assert made.guide.withdrawn
+    assert made.state.way.withdrawn
     assert "accept" in made.command("next", 0.5, press=0)
     assert "withdrawn" in made.command("accept", 0.5)
     assert arm.moving is None

@@ -292,7 +292,10 @@ def test_a_record_is_played_again_to_the_same_end(tmp_path):
     for number in range(30):
         engine.update(0.5 + number / 30)
         engine.execute({"name": "next", "press": 1}, 0.5 + number / 30)
-    assert engine.session.q[engine.session.selected] != engine.session.problem.start[engine.session.selected]
+    assert (
+        engine.session.q[engine.session.state.selected]
+        != engine.session.means.problem.start[engine.session.state.selected]
+    )
     route, q = engine.session.route, engine.session.q
     opened.close()
     again = open_session(SessionOptions("titan4_sdu", replay=file)).engine

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.pilot.interlock import LATE_SECONDS, Sight
+from rrtik_ompl.pilot.machine import READ_SECONDS
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
-from rrtik_ompl.pilot.session import READ_SECONDS
 from rrtik_tests.hostile_arm import HostileArm, Pilot
 from rrtik_tests.pilot_session import PROBLEM, ROBOT, session
 
@@ -32,7 +32,7 @@ FAULTS = {
 @pytest.mark.parametrize(("joint", "direction"), [(0, 1.0), (2, -1.0), (4, 1.0)])
 def test_an_arm_with_a_fault_is_stopped_within_a_degree_and_half_a_second_and_named(fault, joint, direction):
     made, _ = session()
-    arm = made.arm = made.held.drive._arm = HostileArm()
+    arm = made.arm = HostileArm()
     made.command("select", 0.0, joint=joint)
     time_, told = 0.0, 0
     for k in range(60):
@@ -106,10 +106,10 @@ def test_the_rate_falls_as_the_line_gets_slower():
     reached = {}
     for age in (0.05, 0.2, 0.29):
         made, arm = session()
-        made.sight, time_ = Sight(age, age), 0.0
+        time_ = 0.0
         for _ in range(30):
             made.see([], time_)
-            made.command("jog", time_, direction=1.0, press=age)
+            made.command("jog", time_, Sight(age, age), direction=1.0, press=age)
             arm.advance(STEP)
             time_ += STEP
             made.tick(time_)
@@ -118,8 +118,8 @@ def test_the_rate_falls_as_the_line_gets_slower():
         assert reached[age] * age <= 1.05
     assert reached[0.05] > 9.0
     assert 4.0 < reached[0.2] < 5.2
-    made.sight = Sight(0.31, 0.0)
-    assert made.command("jog", made.time, direction=1.0, press=9) == "refused: line too slow for driving: 0.31 s"
+    late = made.command("jog", made.time, Sight(0.31, 0.0), direction=1.0, press=9)
+    assert late == "refused: line too slow for driving: 0.31 s"
 
 
 def test_a_hold_that_lapses_is_said_and_needs_a_new_press():

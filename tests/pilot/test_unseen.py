@@ -10,13 +10,27 @@ import pytest
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
-from rrtik_ompl.pilot.interlock import ALWAYS, FOLLOWING, GUIDED, MANOEUVRE, MOVING, PRESENT, PROPOSED, UNSEEN_SECONDS
+from rrtik_ompl.pilot.document import state_document
+from rrtik_ompl.pilot.interlock import FOLLOWING, MANOEUVRE, PROPOSED, UNSEEN_SECONDS
+from rrtik_ompl.pilot.motion.drive import Press
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.pilot.state import state_document
+from rrtik_ompl.pilot.state import Way
 from rrtik_ompl.pilot.surroundings import Structure
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.world import World
-from rrtik_tests.pilot_session import PLACE, PROBLEM, ROBOT, VALVE, WORLD, hold, seen_at
+from rrtik_tests.pilot_session import (
+    ALWAYS,
+    GUIDED,
+    MOVING,
+    PLACE,
+    PRESENT,
+    PROBLEM,
+    ROBOT,
+    VALVE,
+    WORLD,
+    hold,
+    seen_at,
+)
 
 PANEL = replace(VALVE, name="panel_mark", solids=(), grasps=())
 PANEL_PLACE = pin.SE3(np.eye(3), np.array([1.4, 0.4, 0.3]))
@@ -99,15 +113,15 @@ def test_every_thing_that_the_scene_stands_on_has_an_age_of_its_own(what):
 def test_only_hands_move_an_arm_whose_surroundings_are_out_of_view():
     made, arm = proposed()
     route, follower = made.route, made.follower
-    made.leading.master = SimulatedArm(ROBOT, PROBLEM.start - 0.04)
+    made.master = SimulatedArm(ROBOT, PROBLEM.start - 0.04)
     time = see_nothing(made, 0.2, UNSEEN_SECONDS + 1.0)
     arguments = {"jog": {"direction": 1.0}, "move": {"target": float(PROBLEM.start[0]) + 0.3}}
     for mode, verb in product((MANOEUVRE, PROPOSED, FOLLOWING), sorted({*PRESENT, *ALWAYS} & {*MOVING, *GUIDED})):
         arm._q, arm._goal = PROBLEM.start.copy(), None
-        made.held.end()
-        made.guide.route, made.guide.follower, made.mode, made.held._press = route, follower, mode, ("", -1.0)
-        made.q = made.desired = arm.read()
-        made.desired = made.q + 0.2 * np.eye(ROBOT.dof)[0]
+        made.stand_still()
+        q, way = arm.read(), Way(route, follower, list_of_moves=route)
+        desired = q + 0.2 * np.eye(ROBOT.dof)[0]
+        made.state = replace(made.state, way=way, mode=mode, press=Press(), q=q, desired=desired)
         press = {"press": 1} if verb in MOVING else {}
         made.command(verb, time, **arguments.get(verb, {}), **press)
         arm.advance(0.1)

@@ -19,7 +19,7 @@ def test_a_tool_is_taken_and_put_into_its_rack(browser, kind):
     with Running(SessionOptions("titan4_sdu", vehicle=TOOL, seed=1)) as running:
         pick_and_place(browser, running, HANDS[kind])
         made = running.opened.engine.perception.source.camera.places["tool"]
-        assert running.opened.engine.session.hand.holds == ""
+        assert running.opened.engine.session.state.holds == ""
     vehicle = load_vehicle(TOOL)
     pick, put = (vehicle.marker_map.named(name).grasp(grasp).levels[0]
                  for name, grasp in (("tool", "straight"), ("rack", "put")))  # fmt: skip

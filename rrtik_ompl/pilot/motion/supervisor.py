@@ -4,7 +4,7 @@ On a route `Follower` compares the arm with the route. This one needs none: it k
 
 How a set point and its reading go:
 
-1. the session's loop executes a held command: `Drive` tells the supervisor the set point, and gives it to the arm
+1. the session executes a held command: it tells the supervisor the set point, and gives it to the arm
 2. an arm behind a line has a thread, `LineArm`, which sends the set point on and gets a reading for it
 3. that thread gives each reading to `Supervisor.read` when it comes. On a fault its next request is a stop, at once,
    and it sends no set point on until the fault is acknowledged: neither page, planner nor camera has a part in that
@@ -44,6 +44,17 @@ ASKED = 0.25  # of the way that a set point is ahead: an arm nearer to it need n
 def slack_of(robot: Robot) -> Vector:
     """How far each joint may be from what it was told, shape (dof,) [rad or m]: a degree, or 2 mm."""
     return np.where(robot.prismatic, SLIDING_TOLERANCE, TOLERANCE)
+
+
+def amount(value: float, *, prismatic: bool) -> str:
+    """A way of a joint in words.
+
+    Example:
+        >>> amount(-0.0105, prismatic=False)
+        '0.6 deg'
+    """
+    shown, unit = reading(abs(value), joint_unit(prismatic))
+    return f"{shown:.1f} {unit}" if unit == "deg" else f"{shown:.4f} {unit}"
 
 
 class Supervisor:
@@ -172,10 +183,8 @@ class Supervisor:
             joint = int(np.flatnonzero(late)[0])
             return joint, float(abs(self._q[joint] - self._mark[joint])), float(time - self._mark_time[joint])
 
-    def amount(self, joint: int, value: float) -> str:
-        """A way of a joint in words: "0.6 deg"."""
-        shown, unit = reading(abs(value), joint_unit(self._prismatic[joint]))
-        return f"{shown:.1f} {unit}" if unit == "deg" else f"{shown:.4f} {unit}"
+    def _amount(self, joint: int, value: float) -> str:
+        return amount(value, prismatic=bool(self._prismatic[joint]))
 
     def _begin(self, q: Vector, time: float, active: bool = True) -> None:
         """The arm is where it is: from here on it is compared."""
@@ -198,10 +207,10 @@ class Supervisor:
         if (room >= 0.0).all():
             return ""
         joint = int(room.argmin())
-        name, far = self._names[joint], self.amount(joint, float(change[joint]))
+        name, far = self._names[joint], self._amount(joint, float(change[joint]))
         if abs(change[joint]) > self._slack[joint] + allowed[joint]:
             return f"{name} jumped by {far} between two readings"
-        return f"{name} moves faster than {self.amount(joint, FASTEST * float(self._rates[joint]))}/s"
+        return f"{name} moves faster than {self._amount(joint, FASTEST * float(self._rates[joint]))}/s"
 
     def _elsewhere(self, q: Vector, change: Vector, time: float) -> str:
         """Whether a joint would be farther than the slack from where it should be before the arm could stand."""
@@ -220,16 +229,16 @@ class Supervisor:
         self._used = float(max((wrong / self._slack).max(), over.max()))
         joint = int(excess.argmax())
         if excess[joint] > 1.0 and way[joint] != 0.0:
-            return f"{self._names[joint]} goes the wrong way, by {self.amount(joint, float(wrong[joint]))}"
+            return f"{self._names[joint]} goes the wrong way, by {self._amount(joint, float(wrong[joint]))}"
         if excess[joint] > 1.0 and (self._active or self._changes >= GOING_ON):
             return self._says(joint, float(wrong[joint]))
         joint = int(over.argmax())
         if over[joint] > 1.0:
-            return f"{self._names[joint]} went {self.amount(joint, float(q[joint] - self._aim[joint]))} too far"
+            return f"{self._names[joint]} went {self._amount(joint, float(q[joint] - self._aim[joint]))} too far"
         return ""
 
     def _says(self, joint: int, wrong: float) -> str:
-        name, far = self._names[joint], self.amount(joint, wrong)
+        name, far = self._names[joint], self._amount(joint, wrong)
         if not self._active:
             return f"{name} moved on by {far} after the stop"
         driven = [each for each, way in zip(self._names, self._way, strict=True) if way != 0.0]

@@ -5,7 +5,8 @@ Source: [1, ch. 6].
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -40,33 +41,35 @@ class Progress:
     fault: str = ""
 
 
+@dataclass(frozen=True, eq=False)
 class Follower:
-    """Tracks an arm along a path of single-joint moves.
+    """Tracks an arm along a path of single-joint moves, as a value: `update` gives the next one.
 
     Attributes:
-        path: The path.
-        moves: Its moves.
+        path: The path, of one joint at a time.
+        rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
+        tolerance: Largest error of a joint [rad].
         current: Number of the move that is due, from 0.
-        slack: How far each joint may be off the route, shape (dof,) [rad or m].
     """
 
-    def __init__(self, path: JointPath, rates: Vector, tolerance: float = TOLERANCE) -> None:
-        """Begin at the first move.
+    path: JointPath
+    rates: Vector
+    tolerance: float = TOLERANCE
+    current: int = 0
 
-        Args:
-            path: One joint at a time.
-            rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
-            tolerance: Largest error of a joint [rad].
+    @cached_property
+    def moves(self) -> tuple[Move, ...]:
+        """Moves of the path."""
+        return self.path.moves()
 
-        Raises:
-            InputError: If the path moves several joints at once.
-        """
-        self.path, self.moves = path, path.moves()
-        self._corners = _corners(path, self.moves)
-        self._rates = rates
-        self.slack = slack(path, tolerance)
-        self._names = list(path.joint_names)
-        self.current = 0
+    @cached_property
+    def slack(self) -> Vector:
+        """How far each joint may be off the route, shape (dof,) [rad or m]."""
+        return slack(self.path, self.tolerance)
+
+    @cached_property
+    def _corners(self) -> Matrix:
+        return _corners(self.path, self.moves)
 
     @property
     def done(self) -> bool:
@@ -80,30 +83,33 @@ class Follower:
 
     def joint(self) -> int | None:
         """Number of the joint that the current move turns; None when all is done."""
-        return None if self.done else self._names.index(self.moves[self.current].joint)
+        return None if self.done else self.path.joint_names.index(self.moves[self.current].joint)
 
-    def update(self, q: Vector) -> Progress:
-        """The progress of an arm at q."""
+    def update(self, q: Vector) -> tuple[Follower, Progress]:
+        """The follower with the move that is due for an arm at q, and the arm's progress."""
         joint = self.joint()
         if joint is None:
-            return self._lost(q, self._corners[-1], None) or Progress(self.current, 1.0, 0.0, "done")
+            lost = self._lost(q, self._corners[-1], None)
+            return self, lost or Progress(self.current, 1.0, 0.0, "done")
         begin, end = self._corners[self.current][joint], self._corners[self.current + 1][joint]
         lost = self._lost(q, self._corners[self.current], joint)
         if lost is not None:
-            return lost
+            return self, lost
         remaining = float(end - q[joint])
         if abs(remaining) <= min(MADE, 0.5 * abs(end - begin)):  # a short move has to be made, too
-            self.current += 1
-            return self.update(q)
+            return replace(self, current=self.current + 1).update(q)
         inside = min(begin, end) - self.slack[joint] <= q[joint] <= max(begin, end) + self.slack[joint]
         if not inside:
-            return self._off(joint, float(q[joint]), float(end))
+            return self, self._off(joint, float(q[joint]), float(end))
         share = float(np.clip(1.0 - remaining / (end - begin), 0.0, 1.0))
-        ending = abs(remaining) <= self._rates[joint] * REACTION_SECONDS
-        return Progress(self.current, share, remaining, "stop" if ending else "move")
+        ending = abs(remaining) <= self.rates[joint] * REACTION_SECONDS
+        return self, Progress(self.current, share, remaining, "stop" if ending else "move")
 
-    def pass_on(self, q: Vector) -> tuple[str, str]:
-        """Take the current move for made although its end is not reached; its joint, and what is left of it in words.
+    def pass_on(self, q: Vector) -> tuple[Follower, str, str]:
+        """Take the current move for made although its end is not reached.
+
+        Returns:
+            The follower with the next move, the joint of this one, and what is left of it in words.
 
         Raises:
             InputError: If more than the tolerance of the route is left, or no move is due.
@@ -111,12 +117,11 @@ class Follower:
         joint = self.joint()
         if joint is None:
             raise InputError("all moves are done")
-        name, left = self._names[joint], abs(float(self.target[joint] - q[joint]))
+        name, left = self.path.joint_names[joint], abs(float(self.target[joint] - q[joint]))
         shown, unit = reading(left, joint_unit(self.path.prismatic[joint]))
         if left > self.slack[joint]:
             raise InputError(f"{name}: {shown:.3g} {unit} are left of the move")
-        self.current += 1
-        return name, f"{shown:.2g} {unit}"
+        return replace(self, current=self.current + 1), name, f"{shown:.2g} {unit}"
 
     def rest(self, q: Vector) -> JointPath:
         """The remaining moves from q as they will be made: each for its joint alone, all others stay as they are."""
@@ -131,7 +136,7 @@ class Follower:
         rows = [np.array(q, dtype=np.float64)]
         for name, end in ends:
             row = rows[-1].copy()
-            row[self._names.index(name)] = end
+            row[self.path.joint_names.index(name)] = end
             rows.append(row)
         return self.path.with_waypoints(np.array(rows if len(rows) > 1 else [*rows, *rows]))
 
@@ -144,7 +149,7 @@ class Follower:
 
     def _off(self, joint: int, value: float, planned: float) -> Progress:
         (here, unit), (there, _) = (reading(v, joint_unit(self.path.prismatic[joint])) for v in (value, planned))
-        fault = f"{self._names[joint]} is at {here:.2f} {unit} instead of {there:.2f}"
+        fault = f"{self.path.joint_names[joint]} is at {here:.2f} {unit} instead of {there:.2f}"
         return Progress(self.current, 0.0, 0.0, "lost", fault)
 
 

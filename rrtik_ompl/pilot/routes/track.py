@@ -5,7 +5,8 @@ Source: [1, ch. 6] (comparison with lists of single-joint moves).
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -27,33 +28,44 @@ STAGE = "with all joints at once"
 AHEAD_SECONDS, PLACES = 0.5, 51  # within which the arm is looked for on its path, and at how many places
 
 
+@dataclass(frozen=True, eq=False)
 class Track:
-    """Tracks an arm along a path.
+    """Tracks an arm along a path, as a value: `update` gives the next one.
 
     Attributes:
         path: The path.
-        moves: None: it has no moves of single joints.
+        rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
+        tolerance: Largest error of a joint [rad].
         current: 0 until the end is reached, then 1.
-        slack: How far each joint may be off the path, shape (dof,) [rad or m].
-        seconds: That it takes if the slowest joint of each piece goes at its rate.
+        at: Where on the path the arm is, in seconds from its start.
     """
 
-    def __init__(self, path: JointPath, rates: Vector, tolerance: float = TOLERANCE) -> None:
-        """Begin at its start.
+    path: JointPath
+    rates: Vector
+    tolerance: float = TOLERANCE
+    current: int = 0
+    at: float = 0.0
 
-        Args:
-            path: The path.
-            rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
-            tolerance: Largest error of a joint [rad].
-        """
-        self.path, self.slack = path, slack(path, tolerance)
-        self.moves: tuple[Move, ...] = ()
-        self.current = 0
-        times = (np.abs(np.diff(path.waypoints, axis=0)) / rates).max(axis=1)
-        self._times = np.concatenate([[0.0], np.cumsum(times)])
-        self.seconds = float(self._times[-1])
-        self._rates = rates
-        self._at = 0.0
+    @property
+    def moves(self) -> tuple[Move, ...]:
+        """None: it has no moves of single joints."""
+        return ()
+
+    @cached_property
+    def slack(self) -> Vector:
+        """How far each joint may be off the path, shape (dof,) [rad or m]."""
+        return slack(self.path, self.tolerance)
+
+    @cached_property
+    def _times(self) -> Vector:
+        """When the arm is at each waypoint if the slowest joint of each piece goes at its rate."""
+        times = (np.abs(np.diff(self.path.waypoints, axis=0)) / self.rates).max(axis=1)
+        return np.concatenate([[0.0], np.cumsum(times)])
+
+    @property
+    def seconds(self) -> float:
+        """That the whole path takes."""
+        return float(self._times[-1])
 
     @property
     def done(self) -> bool:
@@ -69,24 +81,23 @@ class Track:
         """None: no single joint is due."""
         return None
 
-    def update(self, q: Vector) -> Progress:
-        """The progress of an arm at q."""
-        places = np.linspace(self._at, min(self._at + AHEAD_SECONDS, self.seconds), PLACES)
+    def update(self, q: Vector) -> tuple[Track, Progress]:
+        """The track with the place that an arm at q has reached, and the arm's progress."""
+        places = np.linspace(self.at, min(self.at + AHEAD_SECONDS, self.seconds), PLACES)
         off = np.abs(np.array([self._place(each) for each in places]) - q) / self.slack
         nearest = int(off.max(axis=1).argmin())
         if off[nearest].max() > 1.0:
-            return Progress(0, self._share(), 0.0, "lost", self._fault(q, int(off[nearest].argmax())))
-        self._at = float(places[nearest])
+            return self, Progress(0, self.share, 0.0, "lost", self._fault(q, int(off[nearest].argmax())))
         if self.done or np.abs(q - self.path.end).max() <= MADE:
-            self.current, self._at = 1, self.seconds
-            return Progress(1, 1.0, 0.0, "done")
-        return Progress(0, self._share(), self.seconds - self._at, "move")
+            return replace(self, current=1, at=self.seconds), Progress(1, 1.0, 0.0, "done")
+        moved = replace(self, at=float(places[nearest]))
+        return moved, Progress(0, moved.share, moved.seconds - moved.at, "move")
 
     def ahead(self, seconds: float) -> Vector:
         """The place on the path that is so much ahead of the arm. Shape (dof,)."""
-        return self._place(min(self._at + seconds, self.seconds))
+        return self._place(min(self.at + seconds, self.seconds))
 
-    def pass_on(self, q: Vector) -> tuple[str, str]:
+    def pass_on(self, q: Vector) -> tuple[Track, str, str]:
         """There is no move that could be passed over.
 
         Raises:
@@ -96,23 +107,25 @@ class Track:
 
     def rest(self, q: Vector) -> JointPath:
         """What remains, from q."""
-        left = self.path.waypoints[np.searchsorted(self._times, self._at, side="right") :]
+        left = self.path.waypoints[np.searchsorted(self._times, self.at, side="right") :]
         return self.path.with_waypoints(np.vstack([q, left if len(left) else self.path.end[None]]))
 
     def back(self, q: Vector) -> JointPath:
         """The path back to the beginning."""
-        made = self.path.waypoints[: np.searchsorted(self._times, self._at, side="right")]
+        made = self.path.waypoints[: np.searchsorted(self._times, self.at, side="right")]
         return self.path.with_waypoints(np.vstack([q, made[::-1]]))
 
     def _place(self, seconds: float) -> Vector:
         return np.array([np.interp(seconds, self._times, column) for column in self.path.waypoints.T])
 
-    def _share(self) -> float:
-        return self._at / self.seconds if self.seconds > 0.0 else 1.0
+    @property
+    def share(self) -> float:
+        """Of the path that is behind the arm, 0 to 1."""
+        return self.at / self.seconds if self.seconds > 0.0 else 1.0
 
     def _fault(self, q: Vector, joint: int) -> str:
         unit = joint_unit(self.path.prismatic[joint])
-        (here, shown), (there, _) = (reading(float(row[joint]), unit) for row in (q, self._place(self._at)))
+        (here, shown), (there, _) = (reading(float(row[joint]), unit) for row in (q, self._place(self.at)))
         return f"{self.path.joint_names[joint]} is at {here:.2f} {shown} instead of {there:.2f}"
 
 

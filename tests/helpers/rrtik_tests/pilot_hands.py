@@ -76,8 +76,8 @@ HANDS = {"keyboard": Keyboard, "gamepad": Gamepad}
 def faster(running, rate=3.0):
     """Make the arm's joints faster than any arm's."""
     session = running.opened.engine.session
-    session.rates.flags.writeable = True
-    session.rates[:] = session.arm._rates[:] = rate
+    session.means.rates.flags.writeable = True
+    session.means.rates[:] = session.arm._rates[:] = rate
 
 
 def follow(browser, hands, verb, look):

@@ -27,6 +27,13 @@ VALVE = MarkedObject(
 PLACE = pin.SE3(ROBOT.fk(PROBLEM.goal.q).rotation, np.array([1.30, 0.17, 0.09]))
 
 
+# What a command needs, as it was reviewed: the table of the verbs must say the same.
+MOVING = ("jog", "go", "next", "servo", "lead")  # held: the arm moves only as long as they are renewed
+PRESENT = (*MOVING, "move", "plan", "replan", "accept", "back", "close", "open", "lift", "together")
+GUIDED = ("plan", "replan", "accept", "back", "together", "lift", "next", "servo")
+ALWAYS = ("stop", "release", "halt", "select", "speed", "object", "grasp", "reject", "settle")
+
+
 def seen_at(T):
     return SeenObject(VALVE, T, 1e-8 * np.eye(6), None)
 
@@ -66,4 +73,4 @@ def follow(made, arm, time, most=60):
 
 def still(made, due):
     """Whether the move that was due is still being made."""
-    return made.held.drive.active or made.follower.current == due
+    return made.driving or made.follower.current == due

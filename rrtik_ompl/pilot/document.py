@@ -1,0 +1,141 @@
+"""The state that the page shows beside its pictures, as plain values; angles in degrees."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from rrtik_ompl.base.units import joint_unit, reading
+from rrtik_ompl.pilot.interlock import STALE_SECONDS
+from rrtik_ompl.pilot.routes.follower import Follower
+from rrtik_ompl.pilot.routes.track import Track
+from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.planning.moves.text import spoken_moves
+from rrtik_ompl.sensing.scene_from_view import SeenObject
+
+
+def state_document(session: Session) -> dict[str, Any]:
+    """The state of a session; the page in `pilot/web/page` shows it."""
+    state = session.state
+    known = session.known
+    age = session.time - session.state.pictures.time
+    return {
+        "mode": session.mode,
+        "message": session.message,
+        "level": session.level.value,
+        "fault_of_arm": known.fault,
+        "picture_age": None if not np.isfinite(age) else round(age, 3),
+        "stale": bool(age > STALE_SECONDS),
+        "selected": state.selected,
+        "joints": _joints(session),
+        "objects": [_object(seen, session.unseen(seen.object.name)) for seen in session.surroundings.seen],
+        "target": session.target,
+        "choice": None if state.choice is None else {"type": state.choice[0], "level": state.choice[1]},
+        "lamps": [
+            {"type": la.type, "level": la.level, "color": la.color, "reason": la.reason} for la in session.lamps()
+        ],
+        "fault": session.fault(),
+        "route": _route(session),
+        "range": _joint_range(session),
+        "aim": _aim(session),
+        "arm_lost": state.arm_lost,
+        "trouble": known.trouble,
+        "unseen": known.unseen,
+        "speed": state.speed,
+        "gripper": {"closed": state.gripper.closed, "holds": state.holds or state.gripper.fixed},
+        "driving": session.driving,
+    }
+
+
+def _joints(session: Session) -> list[dict[str, Any]]:
+    robot, found = session.robot, []
+    for k, name in enumerate(robot.joint_names):
+        unit = joint_unit(robot.prismatic[k])
+        value, shown = reading(float(session.q[k]), unit)
+        low, high = float(robot.lower[k]), float(robot.upper[k])
+        endless = not np.isfinite(low) or not np.isfinite(high)
+        found.append({
+            "name": name, "value": value, "desired": reading(float(session.state.desired[k]), unit)[0], "unit": shown,
+            "lower": None if endless else reading(low, unit)[0], "upper": None if endless else reading(high, unit)[0],
+        })  # fmt: skip
+    return found
+
+
+def _object(seen: SeenObject, unseen: float) -> dict[str, Any]:
+    return {
+        "name": seen.object.name,
+        "graspable": bool(seen.object.grasps),
+        "sigma_mm": round(1e3 * seen.position_sigma, 2),
+        "unseen": round(unseen, 1),
+    }
+
+
+def _joint_range(session: Session) -> dict[str, Any]:
+    """The range of the selected joint, what ends it, and where in it the arm is near a singular posture."""
+    unit, free = joint_unit(session.robot.prismatic[session.state.selected]), session.joint_range()
+    low, high = (reading(end, unit)[0] for end in (free.low, free.high))
+    singular = [[reading(a, unit)[0], reading(b, unit)[0], case] for a, b, case in free.singular]
+    return {"low": low, "high": high, "below": free.below, "above": free.above, "singular": singular}
+
+
+def _aim(session: Session) -> dict[str, Any]:
+    """From the tip to the chosen grasp, or else to the chosen object: ahead along the tool, and in the world [m]."""
+    tip = session.robot.fk(session.q)
+    found: dict[str, Any] = {"tip": np.round(tip.translation, 4).tolist(), "to": ""}
+    seen = None if session.target is None else session.surroundings.named(session.target)
+    if seen is None:
+        return found
+    choice = session.state.choice
+    goal = seen.T_base_object if choice is None else seen.grasp_pose(*choice)
+    offset = goal.translation - tip.translation
+    ahead = float(offset @ tip.rotation[:, 2])
+    aside = float(np.linalg.norm(offset - ahead * tip.rotation[:, 2]))
+    return found | {
+        "to": seen.object.name if choice is None else f"{choice[0]} {choice[1] + 1}",
+        "distance": round(float(np.linalg.norm(offset)), 4),
+        "xyz": np.round(offset, 4).tolist(),
+        "ahead": round(ahead, 4),
+        "aside": round(aside, 4),
+        "turn_deg": round(float(np.rad2deg(np.linalg.norm(pin.log3(tip.rotation.T @ goal.rotation)))), 1),
+    }
+
+
+def _route(session: Session) -> dict[str, Any] | None:
+    route, follower = session.route, session.follower
+    if route is None or follower is None:
+        return None
+    if route.together:
+        share = 0.0 if session.progress is None else session.progress.share
+        done = "done" if follower.current else "current"
+        moves = [{"joint": "all joints", "from": 0.0, "to": share, "unit": "", "text": "all joints at once",
+                  "status": done, "at": 1.0}]  # fmt: skip
+    else:
+        moves = _moves(follower)
+    progress = session.progress
+    return {
+        "moves": moves,
+        "together": route.together,
+        "grasp_from": 1 if route.together else route.grasp_from,
+        "seconds": round(route.seconds, 1),
+        "travel": round(reading(route.travel, "rad")[0], 1),
+        "clearance_mm": None if not np.isfinite(route.clearance) else round(1e3 * route.clearance, 1),
+        "joints": list(route.joints),
+        "robustness": round(route.robustness, 2),
+        "share": 0.0 if progress is None else progress.share,
+        "advice": "" if progress is None else progress.advice,
+        "withdrawn": session.state.way.withdrawn or session.known.unseen,
+    }
+
+
+def _moves(follower: Follower | Track) -> list[dict[str, Any]]:
+    words = spoken_moves(follower.path)
+    ends = np.cumsum([abs(move.change) for move in follower.moves])
+    moves: list[dict[str, Any]] = []
+    for number, (move, text) in enumerate(zip(follower.moves, words, strict=True)):
+        (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
+        status = "done" if number < follower.current else "current" if number == follower.current else "ahead"
+        moves.append({"joint": move.joint, "from": start, "to": end, "unit": unit, "text": text, "status": status,
+                      "at": float(ends[number] / ends[-1])})  # fmt: skip
+    return moves

@@ -1,0 +1,307 @@
+"""The state machine of a session: a state and an event give the next state, and what is to be done.
+
+What an event makes of the mode (nothing: the mode stays, and so it does where a command is refused):
+
+| event | manoeuvre | choosing | proposed | following |
+|---|---|---|---|---|
+| `object`, `grasp` | choosing | choosing | choosing | choosing |
+| `plan`, `replan`: a route is found | proposed | proposed | proposed | proposed |
+| the same, none is found; `reject` | manoeuvre, or choosing with a grasp | the same | the same | the same |
+| `back`, with a route; `lift`, with something held | proposed | proposed | proposed | proposed (`lift`: refused) |
+| `together` | refused | refused | proposed | refused |
+| `accept`: the rest is free | refused | refused | following | refused |
+| `accept`, `next`: the rest is not free | refused | refused | proposed, withdrawn | proposed, withdrawn |
+| `jog`, `go`, `move`, `servo`, `lead` | | | | refused |
+| `close` on something loose, `open` with something | manoeuvre | manoeuvre | manoeuvre | refused |
+| `next`, `settle` | refused | refused | refused | |
+| `stop`, `halt` | | | | proposed |
+| `select`, `speed`, `release` | | | | |
+| measured: the last move is made, and nothing is driven | | | | manoeuvre |
+| judged: picture or arm are not known any more | | | | proposed |
+| judged: what the route stands on is out of view | | | | proposed |
+| seen: the rest of the route is not free any more | | | proposed, withdrawn | proposed, withdrawn |
+
+What drives the arm is beside that: a press that is held (`Press`, `Drive`). It ends, and the arm stops, when it is not
+renewed in time, when the arm does not follow, when any other command is given, when something comes into the way, and
+whenever the arm or the picture are not known any more. A command that is not in the table of its mode, or that needs
+what is not known, is refused: see `interlock`.
+
+A new command is a function and its row in the `VERBS` of a part, and a button of the page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import frozen
+from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError
+from rrtik_ompl.pilot import guide
+from rrtik_ompl.pilot.answers import alarm, news, refused
+from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
+from rrtik_ompl.pilot.events import (
+    Acknowledge,
+    Broken,
+    Command,
+    Effect,
+    Event,
+    Failed,
+    Judged,
+    Measured,
+    Reply,
+    Said,
+    Seen,
+    Stop,
+    TipSeen,
+    Unusable,
+    Write,
+    WriteAnswer,
+)
+from rrtik_ompl.pilot.interlock import ACKNOWLEDGE, CHOOSING, FOLLOWING, PROPOSED, Verb, refusal
+from rrtik_ompl.pilot.motion import hand, held, leading
+from rrtik_ompl.pilot.queries import grasp_fault, known, out_of_view
+from rrtik_ompl.pilot.state import Means, Pictures, State
+
+READ_SECONDS = 1.0  # a stop so soon after a fault is against the fault: it does not acknowledge it
+
+
+def handle(means: Means, state: State, event: Event) -> tuple[State, tuple[Effect, ...]]:
+    """The state after an event, and what is to be done, in this order.
+
+    Nothing else is changed by that: the same state and event give the same.
+    """
+    try:
+        after = _HANDLERS[type(event)](means, state, event)
+    except RrtikError as error:
+        after = held.refuse(state, str(error))
+    return replace(after, due=()), after.due
+
+
+# --- commands --------------------------------------------------------------------------------------------------------
+
+
+def goes_on(state: State, verb: str, press: object) -> bool:
+    """Whether a command renews the press of before."""
+    return verb in VERBS and VERBS[verb].held and state.press.is_of(verb, press)
+
+
+def _command(means: Means, state: State, event: Command) -> State:
+    """Execute a command; one that cannot be executed in this mode, or on what is known, says so and moves nothing."""
+    verb, press = event.verb, event.arguments.get("press")
+    now = replace(state, time=max(state.time, event.time), arm_lost=event.arm_lost, sight=event.sight)
+    renewed = goes_on(now, verb, press)
+    if renewed and now.press.over:
+        return now  # what ended the press was said
+    holds = verb in VERBS and VERBS[verb].held
+    after = _executed(means, replace(now, given=(verb, press if holds else None)), event, renewed)
+    return after if renewed else after.do(WriteAnswer(event.time))
+
+
+def _executed(means: Means, state: State, event: Command, renewed: bool) -> State:
+    verb = event.verb
+    try:
+        if verb not in VERBS:
+            raise UnknownNameError("command", verb[:MAX_WORD_LENGTH], VERBS)
+        row = VERBS[verb]
+        given = fitting(row.act, verb, event.arguments)
+        why = guide.over(state, verb) or refusal(row, state.mode, known(means, state)) or hand.refusal(row, state)
+        if why:
+            raise InputError(why)
+    except RrtikError as error:
+        return held.refuse(state, str(error))
+    if not renewed:
+        state = state.do(Write("command", event.time, {"name": verb, "arguments": given}))
+    if not row.held and verb != "release":
+        state = state.released()
+    try:
+        after: State = row.act(means, state, **given)
+    except RrtikError as error:
+        return held.refuse(state, str(error))
+    return after
+
+
+def _select(means: Means, state: State, joint: float) -> State:
+    robot, number = means.robot, int(joint)
+    if not 0 <= number < robot.dof:
+        raise InputError(f"joint must be 1 to {robot.dof}, got {number + 1}")
+    return replace(state, selected=number).say(news(f"{robot.joint_names[number]} selected"))
+
+
+def _object(_: Means, state: State, name: str) -> State:
+    if state.around.named(name) is None:
+        raise UnknownNameError("object in view", name, [each.object.name for each in state.around.seen])
+    chosen = replace(state, target=name, choice=None, mode=CHOOSING)
+    return chosen.say(news(f"{name} chosen; now a grasp"))
+
+
+def _grasp(means: Means, state: State, type: str, level: float) -> State:
+    state.around.check_grasp(state.target, type, int(level))
+    chosen = replace(state, choice=(type, int(level)), mode=CHOOSING)
+    fault = grasp_fault(means, chosen)
+    place = f"{type} at level {int(level) + 1}"
+    return chosen.say(refused(f"{place}: {fault}") if fault else news(f"{place}: can be reached"))
+
+
+def _stop(_: Means, state: State) -> State:
+    """Stop the arm; a fault that the pilot has had time to read is acknowledged."""
+    stopped, said = _end_motion(state)
+    if not state.fault:
+        return stopped.say(news(said))
+    if state.time - state.fault_at <= READ_SECONDS:
+        return stopped.say(alarm(f"stopped; {state.fault}; {ACKNOWLEDGE}"))
+    return replace(stopped, fault="").do(Acknowledge()).say(news(said))
+
+
+def _halt(_: Means, state: State) -> State:
+    """Stop the arm, for no page has the pilot any more."""
+    return _end_motion(state)[0].say(alarm("the pilot has left; the arm stands still"))
+
+
+def _end_motion(state: State) -> tuple[State, str]:
+    """Stop the arm, and take back that a route is followed; what there is to say."""
+    stopped = replace(state.stand_still(), desired=state.q)
+    if state.mode != FOLLOWING:
+        return stopped, "stopped"
+    return replace(stopped, mode=PROPOSED), "stopped; 'accept' goes on with the route, 'reject' leaves it"
+
+
+VERBS: dict[str, Verb] = {
+    "select": Verb(_select),
+    "object": Verb(_object),
+    "grasp": Verb(_grasp),
+    "stop": Verb(_stop),
+    "halt": Verb(_halt),
+    **held.VERBS,
+    **guide.VERBS,
+    **hand.VERBS,
+    **leading.VERBS,
+}
+
+
+# --- what is seen and measured ---------------------------------------------------------------------------------------
+
+
+def _seen(_: Means, state: State, event: Seen) -> State:
+    """The surroundings are as a picture shows them."""
+    at = {**state.pictures.seen_at, **{each.object.name: event.time for each in event.objects}}
+    if state.holds:
+        at[state.holds] = event.time  # it is where the arm is
+    now = replace(state, time=max(state.time, event.time), pictures=Pictures(event.time, "", at))
+    around = state.around.see(event.objects)
+    if around is state.around:
+        return now
+    target = state.target
+    if target is None:
+        graspable = (each.object for each in event.objects if each.object.role == "target" and each.object.grasps)
+        target = next((each.name for each in graspable), None)
+    changed = replace(now, around=around, target=target)
+    return _check_motion(changed.do(Write("seen", event.time, {"objects": around.places()})))
+
+
+def _tip_seen(means: Means, state: State, event: TipSeen) -> State:
+    """Nothing moves where the joints say another thing than a picture of the tip."""
+    if means.past:
+        return state
+    check = state.check.see(event.T_base_tip, event.covariance, means.robot.fk(state.q), event.time)
+    return replace(state, check=check)
+
+
+def _unusable(_: Means, state: State, event: Unusable) -> State:
+    return replace(state, pictures=replace(state.pictures, unusable=event.why))
+
+
+def _measured(means: Means, state: State, event: Measured) -> State:
+    """The arm is where it was read; a press that was not renewed in time ends."""
+    now = replace(state, time=max(state.time, event.time), arm_lost=event.arm_lost, q=frozen(event.q))
+    if not np.array_equal(state.q, now.q):
+        now = now.do(Write("joints", event.time, {"q": now.q.tolist()}))
+        around = now.around.settle(now.q)
+        now = now if around is now.around else _check_motion(replace(now, around=around))
+    now = replace(now, check=now.check.read(now.q, event.time))
+    now, expired = held.expire(now)
+    return now if means.recorded else now.say(expired)
+
+
+def _judged(means: Means, state: State, event: Judged) -> State:
+    """The arm stops where it errs, or the present is not known any more; else its progress is noted."""
+    watched = replace(held.watch(means, state, event.standing), fault=event.fault)
+    return guide.watch(means, _watch_view(means, _watch(means, watched)))
+
+
+def _watch(means: Means, state: State) -> State:
+    """Stop when picture or arm are not known any more, and leave the route; say when they are known again."""
+    trouble = known(means, state).trouble
+    if trouble == state.trouble:
+        return state
+    named = trouble == state.fault
+    how = f"; {ACKNOWLEDGE}" if named else ""
+    now = replace(state, trouble=trouble, fault_at=state.time if named else state.fault_at)
+    if not trouble:
+        return now.say(news("picture and arm are known again; the arm stands still"))
+    if state.mode != FOLLOWING and not state.drive.active:
+        return now.do(Stop()).say(alarm(trouble + how))
+    stopped, said = _end_motion(_write_stop(now))
+    return stopped.say(alarm(f"{trouble}: {said}{how}"))
+
+
+def _watch_view(means: Means, state: State) -> State:
+    """Leave the route when something that it stands on has been out of view for too long, and say so."""
+    unseen = out_of_view(means, state)
+    now = replace(state, unseen=unseen)
+    if bool(unseen) == bool(state.unseen):
+        return now
+    if not unseen:
+        return now.say(news("all that routes stand on is in view"))
+    if state.mode != FOLLOWING:
+        return now.say(alarm(f"{unseen}: no route is led past it, and by hand it may be elsewhere"))
+    stopped, said = _end_motion(_write_stop(now))
+    return stopped.say(alarm(f"{unseen}: {said}"))
+
+
+def _write_stop(state: State) -> State:
+    """A replay, whose arm and pictures are never lost, has to stop here as well."""
+    return state.do(Write("command", state.time, {"name": "stop", "arguments": {}}))
+
+
+def _check_motion(state: State) -> State:
+    """After a change of the scene: stop if what is driven, followed or proposed is not free any more."""
+    if state.mode != FOLLOWING and not held.still_free(state):
+        state = state.released().say(alarm("stopped: something has come into the way"))
+    return guide.check(state)
+
+
+# --- the others ------------------------------------------------------------------------------------------------------
+
+
+def _said(_: Means, state: State, event: Said) -> State:
+    return state.say(event.answer)
+
+
+def _broken(_: Means, state: State, event: Broken) -> State:
+    return state.stand_still()
+
+
+def _reply(means: Means, state: State, event: Reply) -> State:
+    after: State = event.then(means, state, event.answer)
+    return after
+
+
+def _failed(_: Means, state: State, event: Failed) -> State:
+    return held.refuse(state, event.why)
+
+
+_HANDLERS: dict[type, Callable[[Means, State, Any], State]] = {
+    Command: _command,
+    Measured: _measured,
+    Judged: _judged,
+    Seen: _seen,
+    TipSeen: _tip_seen,
+    Unusable: _unusable,
+    Said: _said,
+    Broken: _broken,
+    Reply: _reply,
+    Failed: _failed,
+}
