@@ -73,10 +73,7 @@ def handle(means: Means, state: State, event: Event) -> tuple[State, tuple[Effec
 
     Nothing else is changed by that: the same state and event give the same.
     """
-    try:
-        after = _HANDLERS[type(event)](means, state, event)
-    except RrtikError as error:
-        after = held.refuse(state, str(error))
+    after = _HANDLERS[type(event)](means, state, event)
     return replace(after, due=()), after.due
 
 
@@ -285,11 +282,16 @@ def _broken(_: Means, state: State, event: Broken) -> State:
 
 
 def _reply(means: Means, state: State, event: Reply) -> State:
-    after: State = event.then(means, state, event.answer)
+    """Go on with a command that has asked for something."""
+    try:
+        after: State = event.then(means, state, event.answer)
+    except RrtikError as error:
+        return held.refuse(state, str(error))
     return after
 
 
 def _failed(_: Means, state: State, event: Failed) -> State:
+    """The command that has asked for it is refused."""
     return held.refuse(state, event.why)
 
 
