@@ -11,10 +11,10 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.answers import Answer, news
 from rrtik_ompl.pilot.arm_check import ArmCheck
+from rrtik_ompl.pilot.drive import Drive, Press
 from rrtik_ompl.pilot.events import Effect, Stop
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.interlock import MANOEUVRE, Sight
-from rrtik_ompl.pilot.motion.drive import Drive, Press
 from rrtik_ompl.pilot.routes.follower import Follower, Progress
 from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.pilot.routes.track import Track

@@ -12,9 +12,9 @@ from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot import guide
 from rrtik_ompl.pilot.answers import Answer, alarm, news, refused
+from rrtik_ompl.pilot.drive import HOLD_SECONDS, LEASH_SECONDS, Press
 from rrtik_ompl.pilot.events import Give, SetPoint
 from rrtik_ompl.pilot.interlock import BY_HAND, FOLLOWING, ON_A_ROUTE, Verb
-from rrtik_ompl.pilot.motion.drive import HOLD_SECONDS, LEASH_SECONDS, Press
 from rrtik_ompl.pilot.motion.supervisor import FOLLOW_SECONDS, amount, slack_of
 from rrtik_ompl.pilot.queries import joint_range, out_of_view, world_by_hand
 from rrtik_ompl.pilot.routes.follower import MADE, Follower

@@ -18,9 +18,9 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.following.servo import Servo
 from rrtik_ompl.motion.following.visual_servo import ServoStep, VisualServo
 from rrtik_ompl.pilot.answers import news
+from rrtik_ompl.pilot.drive import LEASH_SECONDS
 from rrtik_ompl.pilot.events import ReadMaster, StepToGrasp
 from rrtik_ompl.pilot.interlock import BY_HAND, ON_A_ROUTE, Verb
-from rrtik_ompl.pilot.motion.drive import LEASH_SECONDS
 from rrtik_ompl.pilot.motion.held import begins, lead_to, pace
 from rrtik_ompl.pilot.queries import unseen_for, world_by_hand
 from rrtik_ompl.pilot.state import Means, State
