@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import pinocchio as pin
 
@@ -20,7 +20,10 @@ from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.world import World
 
-Then: TypeAlias = Callable[..., Any]  # of the `Means`, the `State` and the answer; returns the next `State`
+if TYPE_CHECKING:
+    from rrtik_ompl.pilot.state import Means, State
+
+Then: TypeAlias = "Callable[[Means, State, Any], State]"  # the last is the answer; gives the next state
 
 
 # --- events ----------------------------------------------------------------------------------------------------------

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from rrtik_ompl.pilot.state import State
 
 MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
 MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
@@ -38,7 +41,7 @@ class Verb:
         otherwise: Why it is refused in the others.
     """
 
-    act: Callable[..., Any]
+    act: Callable[..., State]
     present: bool = False
     held: bool = False
     guided: bool = False

@@ -87,13 +87,17 @@ def goes_on(state: State, verb: str, press: object) -> bool:
 
 def _command(means: Means, state: State, event: Command) -> State:
     """Execute a command; one that cannot be executed in this mode, or on what is known, says so and moves nothing."""
-    verb, press = event.verb, event.arguments.get("press")
+    verb = event.verb
+    press = event.arguments.get("press")
     now = replace(state, time=max(state.time, event.time), arm_lost=event.arm_lost, sight=event.sight)
+
     renewed = goes_on(now, verb, press)
     if renewed and now.press.over:
         return now  # what ended the press was said
+
     holds = verb in VERBS and VERBS[verb].held
-    after = _executed(means, replace(now, given=(verb, press if holds else None)), event, renewed)
+    given = replace(now, given=(verb, press if holds else None))
+    after = _executed(means, given, event, renewed)
     return after if renewed else after.do(WriteAnswer(event.time))
 
 
@@ -107,17 +111,14 @@ def _executed(means: Means, state: State, event: Command, renewed: bool) -> Stat
         why = guide.over(state, verb) or refusal(row, state.mode, known(means, state)) or hand.refusal(row, state)
         if why:
             raise InputError(why)
+
+        if not row.held and verb != "release":  # which itself says what is left of a move
+            state = state.released()
+        if not renewed:
+            state = state.do(Write("command", event.time, {"name": verb, "arguments": given}))
+        return row.act(means, state, **given)
     except RrtikError as error:
         return held.refuse(state, str(error))
-    if not renewed:
-        state = state.do(Write("command", event.time, {"name": verb, "arguments": given}))
-    if not row.held and verb != "release":
-        state = state.released()
-    try:
-        after: State = row.act(means, state, **given)
-    except RrtikError as error:
-        return held.refuse(state, str(error))
-    return after
 
 
 def _select(means: Means, state: State, joint: float) -> State:
@@ -145,7 +146,7 @@ def _grasp(means: Means, state: State, type: str, level: float) -> State:
 def _stop(_: Means, state: State) -> State:
     """Stop the arm; a fault that the pilot has had time to read is acknowledged."""
     stopped, said = _end_motion(state)
-    if not state.fault:
+    if not state.fault:  # one that the supervisor has found since the last `Judged` stays: nobody has read it
         return stopped.say(news(said))
     if state.time - state.fault_at <= READ_SECONDS:
         return stopped.say(alarm(f"stopped; {state.fault}; {ACKNOWLEDGE}"))
@@ -224,8 +225,10 @@ def _measured(means: Means, state: State, event: Measured) -> State:
 
 def _judged(means: Means, state: State, event: Judged) -> State:
     """The arm stops where it errs, or the present is not known any more; else its progress is noted."""
-    watched = replace(held.watch(means, state, event.standing), fault=event.fault)
-    return guide.watch(means, _watch_view(means, _watch(means, watched)))
+    state = replace(held.watch(means, state, event.standing), fault=event.fault)
+    state = _watch(means, state)
+    state = _watch_view(means, state)
+    return guide.watch(means, state)
 
 
 def _watch(means: Means, state: State) -> State:
@@ -240,8 +243,8 @@ def _watch(means: Means, state: State) -> State:
         return now.say(news("picture and arm are known again; the arm stands still"))
     if state.mode != FOLLOWING and not state.drive.active:
         return now.do(Stop()).say(alarm(trouble + how))
-    stopped, said = _end_motion(_write_stop(now))
-    return stopped.say(alarm(f"{trouble}: {said}{how}"))
+    stopped, said = _end_motion(now)
+    return _write_stop(stopped).say(alarm(f"{trouble}: {said}{how}"))
 
 
 def _watch_view(means: Means, state: State) -> State:
@@ -254,8 +257,8 @@ def _watch_view(means: Means, state: State) -> State:
         return now.say(news("all that routes stand on is in view"))
     if state.mode != FOLLOWING:
         return now.say(alarm(f"{unseen}: no route is led past it, and by hand it may be elsewhere"))
-    stopped, said = _end_motion(_write_stop(now))
-    return stopped.say(alarm(f"{unseen}: {said}"))
+    stopped, said = _end_motion(now)
+    return _write_stop(stopped).say(alarm(f"{unseen}: {said}"))
 
 
 def _write_stop(state: State) -> State:
@@ -284,10 +287,9 @@ def _broken(_: Means, state: State, event: Broken) -> State:
 def _reply(means: Means, state: State, event: Reply) -> State:
     """Go on with a command that has asked for something."""
     try:
-        after: State = event.then(means, state, event.answer)
+        return event.then(means, state, event.answer)
     except RrtikError as error:
         return held.refuse(state, str(error))
-    return after
 
 
 def _failed(_: Means, state: State, event: Failed) -> State:

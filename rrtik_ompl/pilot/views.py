@@ -94,7 +94,7 @@ class OutsideView:
         """Equal if the picture would be."""
         session = self._session
         shown = session.q.tobytes() if self.share is None else along(session, self.share).tobytes()
-        moves = None if session.follower is None else (id(session.follower), session.follower.current)
+        moves = None if session.follower is None else (session.follower.path, session.follower.current)
         chosen = (session.mode, session.target, session.state.choice, session.surroundings.version)
         return shown, moves, chosen, self.distance, self.azimuth, self.elevation
 
