@@ -215,7 +215,7 @@ def test_an_arm_stands_still_after_a_picture_that_cannot_be_used(tmp_path, spoil
     engine.update(0.0)
     engine.execute({"name": "jog", "direction": 1.0, "press": 1}, 0.01)
     assert session.driving
-    until(lambda: engine.update(0.02) or said in session.unusable)
+    until(lambda: engine.update(0.02) or said in session.state.pictures.unusable)
     engine.update(0.03)
     assert not session.driving
     assert said in session.message
