@@ -149,3 +149,45 @@ def test_inverse_kinematics_of_many_poses_does_not_depend_on_the_number_of_threa
     assert not one.found[3]
     assert one.found.sum() > 600
     np.testing.assert_array_equal(one.q, other.q)
+
+
+def another_form(world, draw):
+    """A world made of another one in a way that is drawn."""
+    way = draw.integers(6)
+    if way == 0:
+        return world.moved(str(draw.choice(["box 1", "box 7", "cloud"])), rrtik.pose(draw.uniform(-0.8, 0.8, 3)))
+    if way == 1:
+        return world.with_clearance(float(draw.choice([0.0, 0.01, 0.05])))
+    if way == 2:
+        return world.with_settings(self_margin=float(draw.choice([0.0, 0.01])))
+    if way == 3:
+        return world.proving(float(draw.choice([0.0, 0.005])))
+    if way == 4:
+        return world.with_scene(replace(world.scene))
+    return world.with_accuracy(str(draw.choice(["exact", "conservative"])))
+
+
+def test_worlds_remade_by_several_threads_answer_as_fresh_ones(world):
+    rng = np.random.default_rng(8)
+    rows = rng.uniform(*world.robot.finite_range(), (40, world.robot.dof))
+    ends = rows + rng.normal(scale=0.1, size=rows.shape)
+
+    def said(asked):
+        answers = asked.valid_batch(rows), asked.motion_valid_batch(rows, ends), asked.motions_proven(rows, ends)
+        return np.concatenate(answers)
+
+    known, found = [world], []
+
+    def remake(seed):
+        draw = np.random.default_rng(seed)
+        for _ in range(how_many(1500, 20)):
+            before = known[draw.integers(len(known))]
+            after = another_form(before, draw)
+            found.append((after.settings, said(after)))
+            known.append(after)
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(remake, range(4)))
+    for settings, answers in found:
+        fresh = rrtik.World.of(replace(settings, scene=replace(settings.scene)))
+        assert np.array_equal(said(fresh), answers), settings
