@@ -1,4 +1,8 @@
-"""The arm: a Pinocchio [56] model with its geometry, limits, named postures and tip frame. A robot never changes."""
+"""The arm: a Pinocchio [56] model with its geometry, limits, named postures and tip frame. A robot never changes.
+
+Methods of :class:`Robot` check what they are given. What computes in the library calls the functions of this module and
+the methods of :class:`Chain`, which trust their rows: float64, shape (m, dof).
+"""
 
 from __future__ import annotations
 
@@ -44,6 +48,19 @@ class Chain:
     offset: Vector
 
     __reduce__ = as_value
+
+    def joint_values(self, rows: Matrix) -> Matrix:
+        """Values of every joint, mimic joints resolved, for configurations, shape (m, dof). Shape (m, n)."""
+        return np.asarray(rows @ self.gain.T + self.offset)
+
+    def joint_frames(self, rows: Matrix) -> NDArray[np.float64]:
+        """Pose in the world of every joint frame, world first, for configurations, (m, dof). Shape (m, n + 1, 4, 4)."""
+        motions = joint_motions(self.axis, self.prismatic, self.joint_values(rows))
+        frames = room((len(rows), len(self.parent) + 1, 4, 4))
+        frames[:, 0] = np.eye(4)
+        for k, parent in enumerate(self.parent):
+            frames[:, k + 1] = frames[:, parent + 1] @ self.placement[k] @ motions[:, k]
+        return frames
 
     def whole_turns(self) -> Mask:
         """Which actuated joints, shape (dof,), leave every link where it was if they turn by a whole turn."""
@@ -156,8 +173,7 @@ class Robot:
 
     def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
         """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
-        rows, (lower, upper) = self._rows(Q), _widened_limits(self, finite_number(tolerance, "tolerance of limits"))
-        return np.asarray(np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1))
+        return inside_limits(self, self._rows(Q), finite_number(tolerance, "tolerance of limits"))
 
     def finite_range(self) -> tuple[Vector, Vector]:
         """Bounds to draw configurations in, shapes (dof,): the limits, half a turn (or 3.14 m) where there is none."""
@@ -193,78 +209,49 @@ class Robot:
 
     def joint_values(self, Q: ArrayLike) -> Matrix:
         """Values of every joint of the chain, mimic joints resolved. Q: shape (m, dof) or (dof,); (m, joints)."""
-        return np.asarray(self._rows(Q) @ self.chain.gain.T + self.chain.offset)
+        return self.chain.joint_values(self._rows(Q))
 
     def pinocchio_configuration(self, Q: ArrayLike) -> Matrix:
         """Pinocchio's vectors for Q, (m, dof) or (dof,): with mimic joints and (cos, sin) of endless ones; (m, nq)."""
-        rows = self._rows(Q)
-        values = self.joint_values(rows)
-        if self.model.nq == len(self.chain.parent):
-            return values
-        full = np.empty((len(rows), self.model.nq))
-        joints, places, turning, cosines = _places_of(self)
-        angles = values[:, turning]
-        full[:, places], full[:, cosines], full[:, cosines + 1] = values[:, joints], np.cos(angles), np.sin(angles)
-        return full
+        return pinocchio_rows(self, self._rows(Q))
 
     def joint_frames(self, Q: ArrayLike) -> NDArray[np.float64]:
         """Pose in the world of every Pinocchio joint frame, world first. Shape (m, joints + 1, 4, 4)."""
-        rows = self._rows(Q)
-        values = self.joint_values(rows)
-        frames = room((len(rows), len(self.chain.parent) + 1, 4, 4))
-        frames[:, 0] = np.eye(4)
-        motions = joint_motions(self.chain.axis, self.chain.prismatic, values)
-        for k, parent in enumerate(self.chain.parent):
-            frames[:, k + 1] = frames[:, parent + 1] @ self.chain.placement[k] @ motions[:, k]
-        return frames
+        return self.chain.joint_frames(self._rows(Q))
 
     def fk_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Forward kinematics of Q, shape (m, dof): T_world_tip, or of another frame or link. Shape (m, 4, 4)."""
-        return in_blocks(partial(self._poses, frame=self._frame_id(frame)), self._rows(Q))
-
-    def _poses(self, rows: Matrix, frame: int, joint_frames: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-        """Poses of a frame for configurations, shape (m, dof): of few by Pinocchio. Shape (m, 4, 4)."""
-        if self.model.nv > MOST_MOVING or not 0 < len(rows) <= FEW:
-            target = self.model.frames[frame]
-            frames = self.joint_frames(rows) if joint_frames is None else joint_frames
-            return np.asarray(frames[:, target.parentJoint] @ target.placement.homogeneous)
-        data, poses = _data_of(self, get_ident()), np.empty((len(rows), 4, 4))
-        for k, full in enumerate(self.pinocchio_configuration(rows)):
-            pin.forwardKinematics(self.model, data, full)
-            poses[k] = pin.updateFramePlacement(self.model, data, frame).homogeneous
-        return poses
+        self._require_frame(frame)
+        return poses(self, self._rows(Q), frame)
 
     def fk(self, q: ArrayLike, frame: str | None = None) -> pin.SE3:
         """Forward kinematics: T_world_tip (or another frame) as ``pinocchio.SE3`` for q, shape (dof,)."""
-        return pin.SE3(self._poses(self.configuration(q)[None], self._frame_id(frame))[0])
+        row = self.configuration(q)[None]
+        self._require_frame(frame)
+        return pin.SE3(poses(self, row, frame)[0])
 
     def jacobian(self, q: ArrayLike, frame: str | None = None) -> Matrix:
         """Geometric Jacobian at the tip in world axes, rows (linear; angular), shape (6, dof)."""
+        row = self.configuration(q)[None]
+        self._require_frame(frame)
         if self.model.nv > MOST_MOVING:
-            return np.asarray(self.jacobian_batch(self.configuration(q)[None], frame)[0])
-        full, axes = self.pinocchio_configuration(self.configuration(q))[0], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        jacobian = pin.computeFrameJacobian(self.model, self.model.createData(), full, self._frame_id(frame), axes)
+            return np.asarray(jacobians(self, row, frame)[0])
+        full, axes = pinocchio_rows(self, row)[0], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        number = _frame_number(self, frame)
+        jacobian = pin.computeFrameJacobian(self.model, self.model.createData(), full, number, axes)
         return np.asarray(np.reshape(jacobian, (6, -1)) @ self.chain.gain)  # for one joint it comes as a vector
 
     def jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Geometric Jacobians of a batch, as :meth:`jacobian`, for Q of shape (m, dof). Shape (m, 6, dof)."""
-        return in_blocks(lambda rows: self.fk_jacobian_batch(rows, frame)[1], self._rows(Q))
+        rows = self._rows(Q)
+        self._require_frame(frame)
+        return jacobians(self, rows, frame)
 
     def fk_jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> tuple[Matrix, Matrix]:
         """:meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""
-        rows, number = self._rows(Q), self._frame_id(frame)
-        poses = self._poses(rows, number, frames := self.joint_frames(rows))
-        columns = np.zeros((len(frames), 6, len(self.chain.parent)))
-        joint = self.model.frames[number].parentJoint - 1
-        while joint >= 0:  # only the joints between the base and the frame move it
-            axis = frames[:, joint + 1, :3, :3] @ self.chain.axis[joint]
-            if self.chain.prismatic[joint]:
-                columns[:, :3, joint] = axis
-            else:
-                columns[:, :3, joint] = cross_products(axis, poses[:, :3, 3] - frames[:, joint + 1, :3, 3])
-                columns[:, 3:, joint] = axis
-            joint = int(self.chain.parent[joint])
-        return poses, np.asarray(columns @ self.chain.gain)
+        rows = self._rows(Q)
+        self._require_frame(frame)
+        return poses_and_jacobians(self, rows, frame)
 
     def _rows(self, Q: ArrayLike) -> Matrix:
         """One configuration or several as rows, shape (m, dof)."""
@@ -273,9 +260,70 @@ class Robot:
             raise InputError(f"configurations of robot '{self.name}': expected shape (m, {self.dof}), got {rows.shape}")
         return rows
 
-    def _frame_id(self, frame: str | None) -> int:
+    def _require_frame(self, frame: str | None) -> None:
         require(frame, str | None, f"frame of robot '{self.name}'")
-        return _frame_number(self, self.tip if frame is None else frame)
+
+
+def inside_limits(robot: Robot, rows: Matrix, tolerance: float = LIMIT_TOLERANCE) -> Mask:
+    """Which configurations, shape (m, dof), lie inside the limits widened by a tolerance [rad or m]. Shape (m,)."""
+    lower, upper = _widened_limits(robot, tolerance)
+    return np.asarray(np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1))
+
+
+def pinocchio_rows(robot: Robot, rows: Matrix) -> Matrix:
+    """Pinocchio's vectors for configurations, shape (m, dof); see :meth:`Robot.pinocchio_configuration`. (m, nq)."""
+    values = robot.chain.joint_values(rows)
+    if robot.model.nq == len(robot.chain.parent):
+        return values
+    full = np.empty((len(rows), robot.model.nq))
+    joints, places, turning, cosines = _places_of(robot)
+    angles = values[:, turning]
+    full[:, places], full[:, cosines], full[:, cosines + 1] = values[:, joints], np.cos(angles), np.sin(angles)
+    return full
+
+
+def poses(robot: Robot, rows: Matrix, frame: str | None = None) -> NDArray[np.float64]:
+    """T_world_tip, or of another frame, for configurations, shape (m, dof). Shape (m, 4, 4)."""
+    return in_blocks(partial(_poses, robot, _frame_number(robot, frame)), rows)
+
+
+def jacobians(robot: Robot, rows: Matrix, frame: str | None = None) -> NDArray[np.float64]:
+    """Geometric Jacobians at the tip, or at another frame, for configurations, shape (m, dof). Shape (m, 6, dof)."""
+    return in_blocks(lambda block: poses_and_jacobians(robot, block, frame)[1], rows)
+
+
+def poses_and_jacobians(robot: Robot, rows: Matrix, frame: str | None = None) -> tuple[Matrix, Matrix]:
+    """:func:`poses` and :func:`jacobians` at once, shapes (m, 4, 4) and (m, 6, dof)."""
+    number = _frame_number(robot, frame)
+    chain = robot.chain
+    frames = chain.joint_frames(rows)
+    placed = _poses(robot, number, rows, frames)
+    columns = np.zeros((len(frames), 6, len(chain.parent)))
+    joint = robot.model.frames[number].parentJoint - 1
+    while joint >= 0:  # only the joints between the base and the frame move it
+        axis = frames[:, joint + 1, :3, :3] @ chain.axis[joint]
+        if chain.prismatic[joint]:
+            columns[:, :3, joint] = axis
+        else:
+            columns[:, :3, joint] = cross_products(axis, placed[:, :3, 3] - frames[:, joint + 1, :3, 3])
+            columns[:, 3:, joint] = axis
+        joint = int(chain.parent[joint])
+    return placed, np.asarray(columns @ chain.gain)
+
+
+def _poses(
+    robot: Robot, number: int, rows: Matrix, joint_frames: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Poses of a frame, given by its number, for configurations, shape (m, dof): of few by Pinocchio. (m, 4, 4)."""
+    if robot.model.nv > MOST_MOVING or not 0 < len(rows) <= FEW:
+        target = robot.model.frames[number]
+        frames = robot.chain.joint_frames(rows) if joint_frames is None else joint_frames
+        return np.asarray(frames[:, target.parentJoint] @ target.placement.homogeneous)
+    data, placed = _data_of(robot, get_ident()), np.empty((len(rows), 4, 4))
+    for k, full in enumerate(pinocchio_rows(robot, rows)):
+        pin.forwardKinematics(robot.model, data, full)
+        placed[k] = pin.updateFramePlacement(robot.model, data, number).homogeneous
+    return placed
 
 
 def unnamed_joints(count: int) -> tuple[str, ...]:
@@ -313,7 +361,13 @@ def _link_names(robot: Robot) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=256)
-def _frame_number(robot: Robot, name: str) -> int:
+def _frame_number(robot: Robot, frame: str | None) -> int:
+    """Pinocchio's number of a frame, of the tip if None.
+
+    Raises:
+        UnknownNameError: If there is none of that name.
+    """
+    name = robot.tip if frame is None else frame
     if not name.isprintable() or not robot.model.existFrame(name):
         raise UnknownNameError(f"frame of robot '{robot.name}'", name, (f.name for f in robot.model.frames))
     return int(robot.model.getFrameId(name))
