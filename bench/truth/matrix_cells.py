@@ -371,7 +371,7 @@ def _foreseen_worlds(case: Case) -> Judged:
         free = np.array([worlds.free(number, a, b) for a, b in zip(case.A, case.B, strict=True)])
         for time in (begin, 0.6 * begin + 0.4 * end):
             truth = World(case.robot, scene.at(time))
-            blocked = bool(truth._solids.always_colliding)
+            blocked = bool(truth.checks.solids.always_colliding)
             late = blocked and time < reached - 1e-6
             found += Judged(int(not late), 0, int(late), "base_reached: too late" if late else "")
             if not blocked and end <= reached:

@@ -95,7 +95,7 @@ class HeldRegion:
 
     def displacements(self, Q: Matrix) -> NDArray[np.float64]:
         """The frame as seen from the region's frame for configurations, shape (m, dof): (m, 4, 4)."""
-        return self.T_w_world @ self.robot.joint_frames(Q)[:, self.joint] @ self.T_joint_d
+        return self.T_w_world @ self.robot.chain.joint_frames(Q)[:, self.joint] @ self.T_joint_d
 
     def measures(self, Q: Matrix) -> Matrix:
         """How far configurations, shape (m, dof), are from the region, without its tolerances, shape (m, 2).

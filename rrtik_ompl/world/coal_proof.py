@@ -95,7 +95,7 @@ class CoalProof:
         pair = [self._bodies[k] for k in self.packed.bodies[row].tolist()]
         kept = float(self.packed.table[layout.MARGINS][row]) + DISTANCE_TOLERANCE
         way = SPARE * float(approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0]))
-        if kept <= 0.0 or Containment((*pair,), ((0, 1),)).holds((0, 1), self._robot.joint_frames(motion[:1])[0]):
+        if kept <= 0.0 or Containment((*pair,), ((0, 1),)).holds((0, 1), self._robot.chain.joint_frames(motion[:1])[0]):
             return []
 
         def room(share: float) -> float:
@@ -124,7 +124,7 @@ def distance_between(robot: Robot, bodies: Sequence[Body], names: tuple[str, str
 
 
 def _gap(robot: Robot, pair: Sequence[Body], q: Vector) -> float:
-    return next(measured(pair, [(0, 1)], robot.joint_frames(q[None])[0], near_only=False)).distance
+    return next(measured(pair, [(0, 1)], robot.chain.joint_frames(q[None])[0], near_only=False)).distance
 
 
 def _groups(packed: ProofPairs) -> Mask:

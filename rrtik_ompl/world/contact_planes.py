@@ -23,7 +23,7 @@ from rrtik_ompl.model.robot import Robot
 
 def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, ends: Matrix) -> None:
     """Let the kernels try the planes of contacts first, where a motion begins or ends, shape (2, dof)."""
-    frames = robot.joint_frames(ends)
+    frames = robot.chain.joint_frames(ends)
     ways = packed.table[layout.WAYS].reshape(-1, 3)
     bases = packed.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_BASE]
     known: dict[tuple[int, int], tuple[int, Vector]] = {}

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.model.transitions import length_of
 from rrtik_ompl.world.world import Proof, World
 
 SIZES = (0.01, 0.03, 0.1, 0.3)  # of a detour, shares of the stretch's length
@@ -43,7 +43,7 @@ def with_detours(
     Returns:
         A route of proven motions with the same ends, shape (m, dof); the given one if it is proven.
     """
-    known = world.prove(rows, clearance=clearance) if proof is None else proof
+    known = world.prover.route(rows, clearance=clearance) if proof is None else proof
     open_ = [gap.motion for gap in known.unproven]
     for _ in range(MOST_REPAIRS):
         if not open_:
@@ -84,7 +84,7 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
     tried = np.zeros((len(sizes), len(others), len(a)))
     tried[:, np.arange(len(others)), others] = sizes[:, None]
     steps: Matrix = tried.reshape(-1, len(a))
-    proven = partial(world.motions_proven, clearance=clearance)
+    proven = partial(world.prover.proven, clearance=clearance)
     steps = steps[proven(a + steps, b + steps)]  # beside the move
     steps = steps[proven(a + 0.0 * steps, a + steps)]  # out of its way
     steps = steps[proven(b + steps, b + 0.0 * steps)]  # and back to it
@@ -96,10 +96,10 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
 def _via(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
     """What to pass between the ends of a stretch, shape (0 or 1, dof), on proven motions; None if nothing is found."""
     a, b = stretch[0], stretch[-1]
-    proven = partial(world.motions_proven, clearance=clearance)
+    proven = partial(world.prover.proven, clearance=clearance)
     if len(stretch) > 2 and proven(a[None], b[None])[0]:
         return stretch[:0]
-    length = route_length(stretch)
+    length = length_of(stretch)
     for size in SIZES:
         points = _near(world, stretch, size * length, rng)
         points = points[proven(points, points)]

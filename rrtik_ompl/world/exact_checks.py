@@ -28,7 +28,7 @@ from rrtik_ompl.geometry.collision.solids import around, is_mesh, solids_of
 from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.taken_tables import TakenTables
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, pinocchio_rows
 from rrtik_ompl.world.arm_cache import arm_cache
 from rrtik_ompl.world.arrangement import Arrangement
 from rrtik_ompl.world.proof import Prover
@@ -114,12 +114,12 @@ class ExactChecker:
 
         Without ``exact`` nothing falls back to coal: what kernels leave undecided then counts as colliding.
         """
-        answers = self.fast.classify(self._robot.joint_values(rows))
+        answers = self.fast.classify(self._robot.chain.joint_values(rows))
         free: Mask = answers == FREE
         if exact and not free.all():
             undecided = rows[answers == UNDECIDED]
-            doubtful = self.fast.undecided_pairs(self._robot.joint_values(undecided))
-            configurations = self._robot.pinocchio_configuration(undecided)
+            doubtful = self.fast.undecided_pairs(self._robot.chain.joint_values(undecided))
+            configurations = pinocchio_rows(self._robot, undecided)
             apart = [self._gaps(full, pairs) is not None for full, pairs in zip(configurations, doubtful, strict=True)]
             free[answers == UNDECIDED] = apart
         if self.solids.in_contact:
@@ -148,7 +148,7 @@ class ExactChecker:
         ``exact`` as in :meth:`free`. Of those that have to be proven too, what the kernels leave undecided counts as
         free: coal takes longer to say so than a proof, which settles it.
         """
-        sides = self._robot.joint_values(starts), self._robot.joint_values(ends)
+        sides = self._robot.chain.joint_values(starts), self._robot.chain.joint_values(ends)
         answers = self.fast.classify_edges(*sides, steps)
         free: Mask = answers == FREE
         if exact and to_be_proven:
@@ -168,12 +168,12 @@ class ExactChecker:
         """
         order = spread_order(steps)
         rows = (1.0 - order / steps)[:, None] * start + (order / steps)[:, None] * end
-        undecided = self.fast.classify(self._robot.joint_values(rows)) != FREE
+        undecided = self.fast.classify(self._robot.chain.joint_values(rows)) != FREE
         rows, order = rows[undecided], order[undecided]
-        doubtful = self.fast.undecided_pairs(self._robot.joint_values(rows))
+        doubtful = self.fast.undecided_pairs(self._robot.chain.joint_values(rows))
         travel = np.abs(end - start)
         cleared: dict[tuple[int, int], Mask] = {}
-        configurations = self._robot.pinocchio_configuration(rows)
+        configurations = pinocchio_rows(self._robot, rows)
         for place, full, pairs in zip(order.astype(int).tolist(), configurations, doubtful, strict=True):
             left = [pair for pair in pairs if pair not in cleared or not cleared[pair][place]]
             gaps = self._gaps(full, left) if left else []

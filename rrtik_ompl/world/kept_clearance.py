@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, not_negative
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.world.world import FINEST_RESOLUTION, World
+from rrtik_ompl.world.world import FINEST_RESOLUTION, World, form_of
 
 CLEARANCE = 1e-3  # [m] that is kept where nobody says
 SPARE = 1e-3  # [m] that searches keep on top, but not more than twice: they look at points of a motion alone
@@ -40,7 +40,7 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
         clearance: Wanted [m]; None for a millimetre, or less if the ends have less, but not less than the world keeps.
     """
     for room in _rooms(world, clearance):
-        if world.motions_proven(ends, ends, clearance=room.searched).all():
+        if world.prover.proven(ends, ends, clearance=room.searched).all():
             return room
     return None
 
@@ -53,7 +53,7 @@ def rooms_between(world: World, ends: NDArray[np.float64], clearance: float | No
         if len(open_) == 0:
             break
         rows = ends[open_].reshape(-1, ends.shape[2])
-        kept = world.motions_proven(rows, rows, clearance=room.searched).reshape(-1, 2).all(axis=1)
+        kept = world.prover.proven(rows, rows, clearance=room.searched).reshape(-1, 2).all(axis=1)
         for k in open_[kept].tolist():
             found[k] = room
         open_ = open_[~kept]
@@ -89,8 +89,8 @@ def keeping(world: World, clearance: float, *, proven: float | None = None) -> W
     own = world.settings
     inflation = max(clearance - own.clearance, own.inflation)
     if proven is None:
-        return world.with_settings(inflation=inflation)
-    return world.with_settings(inflation=inflation, proving=max(proven, own.proving or 0.0))
+        return form_of(world, inflation=inflation)
+    return form_of(world, inflation=inflation, proving=max(proven, own.proving or 0.0))
 
 
 def leaving_room(world: World, room: Room) -> World:
@@ -100,7 +100,7 @@ def leaving_room(world: World, room: Room) -> World:
     thin is not stepped over: in between, too, obstacles are that far away [16].
     """
     wider, step = keeping(world, room.searched), 2.0 * (room.searched - room.kept)
-    return wider.with_resolution(step) if FINEST_RESOLUTION <= step < world.motion_resolution else wider
+    return form_of(wider, motion_resolution=step) if FINEST_RESOLUTION <= step < world.motion_resolution else wider
 
 
 def check_clearance(world: World, clearance: float | None, ends: dict[str, Matrix]) -> None:
@@ -118,8 +118,8 @@ def check_clearance(world: World, clearance: float | None, ends: dict[str, Matri
         return
     wanted = not_negative(clearance, "clearance")
     for what, q in ends.items():
-        gap = next(iter(world.prove(np.stack([q, q]), clearance=wanted).unproven), None)
-        if gap is not None and world.motion_proven(q, q):
+        gap = next(iter(world.prover.route(q[None], clearance=wanted).unproven), None)
+        if gap is not None and world.prover.proven(q[None], q[None], clearance=world.settings.kept)[0]:
             most = 1e3 * _most(world, q, wanted)
             pair = f"'{gap.first}' and '{gap.second}'"
             raise InputError(f"clearance: {what} cannot keep {1e3 * wanted:g} mm: {pair}; at most {most:.3f} mm here")
@@ -140,7 +140,7 @@ def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> 
     """
     room = room_between(world, rows[[0, -1]], clearance)
     for kept in sorted({room.kept, world.settings.kept}, reverse=True) if room is not None else ():
-        if world.prove(rows, clearance=kept).proven:
+        if world.prover.route(rows, clearance=kept).proven:
             yield kept
 
 
@@ -149,6 +149,6 @@ def _most(world: World, q: Matrix, refused: float) -> float:
     low, high = 0.0, refused
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        kept = world.motions_proven(q[None], q[None], clearance=middle).all()
+        kept = world.prover.proven(q[None], q[None], clearance=middle).all()
         low, high = (middle, high) if kept else (low, middle)
     return low

@@ -20,7 +20,7 @@ from rrtik_ompl.geometry.collision.certificate import distance, fixed_contact
 from rrtik_ompl.geometry.collision.cloud_solid import cloud_solid
 from rrtik_ompl.kernels import FREE, FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, pairs_that_may_touch
 from rrtik_ompl.model.shapes import PointCloud, same_shape
 from rrtik_ompl.world.arm_cache import arm_cache
@@ -152,8 +152,8 @@ class MovingWorld:
         """Which rows of Q, shape (m, dof), are free. Shape (m,)."""
         rows = finite_array(Q, (None, self.robot.dof), "configurations")
         self.checked += len(rows)
-        free: Mask = self._fast.classify(self.robot.joint_values(rows), resolve=False) == FREE
-        return free & self.robot.within_limits(rows) & (not self.blocked)
+        free: Mask = self._fast.classify(self.robot.chain.joint_values(rows), resolve=False) == FREE
+        return free & inside_limits(self.robot, rows) & (not self.blocked)
 
     def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether the straight motion from a to b, shapes (dof,), is free."""
@@ -165,9 +165,9 @@ class MovingWorld:
         starts, ends = (finite_array(Q, (None, self.robot.dof), "ends of motions") for Q in (A, B))
         steps = step_counts(starts, ends, self.weights, self.motion_resolution)
         self.checked += int(steps.sum()) + len(steps)
-        sides = self.robot.joint_values(starts), self.robot.joint_values(ends)
+        sides = self.robot.chain.joint_values(starts), self.robot.chain.joint_values(ends)
         free: Mask = self._fast.classify_edges(*sides, steps, resolve=False) == FREE
-        free &= self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self.blocked)
+        free &= inside_limits(self.robot, starts) & inside_limits(self.robot, ends) & (not self.blocked)
         if self._proving is not None:  # beyond the clearance, which the margins of the bodies hold already
             free[free] = self._prover.proven(starts[free], ends[free], clearance=self._proving - self._room)
         return free

@@ -17,6 +17,7 @@ from rrtik_ompl.base.arrays import (
     Vector,
     finite_array,
     frozen,
+    not_negative,
     positive,
     truths,
     usable_waypoints,
@@ -123,8 +124,16 @@ class JointPath:
         return restored(cls, known)
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
-        """The same joints, other waypoints."""
-        return JointPath(waypoints, self.joint_names, self.prismatic, self.robot_name, self.continuous)
+        """The same joints, other waypoints.
+
+        Raises:
+            InputError: If they are no such rows, or have not one column for each joint.
+        """
+        rows = usable_waypoints(finite_array(waypoints, (None, None), "path waypoints"))
+        count, names = rows.shape[1], self.joint_names
+        if count != len(names):
+            raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
+        return path_through(self, rows)
 
     @property
     def start(self) -> Vector:
@@ -183,7 +192,7 @@ class JointPath:
     def resample(self, step: float) -> JointPath:
         """The same path with further waypoints, none farther than ``step`` [rad] from the next; all old ones stay."""
         counts = part_counts(self.waypoints, positive(step, "resample step"))
-        return self.with_waypoints(subdivided(self.waypoints, counts)[0])
+        return path_through(self, subdivided(self.waypoints, counts)[0])
 
     def violations(self, world: World, *, resolution: float | None = None) -> tuple[Violation, ...]:
         """Check the path again, independently of the planner that made it.
@@ -201,10 +210,8 @@ class JointPath:
         """
         require(world, World, "world of a path's check")
         require_joints(world.robot, self.joint_names, "path")
-        rows = self.waypoints
-        fine = verification_resolution(world) if resolution is None else resolution
-        rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
-        return route_violations(world, rows, positive(fine, "resolution", "give metres"))
+        fine = None if resolution is None else positive(resolution, "resolution", "give metres")
+        return violations_of(world, self.waypoints, fine)
 
     def proved(self, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
         """The same path with what is proven of its motions, see :meth:`World.prove`.
@@ -214,7 +221,9 @@ class JointPath:
         """
         require(world, World, "world of a path's proof")
         require_joints(world.robot, self.joint_names, "path")
-        return self.with_proof(world.prove(self.waypoints, clearance=clearance, seconds=seconds))
+        kept = None if clearance is None else not_negative(clearance, "clearance")
+        limit = None if seconds is None else positive(seconds, "seconds")
+        return proved(self, world, clearance=kept, seconds=limit)
 
     def with_proof(self, proof: Proof) -> JointPath:
         """The same path with what somebody else has proven of its motions."""
@@ -291,15 +300,32 @@ class JointPath:
         }
 
 
+def path_through(path: JointPath, rows: Matrix) -> JointPath:
+    """As :meth:`JointPath.with_waypoints`, of rows that are known to be finite and of its joints, shape (k, n)."""
+    return changed(path, waypoints=frozen(rows), proof=None)
+
+
+def violations_of(world: World, rows: Matrix, resolution: float | None = None) -> tuple[Violation, ...]:
+    """As :meth:`JointPath.violations`, of waypoints of the world's robot, shape (k, dof)."""
+    fine = verification_resolution(world) if resolution is None else resolution
+    return route_violations(world, np.vstack([rows, rows]) if len(rows) == 1 else rows, fine)
+
+
+def proved(path: JointPath, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
+    """As :meth:`JointPath.proved`, of a path of the world's robot."""
+    kept = world.settings.kept if clearance is None else clearance
+    return path.with_proof(world.prover.route(path.waypoints, clearance=kept, seconds=seconds))
+
+
 def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:
     """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
-    proved = path.proved(world, clearance=clearance)
+    found = proved(path, world, clearance=clearance)
     least = world.settings.kept
     for kept in sorted({max(min(clearance, CLEARANCE), least), least} - {clearance}, reverse=True):
-        if proved.proven:
+        if found.proven:
             break
-        proved = path.proved(world, clearance=kept)
-    return proved
+        found = proved(path, world, clearance=kept)
+    return found
 
 
 def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:

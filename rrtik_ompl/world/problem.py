@@ -22,7 +22,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.shapes import PointCloud
 from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.world.route_check import verification_resolution
-from rrtik_ompl.world.world import World
+from rrtik_ompl.world.world import World, form_of
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -91,12 +91,12 @@ class Problem:
         held = held_regions(world.robot, world.scene, (*known, *fresh), first)
         regions = tuple(each.region for each in held.regions)
         if regions:
-            world = world.with_settings(constraints=regions)
+            world = form_of(world, constraints=regions)
             _keep(world.robot, held, first, "start")
 
         if isinstance(wanted, JointGoal):
             _keep(world.robot, held, ends["goal"], "goal")
-            wanted = JointGoal(_nearest_turn(world, first, ends["goal"]), wanted.tolerance)
+            wanted = changed(wanted, q=frozen(_nearest_turn(world, first, ends["goal"])))
         elif any(_of_a_path(part) for part in parts_of(wanted) if isinstance(part, TaskRegion)):
             raise InputError(
                 "goal region: frame, from_start and allowances are for path constraints; a goal is of the tip"
@@ -160,7 +160,8 @@ def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Prob
 
 def densely_checked(problem: Problem) -> Problem:
     """The same problem, its motions checked as densely as by the second check of a path."""
-    return problem.with_resolution(verification_resolution(problem.world))
+    world = problem.world
+    return problem.with_world(form_of(world, motion_resolution=verification_resolution(world)))
 
 
 def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:
@@ -184,7 +185,7 @@ def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[s
     rows = np.array(list(found.values()))
     world = world.unheld
     # both opinions must agree, for the path through them will be certified by the second one
-    for opinion in (world.valid_batch, world.certify):
+    for opinion in (world.checks.free, world.checks.certified):
         for (what, q), free in zip(found.items(), opinion(rows).tolist(), strict=True):
             if not free:
                 raise _in_the_way(world, q, what)

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, in_blocks
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import Body
@@ -25,7 +25,7 @@ from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.arm_cache import MAX_ROBOTS, Pairs, strokes
 from rrtik_ompl.world.coal_proof import CoalProof, Told, distance_between
 from rrtik_ompl.world.contact_planes import suggest_planes
@@ -220,6 +220,9 @@ class Prover:
 
     def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0) -> Mask:
         """Which of the motions starts[k] -> ends[k], shapes (m, dof), are proven free. Shape (m,)."""
+        return in_blocks(partial(self._proven, clearance), starts, ends)
+
+    def _proven(self, clearance: float, starts: Matrix, ends: Matrix) -> Mask:
         if len(mask := np.ones(len(starts), dtype=bool)) == 0:
             return mask
         rows = np.concatenate([starts, ends])
@@ -272,7 +275,7 @@ class Prover:
 
     def _sound(self, rows: Matrix, values: Matrix) -> Mask | None:
         """Which configurations are inside the limits and not too large for the bound on rounding; None for all."""
-        inside = self.robot.within_limits(rows)
+        inside = inside_limits(self.robot, rows)
         if inside.all() and (_joints(self.robot)[2] or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
             return None
         return np.asarray(inside & (np.abs(values) <= LARGEST_VALUE).all(axis=1))
@@ -343,5 +346,5 @@ def _joints(robot: Robot) -> tuple[Matrix, Vector, bool]:
     """How joint values follow from configurations, and whether the limits keep them below half the largest value."""
     gain = np.ascontiguousarray(robot.chain.gain.T)
     ends = np.stack([robot.lower, robot.upper])
-    bounded = bool(np.isfinite(ends).all() and np.abs(robot.joint_values(ends)).max() < 0.5 * LARGEST_VALUE)
+    bounded = bool(np.isfinite(ends).all() and np.abs(robot.chain.joint_values(ends)).max() < 0.5 * LARGEST_VALUE)
     return gain, robot.chain.offset, bounded

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
+from rrtik_ompl.kernels.search.motions.motion_table import step_counts
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.transitions import in_parts, subdivided
 from rrtik_ompl.world.world import FINEST_RESOLUTION, Proof, World
@@ -43,9 +44,10 @@ def verification_resolution(world: World) -> float:
 
 def motion_taken(world: World, a: Vector, b: Vector) -> bool:
     """Whether a motion is free in the world's own steps, and the second check takes it as part of a path."""
-    if not world.motion_valid(a, b):
+    rows = np.stack([a, b])
+    if not world.checks.motions_free(rows[:1], rows[1:])[0]:
         return False
-    return not route_violations(world, np.stack([a, b]), verification_resolution(world))
+    return not route_violations(world, rows, verification_resolution(world))
 
 
 def as_it_stands(scene: Scene) -> str:
@@ -59,7 +61,7 @@ def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
     """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
     proof = known
     if proof is None or not proof.proven or proof.clearance < world.settings.kept:
-        proof = world.prove(rows)
+        proof = world.prover.route(rows, clearance=world.settings.kept)
     if proof.proven:
         margins = "its margins and " if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
         kept = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""
@@ -88,24 +90,30 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
         edges = {violation.edge for violation in broken}
         found = [*broken, *(violation for violation in others if violation.edge not in edges)]
         return tuple(sorted(found, key=lambda violation: violation.edge))
-    counts = np.array([world.steps(a, b, resolution) for a, b in pairwise(rows)], dtype=np.float64)
+    counts = _steps(world, rows, resolution)
     if counts.sum() > MAX_CHECKS:
         raise InputError(
             f"path: {counts.sum():.1e} checks are too many (at most {MAX_CHECKS:.0e}); "
             f"raise motion_resolution, or check whether the joint values are rad and m"
         )
-    open_ = np.flatnonzero(~world.motions_proven(rows[:-1], rows[1:]))
+    open_ = np.flatnonzero(~world.prover.proven(rows[:-1], rows[1:], clearance=world.settings.kept))
     found = []
     for run in np.split(open_, np.flatnonzero(np.diff(open_) > 1) + 1) if len(open_) else ():
         found += _sampled(world, rows, counts, run)
     return tuple(found if world.settings.proving is None else _with_unproven(world, rows, open_, found))
 
 
+def _steps(world: World, rows: Matrix, resolution: float) -> Vector:
+    """In how many steps each motion between waypoints is checked, shape (k - 1,); one by one, as everywhere."""
+    pairs = pairwise(rows[:, None])
+    return np.array([step_counts(a, b, world.weights, resolution)[0] for a, b in pairs], dtype=np.float64)
+
+
 def _with_unproven(world: World, rows: Matrix, open_: NDArray[np.int64], found: list[Violation]) -> Iterator[Violation]:
     """What was found, and each other motion that is not proven to keep what it must, of those given by numbers."""
     broken = {violation.edge: violation for violation in found}
-    wanted = world.settings.proving
-    proven = world.motions_proven(rows[open_], rows[open_ + 1], clearance=wanted)
+    wanted = world.settings.proving or 0.0
+    proven = world.prover.proven(rows[open_], rows[open_ + 1], clearance=wanted)
     for edge, enough in zip(open_.tolist(), proven.tolist(), strict=True):
         if edge in broken:
             yield broken[edge]
@@ -133,7 +141,7 @@ def _sampled(world: World, rows: Matrix, counts: Vector, run: NDArray[np.int64])
     for part in in_parts(counts[run], AT_ONCE):
         edges = run[part]
         dense, owners = subdivided(rows[edges[0] : edges[-1] + 2], counts[edges])
-        bad = np.flatnonzero(~world.certify(dense))
+        bad = np.flatnonzero(~world.checks.certified(dense))
         bad = bad[(bad > 0) | (part[0] == 0)]  # the point at which a part begins is the last one of the part before
         _, first = np.unique(owners[bad], return_index=True)
         for k in bad[first]:

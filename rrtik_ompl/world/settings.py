@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, get_args
 
 from rrtik_ompl.base.arrays import finite_array, not_negative
 from rrtik_ompl.base.choices import Accuracy, one_of
 from rrtik_ompl.base.copies import as_value
-from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
 from rrtik_ompl.base.poses import few_joints
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
@@ -60,24 +60,8 @@ class WorldSettings:
     __reduce__ = as_value
 
     def __post_init__(self) -> None:
-        require(self.robot, Robot, "robot of a world", "use load_robot(name or file)")
-        few_joints(self.robot.model)
-        require(self.scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
-        resolution = float(finite_array(self.motion_resolution, (), "motion_resolution"))
-        if resolution < FINEST_RESOLUTION:
-            raise InputError(
-                f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {self.motion_resolution}"
-            )
-        checked: dict[str, Any] = {
-            "accuracy": one_of(ACCURACIES, self.accuracy, "accuracy"),
-            "motion_resolution": resolution,
-            "self_margin": not_negative(self.self_margin, "self_margin"),
-            "clearance": not_negative(self.clearance, "clearance"),
-            "proving": None if self.proving is None else not_negative(self.proving, "clearance"),
-            "inflation": not_negative(self.inflation, "inflation"),
-            "constraints": listed(self.constraints, "path constraints"),
-        }
-        for name, value in checked.items():
+        given = {name: getattr(self, name) for name in CHECKS}
+        for name, value in checked_settings(given).items():
             object.__setattr__(self, name, value)
 
     @property
@@ -97,3 +81,71 @@ class WorldSettings:
                 yield f"{each.name}={value:g} {each.metadata['unit']}"
             else:
                 yield f"{each.name}={value}"
+
+
+def checked_settings(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of a world given by a user, by their names, as a world keeps them.
+
+    Raises:
+        InputError: If one of them is of the wrong type, or a length makes no sense.
+        UnknownNameError: If there is no setting, or no accuracy, of a name.
+    """
+    for name in given:
+        if name not in CHECKS:
+            raise UnknownNameError("setting of a world", name, CHECKS)
+    return {name: CHECKS[name](value) for name, value in given.items()}
+
+
+def _robot(robot: Robot) -> Robot:
+    require(robot, Robot, "robot of a world", "use load_robot(name or file)")
+    few_joints(robot.model)
+    return robot
+
+
+def _scene(scene: Scene) -> Scene:
+    require(scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
+    return scene
+
+
+def _accuracy(accuracy: Accuracy) -> Accuracy:
+    return one_of(ACCURACIES, accuracy, "accuracy")
+
+
+def _resolution(size: float) -> float:
+    resolution = float(finite_array(size, (), "motion_resolution"))
+    if resolution < FINEST_RESOLUTION:
+        raise InputError(f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {size}")
+    return resolution
+
+
+def _self_margin(length: float) -> float:
+    return not_negative(length, "self_margin")
+
+
+def _clearance(length: float) -> float:
+    return not_negative(length, "clearance")
+
+
+def _proving(length: float | None) -> float | None:
+    return None if length is None else not_negative(length, "clearance")
+
+
+def _inflation(length: float) -> float:
+    return not_negative(length, "inflation")
+
+
+def _constraints(regions: Iterable[TaskRegion]) -> tuple[TaskRegion, ...]:
+    return listed(regions, "path constraints")
+
+
+CHECKS: dict[str, Callable[[Any], Any]] = {  # of what a user gives, in the order of the fields
+    "robot": _robot,
+    "scene": _scene,
+    "accuracy": _accuracy,
+    "motion_resolution": _resolution,
+    "self_margin": _self_margin,
+    "clearance": _clearance,
+    "proving": _proving,
+    "inflation": _inflation,
+    "constraints": _constraints,
+}

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from dataclasses import fields, replace
-from functools import cached_property, partial
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import MOST_NUMBERS, Mask, Matrix, Vector, finite_array, in_blocks, not_negative, positive
+from rrtik_ompl.base.arrays import MOST_NUMBERS, Mask, Matrix, Vector, finite_array, not_negative, positive
 from rrtik_ompl.base.choices import Accuracy
-from rrtik_ompl.base.copies import ThreadOwn, in_notebook
-from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, Renamed, UnknownNameError, require
+from rrtik_ompl.base.copies import ThreadOwn, changed, in_notebook, restored
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, Renamed, require
 from rrtik_ompl.base.sharing import Shared
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs
@@ -28,15 +27,14 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Scene
 from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.world.arrangement import Arrangement, arranged
-from rrtik_ompl.world.exact_checks import ExactChecker, one_way
+from rrtik_ompl.world.exact_checks import ExactChecker
 from rrtik_ompl.world.proof import Gap as Gap
 from rrtik_ompl.world.proof import Proof as Proof
 from rrtik_ompl.world.proof import Prover
+from rrtik_ompl.world.row_checks import RowChecks
 from rrtik_ompl.world.settings import ACCURACIES as ACCURACIES
 from rrtik_ompl.world.settings import FINEST_RESOLUTION as FINEST_RESOLUTION
-from rrtik_ompl.world.settings import MOTION_RESOLUTION, WorldSettings
-
-SETTINGS = tuple(each.name for each in fields(WorldSettings))
+from rrtik_ompl.world.settings import MOTION_RESOLUTION, WorldSettings, checked_settings
 
 
 def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
@@ -50,16 +48,11 @@ def _held_regions(robot: Robot, attached: tuple[AttachedObject, ...], regions: t
     return held_regions(robot, Scene(attached=attached), regions, None)
 
 
-def _second_checker(solids: Arrangement, clearance: float) -> Certificate:
-    return Certificate(solids.robot, solids.with_room(clearance).whole, solids.pairs)
-
-
 # What a world is made of, and what each part depends on: worlds that are made of the same values share them.
 ARRANGEMENTS = Shared(arranged)  # robot, scene, self_margin
 CHECKERS = Shared(ExactChecker.of)  # arrangement, room
 PROVERS = Shared(_prover_of)  # arrangement, held regions
 HELD = Shared(_held_regions)  # robot, what is attached, regions
-CERTIFICATES = Shared(_second_checker)  # arrangement, clearance
 
 
 class World:
@@ -84,8 +77,7 @@ class World:
             are also attributes of the world. ``World.of(replace(world.settings, ...))`` is another form of it.
         bodies: The solids of the robot and the scene.
         pairs: Numbers of the bodies that must not touch.
-        prover: Proves motions free; where there are path constraints, free and held.
-        constraints: What is held (:class:`~rrtik_ompl.constraints.held_regions.HeldRegions`); None if nothing is.
+        checks: Answers what the methods of a world ask, of rows that are trusted; of each thread's own.
         weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
 
     Args:
@@ -129,16 +121,8 @@ class World:
             inflation=inflation,
             constraints=constraints,  # type: ignore[arg-type]  # made a tuple there
         )
-        self._settings = settings
-        self._solids = ARRANGEMENTS.of(robot, settings.scene, settings.self_margin)
-        while self._solids.doubts:  # each is said once
-            warnings.warn(self._solids.doubts.pop(0), MeshWarning, stacklevel=2)
-
-        self._checks = CHECKERS.of(self._solids, settings.clearance + settings.inflation)
-        self.constraints: HeldRegions | None = None
-        if settings.constraints:
-            self.constraints = HELD.of(robot, settings.scene.attached, settings.constraints)
-        self.prover = PROVERS.of(self._solids, self.constraints)
+        for name, value in _parts(settings).items():
+            setattr(self, name, value)
 
     @classmethod
     def of(cls, settings: WorldSettings) -> World:
@@ -148,15 +132,24 @@ class World:
             InputError: If they are none.
         """
         require(settings, WorldSettings, "settings of a world", "use world.settings, or dataclasses.replace of them")
-        return cls(**{name: getattr(settings, name) for name in SETTINGS})
+        return restored(cls, _parts(settings))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy answers as the world does, and may be used in another thread or process."""
         return _quietly, (self.settings,)
 
-    prover: ThreadOwn[Prover] = ThreadOwn()
-    _checks: ThreadOwn[ExactChecker] = ThreadOwn()
+    checks: ThreadOwn[RowChecks] = ThreadOwn()
     resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
+
+    @property
+    def prover(self) -> Prover:
+        """Proves motions free; where there are path constraints, free and held."""
+        return self.checks.prover
+
+    @property
+    def constraints(self) -> HeldRegions | None:
+        """What is held; None if nothing is."""
+        return self.checks.constraints
 
     def __repr__(self) -> str:
         return f"World({', '.join([self.robot.name, str(self.scene), *self._settings.unusual()])})"
@@ -194,17 +187,17 @@ class World:
     @property
     def bodies(self) -> tuple[Body, ...]:
         """The solids of the robot and the scene, with the margins of obstacles, without the clearance."""
-        return self._solids.bodies.whole
+        return self.checks.solids.bodies.whole
 
     @property
     def pairs(self) -> Pairs:
         """Numbers of the bodies that must not touch."""
-        return self._solids.pairs
+        return self.checks.solids.pairs
 
     @property
     def weights(self) -> Vector:
         """No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,)."""
-        return self._solids.weights
+        return self.checks.solids.weights
 
     @property
     def fast(self) -> FastWorld | None:
@@ -212,15 +205,15 @@ class World:
 
         They do not where motions have to be proven or held, nor where something is in contact: they know nothing of it.
         """
-        tables = self._checks.fast
+        tables = self.checks.checker.fast
         settings = self._settings
         enough = settings.proving is None and self.constraints is None and not settings.scene.contacts
-        return tables if tables.address and enough and not self._solids.always_colliding else None
+        return tables if tables.address and enough and not self.checks.solids.always_colliding else None
 
     @property
     def motions(self) -> FastMotions | None:
         """How motions are checked, for searches in kernels: one table for all of them. None where ``fast`` is."""
-        return motions_of(self, self._checks.motions)
+        return motions_of(self, self.checks.checker.motions)
 
     @property
     def free_motions(self) -> FastMotions | None:
@@ -228,7 +221,7 @@ class World:
 
         Pairs that are in contact are left out: how deep they overlap is proven of what is found.
         """
-        free = self.with_settings(proving=None, constraints=())
+        free = form_of(self, proving=None, constraints=())
         scene = free.scene
         if not scene.contacts:
             return free.motions
@@ -238,7 +231,7 @@ class World:
     @property
     def unheld(self) -> World:
         """The same world without path constraints."""
-        return self.with_settings(constraints=())
+        return self if self.constraints is None else form_of(self, constraints=())
 
     def with_settings(self, **changes: Any) -> World:
         """The same world but for some of its settings; it shares what does not depend on them.
@@ -255,12 +248,7 @@ class World:
             >>> world
             World(planar3, Scene(empty), self_margin=0.01 m, clearance=0.05 m)
         """
-        for name in changes:
-            if name not in SETTINGS:
-                raise UnknownNameError("setting of a world", name, SETTINGS)
-        settings = replace(self._settings, **changes)
-        changed = any(getattr(settings, name) != getattr(self._settings, name) for name in changes)
-        return World.of(settings) if changed else self
+        return form_of(self, **checked_settings(changes))
 
     def with_scene(self, scene: Scene) -> World:
         """A world of the same robot in another scene, with the same settings.
@@ -333,16 +321,18 @@ class World:
         """
         require(name, str, "name of an obstacle")
         settings = self._settings
-        moved, numbers = self._solids.moved(name, pose)
+        checks = self.checks
+        moved, numbers = checks.solids.moved(name, pose)
         solids = ARRANGEMENTS.keep(moved, settings.robot, moved.scene, settings.self_margin)
 
         # These names hold the parts until the new world has found them.
-        prover = self.prover.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
-        PROVERS.keep(prover, solids, self.constraints)
-        checks = self._checks.moved(solids, numbers)
-        if checks is not None:
-            CHECKERS.keep(checks, solids, checks.room)
-        return World.of(replace(settings, scene=solids.scene))
+        free = PROVERS.of(checks.solids, None)
+        prover = free.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
+        PROVERS.keep(prover, solids, None)
+        checker = checks.checker.moved(solids, numbers)
+        if checker is not None:
+            CHECKERS.keep(checker, solids, checker.room)
+        return form_of(self, scene=solids.scene)
 
     def valid(self, q: ArrayLike) -> bool:
         """Whether q, shape (dof,), is inside the limits and free of collision.
@@ -350,7 +340,7 @@ class World:
         Raises:
             InputError: If q has the wrong length or a value that is not finite.
         """
-        return bool(self._free(self._rows(q, 1))[0])
+        return bool(self.checks.free(self._rows(q, 1))[0])
 
     def valid_batch(self, Q: ArrayLike) -> Mask:
         """Which rows of Q, shape (m, dof), are inside the limits and free of collision. Shape (m,).
@@ -358,15 +348,15 @@ class World:
         Raises:
             InputError: If Q has the wrong shape or a value that is not finite.
         """
-        return in_blocks(self._free, self._rows(Q, 2))
+        return self.checks.free(self._rows(Q, 2))
 
     def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether the straight motion from a to b, shape (dof,) each, is valid; the same answer from b to a."""
-        return bool(self._motions_free(self._rows(a, 1), self._rows(b, 1))[0])
+        return bool(self.checks.motions_free(self._rows(a, 1), self._rows(b, 1))[0])
 
     def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
         """Which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
-        return in_blocks(self._motions_free, *self._both_ends(A, B))
+        return self.checks.motions_free(*self._both_ends(A, B))
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
@@ -380,7 +370,7 @@ class World:
         an obstacle cannot be proven.
         """
         kept = self._proven_clearance(clearance)
-        return in_blocks(partial(self.prover.proven, clearance=kept), *self._both_ends(A, B))
+        return self.prover.proven(*self._both_ends(A, B), clearance=kept)
 
     def prove(
         self,
@@ -417,12 +407,12 @@ class World:
     def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
         """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
         rows = self._rows(q, 1)
-        kept = self._checks.contacts_of_meshes_kept(rows)
+        kept = self.checks.checker.contacts_of_meshes_kept(rows)
         pairs = tuple(pair for pair in self.pairs if pair not in kept) if kept else self.pairs
-        found = list(measured(self.bodies, pairs, self.robot.joint_frames(rows)[0], near_only=True))
+        found = list(measured(self.bodies, pairs, self.robot.chain.joint_frames(rows)[0], near_only=True))
         if not found:
             shared = not kept and self._settings.clearance == 0.0
-            certificate = self._certificate if shared else Certificate(self.robot, self.bodies, pairs)
+            certificate = self.checks.certificate if shared else Certificate(self.robot, self.bodies, pairs)
             found = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
         return tuple(sorted(found, key=lambda c: c.clearance))
 
@@ -433,7 +423,7 @@ class World:
         """
         if known_free is not True and (touching := self.contacts(q)):
             return touching[0]
-        found = measured(self.bodies, self.pairs, self.robot.joint_frames(self._rows(q, 1))[0], near_only=False)
+        found = measured(self.bodies, self.pairs, self.robot.chain.joint_frames(self._rows(q, 1))[0], near_only=False)
         return min(found, key=lambda c: c.clearance, default=None)
 
     def clearance(self, q: ArrayLike) -> float:
@@ -448,8 +438,8 @@ class World:
         """
         if self._settings.clearance == 0.0:
             return ()
-        frames = self.robot.joint_frames(self._rows(q, 1))[0]
-        roomy = self._solids.with_room(self._settings.clearance).whole
+        frames = self.robot.chain.joint_frames(self._rows(q, 1))[0]
+        roomy = self.checks.solids.with_room(self._settings.clearance).whole
         near = measured(roomy, self.pairs, frames, near_only=True)
         kept = (c for c in near if c.clearance + self._settings.clearance > 0.0)
         return tuple(sorted(kept, key=lambda c: c.clearance))
@@ -471,22 +461,14 @@ class World:
             return f"{apart}, {wanted}{_and_more(near)}"
         if self.constraints is not None and (breach := self.constraints.explain(row)):
             return breach
-        if self.valid(row):
+        if self.checks.free(row[None])[0]:
             return ""
         nearest = self.closest(row, known_free=True)
         return "it is not proven free" if nearest is None else f"{nearest}, too near to be told free"
 
     def certify(self, Q: ArrayLike) -> Mask:
         """A second opinion on rows of Q, (m, dof) -> (m,), not by the checks of planners: proofs first, then coal."""
-        mask = self.robot.within_limits(rows := self._rows(Q, 2))
-        open_ = mask & ~self.prover.still_proven(rows, clearance=self._settings.clearance)
-        mask[open_] = self._certificate.free(rows[open_])
-        return mask if self.constraints is None else mask & self.constraints.held(rows)
-
-    @cached_property
-    def _certificate(self) -> Certificate:
-        """The checker behind :meth:`certify`."""
-        return CERTIFICATES.of(self._solids, self._settings.clearance)
+        return self.checks.certified(self._rows(Q, 2))
 
     def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:
         starts, ends = self._rows(A, 2), self._rows(B, 2)
@@ -502,33 +484,25 @@ class World:
             rows = self.robot.configuration(Q) if dimensions == 1 else finite_array(Q, (None, self.robot.dof), what)
         return np.atleast_2d(rows)
 
-    @property
-    def _exact(self) -> bool:
-        return self._settings.accuracy == "exact"
 
-    def _free(self, rows: Matrix) -> Mask:
-        mask = self.robot.within_limits(rows) & (not self._solids.always_colliding)
-        if mask.all():
-            mask = self._checks.free(rows, exact=self._exact)
-        else:
-            mask[mask] = self._checks.free(rows[mask], exact=self._exact)
-        if self.constraints is not None:
-            mask[mask] = self.constraints.held(rows[mask])
-        return mask
+def form_of(world: World, **known: Any) -> World:
+    """The same world but for some of its settings, which are known to be right; see :meth:`World.with_settings`."""
+    settings = world.settings
+    if all(getattr(settings, name) == value for name, value in known.items()):
+        return world
+    return World.of(changed(settings, **known))
 
-    def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
-        mask = self.robot.within_limits(starts) & self.robot.within_limits(ends) & (not self._solids.always_colliding)
-        A, B = one_way(starts[mask], ends[mask])
-        counts = step_counts(A, B, self.weights, self.motion_resolution)
-        clearance = self._settings.proving
-        mask[mask] = free = self._checks.motions_free(
-            A, B, counts, exact=self._exact, to_be_proven=clearance is not None
-        )
-        if clearance is not None:
-            mask[mask] = self.prover.proven(A[free], B[free], clearance=clearance)
-        elif self.constraints is not None:  # a prover says that too
-            mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
-        return mask
+
+def _parts(settings: WorldSettings) -> dict[str, Any]:
+    """What a world of these settings holds."""
+    robot, scene = settings.robot, settings.scene
+    solids = ARRANGEMENTS.of(robot, scene, settings.self_margin)
+    while solids.doubts:  # each is said once
+        warnings.warn(solids.doubts.pop(0), MeshWarning, stacklevel=3)
+
+    checker = CHECKERS.of(solids, settings.clearance + settings.inflation)
+    held = HELD.of(robot, scene.attached, settings.constraints) if settings.constraints else None
+    return {"_settings": settings, "checks": RowChecks(settings, solids, checker, PROVERS.of(solids, held), held)}
 
 
 def _and_more(contacts: tuple[Contact, ...]) -> str:

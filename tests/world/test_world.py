@@ -241,7 +241,7 @@ def test_the_certificate_agrees_with_itself_in_chunks(dented_cube):
     Q = np.random.default_rng(6).uniform(robot.lower, robot.upper, (600, 6))
     whole = world.certify(Q)
     assert (whole == np.concatenate([world.certify(Q[:100]), world.certify(Q[100:])])).all()
-    assert isinstance(world._certificate, Certificate)
+    assert isinstance(world.checks.certificate, Certificate)
 
 
 def test_a_half_space_cannot_be_held():

@@ -83,7 +83,7 @@ class Certificate:
         """
         middles, ends = np.minimum(begins + size // 2, len(Q) - 1), np.minimum(begins + size, len(Q))
         near = np.array([np.abs(Q[a:b] - Q[m]).max(axis=0) for a, b, m in zip(begins, ends, middles, strict=True)])
-        frames = self._robot.joint_frames(Q[middles])
+        frames = self._robot.chain.joint_frames(Q[middles])
         placed = self._boxes.placed(frames)
         approach = DISTANCE_TOLERANCE + self._approached(near, run, pair)
         open_: Mask = self._gaps(placed, run, pair) <= approach

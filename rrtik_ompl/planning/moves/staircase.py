@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, positive
 from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.robot import require_joints
 from rrtik_ompl.model.transitions import SAME, merge_moves
 from rrtik_ompl.world.kept_clearance import check_route_clearance, keeping, provable_clearances
 from rrtik_ompl.world.motion_queries import MotionsFree
-from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.world.path import JointPath, path_through, proved, violations_of
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
-from rrtik_ompl.world.world import FINEST_RESOLUTION, World
+from rrtik_ompl.world.world import FINEST_RESOLUTION, World, form_of
 
 Order: TypeAlias = tuple[int, ...]  # the joints of a piece, the first to move first
 
@@ -68,20 +69,21 @@ def one_joint_moves(
     require(world, World, "world of a path to convert")
     if len(path.waypoints) < 2:
         raise InputError("path to convert: it has one waypoint, so there is nothing to convert")
-    faults = path.violations(world)
+    require_joints(world.robot, path.joint_names, "path")
+    faults = violations_of(world, path.waypoints)
     if faults:
         raise InputError(f"path to convert: motion {faults[0].edge + 1} is not valid: {faults[0].reason}")
     least = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
     check_route_clearance(world, clearance, path.waypoints)
     for kept in provable_clearances(world, path.waypoints, clearance):
         with suppress(InputError):  # no staircase keeps so much; one that keeps less may
-            converted = path.with_waypoints(_converted(path.waypoints, keeping(world, 0.0, proven=kept), least))
-            return converted.proved(world, clearance=kept)
+            rows = _converted(path.waypoints, keeping(world, 0.0, proven=kept), least)
+            return proved(path_through(path, rows), world, clearance=kept)
     for density in DENSITIES:
-        finer = world.with_resolution(max(world.motion_resolution / density, FINEST_RESOLUTION))
-        converted = path.with_waypoints(_converted(path.waypoints, finer, least))
-        if not converted.violations(world):
-            return converted.proved(world)
+        finer = form_of(world, motion_resolution=max(world.motion_resolution / density, FINEST_RESOLUTION))
+        rows = _converted(path.waypoints, finer, least)
+        if not violations_of(world, rows):
+            return proved(path_through(path, rows), world)
     raise InputError("path to convert: its single-joint moves do not pass the second check; lower motion_resolution")
 
 
@@ -169,14 +171,14 @@ def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
     joints = [tuple(np.flatnonzero(piece.a != piece.b).tolist()) for piece in pieces]
     trials = [(piece, order) for piece, own in zip(pieces, joints, strict=True) for order in (own[::-1], own)]
     stairs = [_staircase(*trial) for trial in trials]
-    free = world.motion_valid_batch(np.vstack([s[:-1] for s in stairs]), np.vstack([s[1:] for s in stairs]))
+    free = world.checks.motions_free(np.vstack([s[:-1] for s in stairs]), np.vstack([s[1:] for s in stairs]))
     ends = np.cumsum([len(s) - 1 for s in stairs])[:-1]
     passed = [bool(ok.all()) for ok in np.split(free, ends)]
     found = []
     for k, piece in enumerate(pieces):
         both = zip(trials[2 * k : 2 * k + 2], passed[2 * k : 2 * k + 2], strict=True)
         plain = [order for (_, order), ok in both if ok]
-        found.append(plain or staircase_orders(piece.a, piece.b, world.motion_valid_batch))
+        found.append(plain or staircase_orders(piece.a, piece.b, world.checks.motions_free))
     return found
 
 

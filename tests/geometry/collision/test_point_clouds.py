@@ -60,14 +60,14 @@ def test_a_cloud_is_free_where_its_balls_are(name, count, margin):
     free = spheres.valid_batch(Q)
     assert (cloud.valid_batch(Q) == free).all()
     assert (cloud.certify(Q[:60]) == free[:60]).all()
-    assert cloud._checks.fast.intact()
+    assert cloud.checks.exact.fast.intact()
 
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("name", ARMS)
 def test_kernels_agree_with_the_reference_and_leave_next_to_nothing_open(name):
     cloud, _ = worlds(name, 5, 2000)
-    fast, Q = cloud._checks.fast, sample(cloud.robot, 2, 400)
+    fast, Q = cloud.checks.exact.fast, sample(cloud.robot, 2, 400)
     V = cloud.robot.joint_values(Q)
     slow = fast._reference.classify(V, resolve=False)
     assert (fast.classify(V, resolve=False) == slow).mean() > 0.995  # rounding
@@ -75,7 +75,7 @@ def test_kernels_agree_with_the_reference_and_leave_next_to_nothing_open(name):
     kernels, fast._kernels = fast._kernels, None
     expected, fast._kernels = fast.clearance(V), kernels
     assert np.abs(bounds.lower - expected.lower)[expected.lower > 0.0].max(initial=0.0) < NEARLY
-    answers, certain = fast.classify(V), cloud._certificate.free(Q)
+    answers, certain = fast.classify(V), cloud.checks.certificate.free(Q)
     assert certain[answers == FREE].all()
     assert not certain[answers == COLLIDING].any()
     assert ((answers != FREE) & (answers != COLLIDING)).mean() < 0.05
@@ -112,7 +112,7 @@ def test_kernels_are_right_at_contact_with_walls_of_points(name):
         )
         if world.fast is None:  # the walls stand in the base
             continue
-        found, certain = world.fast.classify(robot.joint_values(near)), world._certificate.free(near)
+        found, certain = world.fast.classify(robot.joint_values(near)), world.checks.certificate.free(near)
         assert certain[found == FREE].all()
         assert not certain[found == COLLIDING].any()
         answers.extend(zip(found, certain, strict=True))
