@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.base.errors import InputError, listed
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_region import HeldRegion, Turning, frame_place, held_region
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
@@ -96,7 +96,7 @@ def held_regions(robot: Robot, scene: Scene, regions: Iterable[TaskRegion], star
         InputError: If one of them is no region, names no frame, or cannot be held.
     """
     prepared = []
-    for number, region in enumerate(listed(regions, "path constraints"), 1):
+    for number, region in enumerate(regions, 1):
         label = f"path constraint {number}"
         if not isinstance(region, TaskRegion):
             raise InputError(

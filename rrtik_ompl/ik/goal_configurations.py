@@ -130,8 +130,8 @@ class GoalSearch:
                 self._unheld = np.vstack([self._unheld, found])
                 found = held_at_goal(self._problem, goal, found, self._rng)
         self._rounds += 1
-        free = found[world.valid_batch(found)]
-        free = free[world.certify(free)]
+        free = found[world.checks.free(found)]
+        free = free[world.checks.certified(free)]
         self._found = np.vstack([self._found, found])
         self.rows = frozen(np.vstack([self.rows, _chosen(self._problem, free, self.rows)])[:LARGEST])
         self.exhausted |= self._rounds >= LAST_ROUND or len(self.rows) >= LARGEST

@@ -143,7 +143,7 @@ class Search:
         if wanted is None or isinstance(self._problem.goal, JointGoal):
             return rows
         for _ in range(MAX_ROUNDS):
-            kept = self._problem.world.motions_proven(rows, rows, clearance=wanted)
+            kept = self._problem.world.prover.proven(rows, rows, clearance=wanted)
             if kept.any():
                 return rows[kept]
             if not self._goals.more():
@@ -158,7 +158,7 @@ class Search:
         if self._aimless and not self._traits.kernels:
             return None
         proven = self._problem.with_accuracy("conservative")
-        free = proven.world.valid_batch(np.concatenate([proven.start[None], aims]))
+        free = proven.world.checks.free(np.concatenate([proven.start[None], aims]))
         aims = aims[free[1:]]
         if not free[0] or (len(aims) == 0 and not self._aimless):
             return None
@@ -169,7 +169,7 @@ class Search:
         if self._leaves_room(number):
             proving = not self._traits.kernels or self._strict_attempts >= IN_KERNELS
             strict = self._strict_problem(proving)
-            roomy = aims[strict.world.valid_batch(aims)]
+            roomy = aims[strict.world.checks.free(aims)]
             if len(roomy) or self._aimless:
                 return self._strict_path(strict, number, roomy, base=2 if proving else 4)
         effort = self._effort(number)

@@ -12,7 +12,7 @@ from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
 from rrtik_ompl.planning.moves.clearance_levels import roomiest
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import Room, keeping, leaving_room, room_between
-from rrtik_ompl.world.path import JointPath, proved_as_clear
+from rrtik_ompl.world.path import JointPath, path_through, proved, proved_as_clear, violations_of
 from rrtik_ompl.world.problem import Problem, densely_checked
 
 TOUCHING = 1e-6  # [m]; bodies that are nearer to their margin than this count as touching
@@ -126,7 +126,7 @@ class SecondCheck:
             return None
         world, rows = self._problem.world, path.waypoints
         leaves_room = self._traits.leaves_room
-        first = proved_as_clear(path, world, room.kept) if leaves_room else path.proved(world, clearance=room.kept)
+        first = proved_as_clear(path, world, room.kept) if leaves_room else proved(path, world, clearance=room.kept)
         if first.proven:
             self.reason = ""
             return first
@@ -135,7 +135,7 @@ class SecondCheck:
         rng, single = np.random.default_rng(seed), self._traits.one_joint
         known = None if leaves_room else first.proof
         repaired = with_detours(world, rows, clearance=room.kept, rng=rng, one_joint=single, proof=known)
-        mended = None if repaired is None else path.with_waypoints(repaired).proved(world, clearance=room.kept)
+        mended = None if repaired is None else proved(path_through(path, repaired), world, clearance=room.kept)
         if mended is None or not mended.proven:
             return None
         self.reason = ""
@@ -145,8 +145,8 @@ class SecondCheck:
         """The path if no proof is wanted and the check in steps agrees; else it may become the best one."""
         world = self._problem.world
         if self.proves:
-            path = path.proved(world)
-        faults = () if path.proven else path.violations(world)
+            path = proved(path, world)
+        faults = () if path.proven else violations_of(world, path.waypoints)
         if faults:
             self.rejected += 1
             self.reason = f"the path of {self._name} was rejected by the second check: {faults[0].reason}"
@@ -166,7 +166,9 @@ class SecondCheck:
         return room(self._problem.world, ends, self._clearance)
 
     def _first_gap(self, rows: Matrix) -> str:
-        return str(next(iter(self._problem.world.prove(rows).unproven), ""))
+        world = self._problem.world
+        proof = world.prover.route(rows, clearance=world.settings.kept)
+        return str(next(iter(proof.unproven), ""))
 
 
 def fixed_ends(problem: Problem) -> dict[str, Vector]:

@@ -30,10 +30,10 @@ from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.model.robot import Robot, require_joints, unnamed_joints
 from rrtik_ompl.model.transitions import (
     SAME,
+    length_of,
     merge_moves,
     moved,
     part_counts,
-    route_length,
     single_joint,
     subdivided,
     transitions,
@@ -148,7 +148,7 @@ class JointPath:
     @property
     def length(self) -> float:
         """Sum of the Euclidean lengths of the edges [rad, metres counted alike]."""
-        return route_length(self.waypoints)
+        return length_of(self.waypoints)
 
     @property
     def unit(self) -> str:

@@ -490,7 +490,7 @@ def form_of(world: World, **known: Any) -> World:
     settings = world.settings
     if all(getattr(settings, name) == value for name, value in known.items()):
         return world
-    return World.of(changed(settings, **known))
+    return restored(World, _parts(changed(settings, **known)))
 
 
 def _parts(settings: WorldSettings) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 
-from rrtik_ompl.base.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.search.taut import layout
@@ -27,18 +27,17 @@ class Tightening:
         seed: Of the steps.
 
     Raises:
-        InputError: If the route is none, or the kernels cannot check it.
+        InputError: If the route has no motion, or the kernels cannot check it.
     """
 
     def __init__(self, motions: FastMotions, waypoints: Matrix, *, seed: int = 0) -> None:
         dof, kernels = motions.dof, library(layout.KERNELS)
-        rows = finite_array(waypoints, (None, dof), "waypoints to pull taut")
-        if kernels is None or len(rows) < 2 or not motions.fast.covered(motions.joint_values(rows)):
+        if kernels is None or len(waypoints) < 2 or not motions.fast.covered(motions.joint_values(waypoints)):
             raise InputError("waypoints to pull taut: expected a route of two or more that kernels can check")
         self._kernels, self._motions, self._dof = kernels, motions, dof
-        self._table = made = PlannedTable(_plan(len(rows), dof))
+        self._table = made = PlannedTable(_plan(len(waypoints), dof))
         made.header[[layout.MOTIONS, layout.RANDOM]] = motions.address, seed % 2**62
-        made[layout.ROUTE][:], made[layout.STEPS][:], made[layout.HINTS][:] = rows.ravel(), FIRST_STEP, -1.0
+        made[layout.ROUTE][:], made[layout.STEPS][:], made[layout.HINTS][:] = waypoints.ravel(), FIRST_STEP, -1.0
 
     @property
     def waypoints(self) -> Matrix:
