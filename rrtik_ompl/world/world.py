@@ -77,6 +77,7 @@ class World:
             are also attributes of the world. ``World.of(replace(world.settings, ...))`` is another form of it.
         bodies: The solids of the robot and the scene.
         pairs: Numbers of the bodies that must not touch.
+        constraints: What is held (:class:`~rrtik_ompl.constraints.held_regions.HeldRegions`); None if nothing is.
         checks: Answers what the methods of a world ask, of rows that are trusted; of each thread's own.
         weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
 
@@ -138,6 +139,8 @@ class World:
         """A copy answers as the world does, and may be used in another thread or process."""
         return _quietly, (self.settings,)
 
+    _settings: WorldSettings
+    constraints: HeldRegions | None
     checks: ThreadOwn[RowChecks] = ThreadOwn()
     resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
 
@@ -145,11 +148,6 @@ class World:
     def prover(self) -> Prover:
         """Proves motions free; where there are path constraints, free and held."""
         return self.checks.prover
-
-    @property
-    def constraints(self) -> HeldRegions | None:
-        """What is held; None if nothing is."""
-        return self.checks.constraints
 
     def __repr__(self) -> str:
         return f"World({', '.join([self.robot.name, str(self.scene), *self._settings.unusual()])})"
@@ -502,7 +500,8 @@ def _parts(settings: WorldSettings) -> dict[str, Any]:
 
     checker = CHECKERS.of(solids, settings.clearance + settings.inflation)
     held = HELD.of(robot, scene.attached, settings.constraints) if settings.constraints else None
-    return {"_settings": settings, "checks": RowChecks(settings, solids, checker, PROVERS.of(solids, held), held)}
+    checks = RowChecks(settings, solids, checker, PROVERS.of(solids, held), held)
+    return {"_settings": settings, "constraints": held, "checks": checks}
 
 
 def _and_more(contacts: tuple[Contact, ...]) -> str:
