@@ -122,8 +122,8 @@ class World:
             inflation=inflation,
             constraints=constraints,  # type: ignore[arg-type]  # made a tuple there
         )
-        for name, value in _parts(settings).items():
-            setattr(self, name, value)
+        self._settings = settings
+        self.checks = _checks_of(settings)
 
     @classmethod
     def of(cls, settings: WorldSettings) -> World:
@@ -133,16 +133,19 @@ class World:
             InputError: If they are none.
         """
         require(settings, WorldSettings, "settings of a world", "use world.settings, or dataclasses.replace of them")
-        return restored(cls, _parts(settings))
+        return _world_of(settings)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy answers as the world does, and may be used in another thread or process."""
         return _quietly, (self.settings,)
 
-    _settings: WorldSettings
-    constraints: HeldRegions | None
     checks: ThreadOwn[RowChecks] = ThreadOwn()
     resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
+
+    @property
+    def constraints(self) -> HeldRegions | None:
+        """What is held; None if nothing is."""
+        return self.checks.constraints
 
     @property
     def prover(self) -> Prover:
@@ -488,11 +491,16 @@ def form_of(world: World, **known: Any) -> World:
     settings = world.settings
     if all(getattr(settings, name) == value for name, value in known.items()):
         return world
-    return restored(World, _parts(changed(settings, **known)))
+    return _world_of(changed(settings, **known))
 
 
-def _parts(settings: WorldSettings) -> dict[str, Any]:
-    """What a world of these settings holds."""
+def _world_of(settings: WorldSettings) -> World:
+    """A world of settings that are known to be right: ``World(...)`` without its checks."""
+    return restored(World, {"_settings": settings, "checks": _checks_of(settings)})
+
+
+def _checks_of(settings: WorldSettings) -> RowChecks:
+    """What answers in a world of these settings."""
     robot, scene = settings.robot, settings.scene
     solids = ARRANGEMENTS.of(robot, scene, settings.self_margin)
     while solids.doubts:  # each is said once
@@ -500,8 +508,7 @@ def _parts(settings: WorldSettings) -> dict[str, Any]:
 
     checker = CHECKERS.of(solids, settings.clearance + settings.inflation)
     held = HELD.of(robot, scene.attached, settings.constraints) if settings.constraints else None
-    checks = RowChecks(settings, solids, checker, PROVERS.of(solids, held), held)
-    return {"_settings": settings, "constraints": held, "checks": checks}
+    return RowChecks(settings, solids, checker, PROVERS.of(solids, held), held)
 
 
 def _and_more(contacts: tuple[Contact, ...]) -> str:

@@ -50,7 +50,7 @@ def asked(world, rows, ends):
     """What a world says, down to which answers are in doubt."""
     values = world.robot.joint_values(rows)
     said = [world.valid_batch(rows), world.motion_valid_batch(rows, ends), world.motions_proven(rows, ends)]
-    said += [world.checks.exact.fast.classify(values), world.checks.exact.fast.clearance(values).lower]
+    said += [world.checks.checker.fast.classify(values), world.checks.checker.fast.clearance(values).lower]
     return [*said, world.prove(rows[:4]).proven, world.contacts(rows[0]), world.prover.digest]
 
 
@@ -94,7 +94,7 @@ def test_the_rows_of_a_box_are_those_that_packing_makes(queries, monkeypatch):
 
 
 def rows_after(world, pose):
-    tables = world.with_scene(replace(world.scene)).moved("box", pose).checks.exact.fast.tables
+    tables = world.with_scene(replace(world.scene)).moved("box", pose).checks.checker.fast.tables
     return [array.copy() for table in (tables[3], tables[4], tables[7]) for array in table.arrays.values()]
 
 

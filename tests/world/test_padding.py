@@ -102,7 +102,7 @@ def test_moved_obstacles_keep_it_too(judged):
 
 def test_the_kernels_agree_with_numpy_and_say_how_much_room_there_is(judged):
     world, Q, room = judged
-    fast, values = world.checks.exact.fast, world.robot.joint_values(Q[:60])
+    fast, values = world.checks.checker.fast, world.robot.joint_values(Q[:60])
     spheres, answers = fast._reference.classify(values, resolve=True), fast.classify(values)
     assert (answers[spheres != 1] == spheres[spheres != 1]).all(), "solids decide what spheres leave open, no more"
     found = fast.clearance(values, upper=True)

@@ -104,10 +104,10 @@ def test_distances_in_kernels_take_the_margin_off(name):
     bare, Q, gaps = free_of_contact(name, 60)
     world = World(bare.robot, Scene((), bare.scene.attached), self_margin=0.02)
     values = bare.robot.joint_values(Q)
-    found = world.checks.exact.fast.clearance(values, upper=True)
+    found = world.checks.checker.fast.clearance(values, upper=True)
     assert (found.lower <= gaps - 0.02 + NEARLY).all()
     assert (found.upper >= gaps - 0.02 - NEARLY).all()
-    without = World(bare.robot, Scene((), bare.scene.attached)).checks.exact.fast.clearance(values, upper=True)
+    without = World(bare.robot, Scene((), bare.scene.attached)).checks.checker.fast.clearance(values, upper=True)
     assert (found.lower <= without.lower - 0.02 + 1e-6).all()
     if name == "planar6":  # all of it moves; what stands still has no ball to grow
         assert found.lower == pytest.approx(without.lower - 0.02, abs=1e-6)
@@ -115,7 +115,7 @@ def test_distances_in_kernels_take_the_margin_off(name):
 
 def test_the_kernels_agree_with_numpy():
     bare, Q, _ = free_of_contact("panda", 60)
-    fast = World(bare.robot, bare.scene, self_margin=0.03).checks.exact.fast
+    fast = World(bare.robot, bare.scene, self_margin=0.03).checks.checker.fast
     values = bare.robot.joint_values(Q)
     spheres = fast._reference.classify(values, resolve=True)
     answers = fast.classify(values)

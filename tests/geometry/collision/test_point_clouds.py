@@ -60,14 +60,14 @@ def test_a_cloud_is_free_where_its_balls_are(name, count, margin):
     free = spheres.valid_batch(Q)
     assert (cloud.valid_batch(Q) == free).all()
     assert (cloud.certify(Q[:60]) == free[:60]).all()
-    assert cloud.checks.exact.fast.intact()
+    assert cloud.checks.checker.fast.intact()
 
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("name", ARMS)
 def test_kernels_agree_with_the_reference_and_leave_next_to_nothing_open(name):
     cloud, _ = worlds(name, 5, 2000)
-    fast, Q = cloud.checks.exact.fast, sample(cloud.robot, 2, 400)
+    fast, Q = cloud.checks.checker.fast, sample(cloud.robot, 2, 400)
     V = cloud.robot.joint_values(Q)
     slow = fast._reference.classify(V, resolve=False)
     assert (fast.classify(V, resolve=False) == slow).mean() > 0.995  # rounding
