@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from rrtik_ompl.description.joint_weights import weighted as weighted
     from rrtik_ompl.description.padding import padded as padded
     from rrtik_ompl.description.scaling import scaled as scaled
-    from rrtik_ompl.files.cloud import load_cloud as load_cloud
-    from rrtik_ompl.files.cloud import save_cloud as save_cloud
-    from rrtik_ompl.files.heights import load_height_field as load_height_field
-    from rrtik_ompl.files.mesh import load_mesh as load_mesh
-    from rrtik_ompl.files.octree import load_octree as load_octree
+    from rrtik_ompl.description.shapes.cloud import load_cloud as load_cloud
+    from rrtik_ompl.description.shapes.cloud import save_cloud as save_cloud
+    from rrtik_ompl.description.shapes.heights import load_height_field as load_height_field
+    from rrtik_ompl.description.shapes.mesh import load_mesh as load_mesh
+    from rrtik_ompl.description.shapes.octree import load_octree as load_octree
     from rrtik_ompl.ik.batch import IkBatch as IkBatch
     from rrtik_ompl.ik.batch import solve_ik_batch as solve_ik_batch
     from rrtik_ompl.ik.reach.grid_map import ReachMap as ReachMap
@@ -159,10 +159,10 @@ else:
         "ompl_bridge.goal_sampler": ("GoalSampler",),
         "ompl_bridge.benchmark_notes": ("BenchmarkNotes",),
         "ompl_bridge.simple_setup": ("simple_setup", "space_information"),
-        "files.cloud": ("load_cloud", "save_cloud"),
-        "files.heights": ("load_height_field",),
-        "files.mesh": ("load_mesh",),
-        "files.octree": ("load_octree",),
+        "description.shapes.cloud": ("load_cloud", "save_cloud"),
+        "description.shapes.heights": ("load_height_field",),
+        "description.shapes.mesh": ("load_mesh",),
+        "description.shapes.octree": ("load_octree",),
         "planning.moves.staircase": ("one_joint_moves",),
         "world.path": ("JointPath", "load_path"),
         "planning.plan": ("Plan", "list_planners", "plan"),

@@ -14,8 +14,8 @@ import pinocchio as pin
 from rrtik_ompl.base.arrays import bounded_array
 from rrtik_ompl.base.copies import Once
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.shapes.mesh import MAX_BYTES, finite_numbers, stated_unit
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Tree
-from rrtik_ompl.files.mesh import MAX_BYTES, finite_numbers, stated_unit
 from rrtik_ompl.files.text import read_bytes
 from rrtik_ompl.geometry.collision.shape_table import pieces
 

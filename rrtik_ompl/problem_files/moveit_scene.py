@@ -14,7 +14,7 @@ import pinocchio as pin
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError, SceneWarning, UnknownNameError, few
 from rrtik_ompl.description.faults import nearest_name
-from rrtik_ompl.files.octree import cells_of_tree
+from rrtik_ompl.description.shapes.octree import cells_of_tree
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene

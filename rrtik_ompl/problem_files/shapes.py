@@ -12,10 +12,10 @@ from pydantic import Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.files.cloud import load_cloud
-from rrtik_ompl.files.heights import load_height_field
-from rrtik_ompl.files.mesh import load_mesh
-from rrtik_ompl.files.octree import load_octree
+from rrtik_ompl.description.shapes.cloud import load_cloud
+from rrtik_ompl.description.shapes.heights import load_height_field
+from rrtik_ompl.description.shapes.mesh import load_mesh
+from rrtik_ompl.description.shapes.octree import load_octree
 from rrtik_ompl.files.sections import (
     Length,
     Name,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import positive
 from rrtik_ompl.base.errors import InputError, require
-from rrtik_ompl.files.octree import octree_points, octree_resolution
+from rrtik_ompl.description.shapes.octree import octree_points, octree_resolution
 from rrtik_ompl.files.pcd import pcd_points
 from rrtik_ompl.files.ply import ply_points
 from rrtik_ompl.files.point_records import AXES, npy_rows, text_rows

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.base.errors import InputError, MeshWarning
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.description.shapes import mesh as mesh_files
+from rrtik_ompl.description.shapes.mesh import load_mesh
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.files import mesh as mesh_files
 from rrtik_ompl.files import notice
-from rrtik_ompl.files.mesh import load_mesh
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Mesh
 from rrtik_ompl.world.world import World
