@@ -45,11 +45,15 @@ if TYPE_CHECKING:
     from rrtik_ompl.ik.solve import solve_ik as solve_ik
     from rrtik_ompl.ik.trajectory import IkTrajectory as IkTrajectory
     from rrtik_ompl.ik.trajectory import solve_ik_trajectory as solve_ik_trajectory
+    from rrtik_ompl.model.certificate import Certificate as Certificate
+    from rrtik_ompl.model.certificate import load_certificate as load_certificate
     from rrtik_ompl.model.goal import GoalSet as GoalSet
     from rrtik_ompl.model.goal import JointGoal as JointGoal
     from rrtik_ompl.model.goal import MultiGoal as MultiGoal
     from rrtik_ompl.model.goal import PoseGoal as PoseGoal
     from rrtik_ompl.model.goal import PositionGoal as PositionGoal
+    from rrtik_ompl.model.path import JointPath as JointPath
+    from rrtik_ompl.model.path import load_path as load_path
     from rrtik_ompl.model.robot import Robot as Robot
     from rrtik_ompl.model.scene import AttachedObject as AttachedObject
     from rrtik_ompl.model.scene import ConstantVelocity as ConstantVelocity
@@ -126,12 +130,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks.timed import time_task as time_task
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.viewer.plots.joints import plot_joints as plot_joints
-    from rrtik_ompl.world.certificates.certificate import Certificate as Certificate
-    from rrtik_ompl.world.certificates.certificate import load_certificate as load_certificate
     from rrtik_ompl.world.certificates.checked import verify_certificate as verify_certificate
     from rrtik_ompl.world.certificates.write import certificate_of as certificate_of
-    from rrtik_ompl.world.path import JointPath as JointPath
-    from rrtik_ompl.world.path import load_path as load_path
     from rrtik_ompl.world.problem import Problem as Problem
     from rrtik_ompl.world.robot_points import without_robot as without_robot
     from rrtik_ompl.world.world import World as World
@@ -139,7 +139,7 @@ else:
     _HOMES = {
         "description.catalog": ("list_problems", "list_robots", "load_robot"),
         "benchmark.batch": ("plan_batch",),
-        "world.certificates.certificate": ("Certificate", "load_certificate"),
+        "model.certificate": ("Certificate", "load_certificate"),
         "world.certificates.checked": ("verify_certificate",),
         "world.certificates.write": ("certificate_of",),
         "description.joint_ranges": ("narrowed",),
@@ -164,7 +164,7 @@ else:
         "description.shapes.mesh": ("load_mesh",),
         "description.shapes.octree": ("load_octree",),
         "planning.moves.staircase": ("one_joint_moves",),
-        "world.path": ("JointPath", "load_path"),
+        "model.path": ("JointPath", "load_path"),
         "planning.plan": ("Plan", "list_planners", "plan"),
         "planning.many": ("plan_many",),
         "viewer.plots.joints": ("plot_joints",),

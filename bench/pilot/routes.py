@@ -12,6 +12,7 @@ import rrtik_ompl as rrtik
 from bench.pilot.hands import follow_route
 from bench.pilot.scene import NAME, PROBLEM, ROBOT, WORLD, green_grasps
 from bench.shared.problems import goal_joints
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.devices.wrong_arm import Faults, WrongArm
 from rrtik_ompl.pilot.routes.clearance import executions, free_rows
@@ -20,7 +21,6 @@ from rrtik_ompl.pilot.routes.route import Route, route_to
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
-from rrtik_ompl.world.path import JointPath
 
 REACTION_SECONDS, OVERSHOOT, REPLANNING = 0.3, np.deg2rad(1.0), 2.0
 

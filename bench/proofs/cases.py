@@ -10,12 +10,12 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
+from rrtik_ompl.model.certificate import Certificate
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
-from rrtik_ompl.world.certificates.certificate import Certificate
 from rrtik_ompl.world.certificates.write import certificate_of
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 WAYPOINTS = 7

@@ -15,7 +15,7 @@ import numpy as np
 from bench.proofs.cases import Case, random_cases
 from bench.proofs.tampering import TAMPERINGS
 from rrtik_ompl import load_robot
-from rrtik_ompl.world.certificates.certificate import from_document
+from rrtik_ompl.model.certificate import from_document
 from rrtik_ompl.world.certificates.verify import verify_certificate
 
 ROBOTS = ("planar3", "titan4", "panda", "ur5_gripper", "puma560", "point2d")

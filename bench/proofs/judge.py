@@ -8,7 +8,7 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.geometry.collision.certificate import Certificate
-from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.world.world import World
 
 FINER = 50.0  # than the world's motion resolution

@@ -22,6 +22,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.choices import ShorteningMethod
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Cylinder
@@ -29,7 +30,6 @@ from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
 from rrtik_ompl.planning.generated_problems import generated_problem
 from rrtik_ompl.planning.shortening import METHODS, Task
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.world import World
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from bench.moves.fewest_moves_oracle import ROOM, drawn_arm, world_of
 from bench.proofs.measurements import by_every_method
 from rrtik_bench.shortening.plane_arms import PlaneArm
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.planning.shortening import METHODS
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 
 Motion: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64]]

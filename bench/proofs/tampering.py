@@ -13,11 +13,12 @@ import pinocchio as pin
 from bench.proofs.cases import Case, inner_point
 from rrtik_ompl import load_robot
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.collision.contacts import Contact, measured
+from rrtik_ompl.geometry.collision.contacts import measured
 from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest
+from rrtik_ompl.model.certificate import Certificate, MotionEntries
+from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene
-from rrtik_ompl.world.certificates.certificate import Certificate, MotionEntries
 from rrtik_ompl.world.world import World
 
 TOUCH = 1e-6  # [rad] or [m] by which a waypoint is moved

@@ -16,6 +16,7 @@ from rrtik_ompl.benchmark.records import NAME, key_of, read_head, read_records
 from rrtik_ompl.cli.app import FOUND, NOT_FOUND, run
 from rrtik_ompl.cli.terminal import stoppable
 from rrtik_ompl.ik.reach.grid_map import load_reach_map
+from rrtik_ompl.model.certificate import load_certificate
 from rrtik_ompl.pilot.overlay.film import write_film
 from rrtik_ompl.pilot.records.record import read_record
 from rrtik_ompl.pilot.run import Loop
@@ -23,7 +24,6 @@ from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.replanning import load_run
 from rrtik_ompl.tasks.plan_file import load_task_plan
-from rrtik_ompl.world.certificates.certificate import load_certificate
 
 SUITE = "version: 1\nproblems: [planar3_a]\nplanners: [bicrdt, fastrrtconnect]\nruns: 3\nseconds: 0.5\n"
 RUNS = 6

@@ -14,7 +14,7 @@ from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.model.goal import PoseGoal, PositionGoal
-from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import verification_resolution
 from rrtik_ompl.world.world import World

@@ -10,9 +10,9 @@ import numpy as np
 
 from rrtik_ompl import RateLimits, load_robot, plan, solve_ik_trajectory
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 ARMS = ("panda", "ur5")

@@ -14,6 +14,7 @@ from rrtik_bench.report.page import Report
 from rrtik_ompl import RateLimits, load_robot, time_parameterize
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Sphere
@@ -24,7 +25,6 @@ from rrtik_ompl.motion.trajectory.curve import Curve
 from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest
 from rrtik_ompl.motion.trajectory.line import along_lines
 from rrtik_ompl.motion.trajectory.runs import along_curve
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 _PANDA = load_robot("panda")

@@ -8,8 +8,8 @@ import numpy as np
 
 from bench.trajectories.cases import Case, lines, planned, single_joint_moves
 from rrtik_ompl import RateLimits, motion_report, time_parameterize
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import Trajectory
-from rrtik_ompl.world.path import JointPath
 
 BLEND = 0.2  # [rad] of the large table
 BLENDS = (0.05, 0.1, 0.2, 0.4)  # of the proofs

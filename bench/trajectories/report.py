@@ -21,10 +21,10 @@ from bench.trajectories.motions import BLEND, OF_A_PART, Paths, measured_lines, 
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
 from rrtik_ompl import RateLimits
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.motion.trajectory.blending import blended
 from rrtik_ompl.motion.trajectory.corners import vertices
-from rrtik_ompl.world.path import JointPath
 
 ROUNDS = 25  # of a measurement of time; the least counts
 

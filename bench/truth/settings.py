@@ -25,9 +25,9 @@ from rrtik_bench.report.page import Report
 from rrtik_ompl import AttachedObject, ConstantVelocity, Obstacle, Problem, Robot, Scene, World
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Attach, Detach
-from rrtik_ompl.world.settings import WorldSettings
 
 START, GOAL = np.zeros(3), np.array([0.3, 0.1, 0.0])
 LINK = "link2"

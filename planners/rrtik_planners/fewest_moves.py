@@ -11,6 +11,7 @@ from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, not_negative, whole_number
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, transitions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
@@ -23,7 +24,6 @@ from rrtik_ompl.planning.moves.search import MOST_NODES, MoveSearch, Proof
 from rrtik_ompl.planning.moves.staircase import one_joint_moves
 from rrtik_ompl.planning.shortening import Task
 from rrtik_ompl.planning.shortening.random_cut import shortcut
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect

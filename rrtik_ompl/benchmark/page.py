@@ -14,7 +14,7 @@ from rrtik_ompl.benchmark.sources import build, from_plain
 from rrtik_ompl.benchmark.statistics import Result
 from rrtik_ompl.benchmark.tables import OVERVIEW, conditions, failures, overview, remark
 from rrtik_ompl.files.text import make_folder
-from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.model.path import JointPath
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1d2733; max-width: 82rem; margin: 2rem auto; padding: 0 1rem }

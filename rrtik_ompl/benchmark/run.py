@@ -12,11 +12,12 @@ from rrtik_ompl.base.choices import ShorteningMethod, SuiteShortening
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.benchmark.sources import build, from_plain
 from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening import shorten
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.world import FINEST_RESOLUTION, World
+from rrtik_ompl.world.world import World
 
 SOLVED, NOT_FOUND, INVALID, ERROR = "solved", "not found", "invalid", "error"
 OUT_OF_MEMORY, CRASH, HANG = "out of memory", "crash", "hang"

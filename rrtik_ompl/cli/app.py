@@ -30,8 +30,8 @@ from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
-    from rrtik_ompl.world.certificates.certificate import Certificate
-    from rrtik_ompl.world.path import JointPath
+    from rrtik_ompl.model.certificate import Certificate
+    from rrtik_ompl.model.path import JointPath
     from rrtik_ompl.world.problem import Problem
 
 COMPLETING = "_RRTIK_COMPLETE"  # by which a shell asks for completions
@@ -94,9 +94,9 @@ def check(
     from rrtik_ompl import load_path, load_problem
     from rrtik_ompl.cli.plan_report import faults_of_motion, faults_of_path, how_proven, path_lines
     from rrtik_ompl.cli.run_report import is_record, judged
+    from rrtik_ompl.model.certificate import load_certificate
     from rrtik_ompl.motion.trajectory import Trajectory
     from rrtik_ompl.motion.trajectory.load import load_motion_or_path
-    from rrtik_ompl.world.certificates.certificate import load_certificate
 
     question = load_problem(problem)
     world = question.world
@@ -143,7 +143,7 @@ def _said(file: Path, lines: Sequence[str], holds: bool) -> int:
 
 def _beside(problem: Problem, route: JointPath, path: Path) -> int:
     """Say whether the certificate holds that a path's file has, if it has one."""
-    from rrtik_ompl.world.certificates.certificate import certificate_beside
+    from rrtik_ompl.model.certificate import certificate_beside
 
     found = certificate_beside(path)
     return FOUND if found is None else _certified(problem, route, found, f"{path}")

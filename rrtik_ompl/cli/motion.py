@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from rrtik_ompl.base.arrays import Vector
-    from rrtik_ompl.world.path import JointPath
+    from rrtik_ompl.model.path import JointPath
     from rrtik_ompl.world.problem import Problem
 
 PLOT_FORMATS = (".png", ".svg")

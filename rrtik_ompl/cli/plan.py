@@ -17,7 +17,7 @@ from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
-    from rrtik_ompl.world.path import JointPath
+    from rrtik_ompl.model.path import JointPath
     from rrtik_ompl.world.problem import Problem
 
 RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules

@@ -10,19 +10,19 @@ import numpy as np
 from rrtik_ompl.base.units import reading, shown_unit
 from rrtik_ompl.cli.terminal import Table
 from rrtik_ompl.model.goal import GoalSet, JointGoal, PositionGoal
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import lower_bound
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.planning.moves.text import COLUMNS, moves_document
 from rrtik_ompl.planning.plan import Plan
 from rrtik_ompl.world.clearance_curve import clearance_along
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import as_it_stands, how_checked
 
 if TYPE_CHECKING:
+    from rrtik_ompl.model.certificate import Certificate
     from rrtik_ompl.model.robot import Robot
     from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
-    from rrtik_ompl.world.certificates.certificate import Certificate
 
 SLACK = 1e-6  # share of a joint's fastest rate that rounding may add
 
@@ -189,7 +189,7 @@ def write_certificate(problem: Problem, path: JointPath, file: Path, *, beside: 
     Raises:
         InputError: If the file cannot be written, or the scene has a cloud.
     """
-    from rrtik_ompl.world.certificates.write import certificate_by
+    from rrtik_ompl.model.proof import certificate_by
 
     proved = path if path.proven_in(problem.world) else path.proved(problem.world)
     if proved.proof is not None and proved.proof.unproven:

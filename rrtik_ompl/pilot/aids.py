@@ -13,7 +13,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.geometry.collision.contacts import Contact, measured
+from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import gripper_links
 from rrtik_ompl.sensing.cameras.camera import Camera

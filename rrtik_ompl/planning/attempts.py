@@ -12,10 +12,10 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.choices import ProofMode
 from rrtik_ompl.ik.goal_configurations import MAX_ROUNDS, GoalSearch
 from rrtik_ompl.model.goal import JointGoal, TipGoal, has_continuous
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, EFFORT_MOTIONS, Attempt, attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.planning.second_check import SecondCheck
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem, densely_checked
 
 SHORTEST = 1e-3  # [s] that an attempt gets at least

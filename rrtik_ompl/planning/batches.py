@@ -17,6 +17,8 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, ITERATION_LIMIT, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, reseed, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
@@ -26,9 +28,7 @@ from rrtik_ompl.ompl_bridge.setup import shared_space
 from rrtik_ompl.planning.one_planner import load_kernels_for
 from rrtik_ompl.planning.outcome import Plan
 from rrtik_ompl.world.kept_clearance import Room, rooms_between
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem, known_problem
-from rrtik_ompl.world.proof import Proof
 from rrtik_ompl.world.world import World
 
 
@@ -184,5 +184,5 @@ def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Room | None]]) -> d
         ends = np.cumsum([len(rows) - 1 for rows in own.values()])
         for (k, rows), each in zip(own.items(), np.split(proven, ends[:-1]), strict=True):
             if each.all():
-                made[k] = Proof(len(rows) - 1, kept, (), world.prover.margin, _prover=world.prover)
+                made[k] = Proof(len(rows) - 1, kept, (), world.prover.margin, maker=world.prover)
     return made

@@ -17,12 +17,12 @@ import numpy as np
 
 from rrtik_ompl.base.choices import ImproveStrategy, PathObjective
 from rrtik_ompl.base.errors import PlannerError
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.planning.path_costs import COSTS, least_cost
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.planning.shortening.restarts import BOUND, BOUNDED_SAMPLES, GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
 from rrtik_ompl.world.kept_clearance import possible_clearance
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 
 LEAST_SECONDS = 1e-3  # for which another round is begun

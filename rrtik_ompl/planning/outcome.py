@@ -8,7 +8,7 @@ from typing import Any
 
 from rrtik_ompl.base.choices import ProofMode
 from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
-from rrtik_ompl.world.path import JointPath
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import as_it_stands
 

@@ -13,11 +13,11 @@ from rrtik_ompl.base.choices import PathObjective
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge.weighted import has_weights
 from rrtik_ompl.world.clearance_curve import distances_at, places_along
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 
 NEAREST = 1e-3  # [m] clearances below this cost no more

@@ -7,13 +7,14 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.choices import ProofMode
 from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.ompl_bridge.attempt import Attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
 from rrtik_ompl.planning.moves.clearance_levels import roomiest
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import Room, keeping, leaving_room, room_between
-from rrtik_ompl.world.path import JointPath, path_through, proved, proved_as_clear, violations_of
+from rrtik_ompl.world.kept_clearance import Room, keeping, leaving_room, proved, proved_as_clear, room_between
 from rrtik_ompl.world.problem import Problem, densely_checked
+from rrtik_ompl.world.route_check import violations_of
 
 TOUCHING = 1e-6  # [m]; bodies that are nearer to their margin than this count as touching
 

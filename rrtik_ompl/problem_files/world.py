@@ -12,7 +12,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.sections import NotNegative, Positive, Section
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.world.settings import FINEST_RESOLUTION, MOTION_RESOLUTION, WorldSettings
+from rrtik_ompl.model.world_settings import FINEST_RESOLUTION, MOTION_RESOLUTION, WorldSettings
 from rrtik_ompl.world.world import World
 
 ELSEWHERE = ("robot", "scene", "constraints")  # settings that have sections of their own

@@ -29,7 +29,7 @@ from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.world.problem import Problem
 
 if TYPE_CHECKING:
-    from rrtik_ompl.world.played import Judged
+    from rrtik_ompl.model.judgement import Judged
 
 KIND = "replan_run"
 MOST_POINTS = 2_000_000  # of all clouds that a record keeps

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.geometry.collision.contacts import Contact
+from rrtik_ompl.model.judgement import Contact, Judged, PathContact, Verdict
 from rrtik_ompl.replanning.judge import RunViolation
-from rrtik_ompl.world.path_contacts import PathContact
-from rrtik_ompl.world.played import Judged, Verdict
 from rrtik_ompl.world.problem import Problem
 
 if TYPE_CHECKING:

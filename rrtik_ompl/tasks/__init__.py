@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import positive, whole_number
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import require
+from rrtik_ompl.model.judgement import Violation
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.tasks.branches import Branch
 from rrtik_ompl.tasks.contact_life import MotionContact as MotionContact
 from rrtik_ompl.tasks.contact_life import world_from
@@ -29,9 +31,7 @@ from rrtik_ompl.tasks.stages import MoveTo as MoveTo
 from rrtik_ompl.tasks.stages import Stage, checked_stages
 from rrtik_ompl.tasks.stages import Straight as Straight
 from rrtik_ompl.tasks.standing import standing_faults
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import usable_configuration
-from rrtik_ompl.world.route_check import Violation
 from rrtik_ompl.world.world import World
 
 if TYPE_CHECKING:

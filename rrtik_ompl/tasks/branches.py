@@ -13,6 +13,7 @@ from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.model.goal import JointGoal
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.planning.tip_motion import DEVIATION, TURN_DEVIATION
@@ -27,7 +28,6 @@ from rrtik_ompl.tasks.handling import arriving_at, handled, left_where, may_touc
 from rrtik_ompl.tasks.program import Step, options_of
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Alternatives, Gripper, MoveTo, Straight
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

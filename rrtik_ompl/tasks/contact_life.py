@@ -23,10 +23,10 @@ from rrtik_ompl.geometry.collision.contacts import measured
 from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, usually_apart
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.solids import is_mesh
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
 from rrtik_ompl.world.exact_checks import distance
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.world import World
 

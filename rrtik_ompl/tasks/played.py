@@ -12,11 +12,11 @@ from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import held_regions
+from rrtik_ompl.model.judgement import Judged, PathContact, Verdict
 from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.timed import time_task
-from rrtik_ompl.world.path_contacts import PathContact, contacts_at
-from rrtik_ompl.world.played import Judged, Verdict
+from rrtik_ompl.world.path_contacts import contacts_at
 from rrtik_ompl.world.route_check import as_it_stands
 from rrtik_ompl.world.world import World
 

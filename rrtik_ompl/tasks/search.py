@@ -15,14 +15,14 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Vector
 from rrtik_ompl.base.errors import ProblemError
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.planning.plan import plan_counted
 from rrtik_ompl.tasks.branches import Branch, Expander, again
 from rrtik_ompl.tasks.contact_life import MotionContact, lived
 from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.stages import MoveTo
-from rrtik_ompl.world.kept_clearance import CLEARANCE
-from rrtik_ompl.world.path import JointPath, proved_as_clear
+from rrtik_ompl.world.kept_clearance import CLEARANCE, proved_as_clear
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

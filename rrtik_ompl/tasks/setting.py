@@ -12,11 +12,11 @@ import numpy as np
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import robot_from_entry
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
 from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, allowed, left_inside, touching_at, with_contacts
 from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, MoveTo, Stage
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

@@ -15,12 +15,12 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE
+from rrtik_ompl.model.judgement import Violation
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, Touching
 from rrtik_ompl.model.shapes.shape import same_shape
 from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, MotionContact, contacts_from, touching_at
-from rrtik_ompl.world.path import JointPath
-from rrtik_ompl.world.route_check import Violation
 from rrtik_ompl.world.world import World
 
 MOVED = 1e-6  # [m, rad] between two motions that is rounding

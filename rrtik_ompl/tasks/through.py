@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import dimensions
 from rrtik_ompl.base.errors import InputError, listed
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.tasks import SECONDS, MoveTo, Task
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

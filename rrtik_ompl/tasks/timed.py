@@ -10,12 +10,12 @@ import numpy as np
 from rrtik_ompl.base.arrays import Vector, frozen, not_negative
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.motion.trajectory.checks import proof_of_pieces
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.contact_life import MotionContact, world_from
 from rrtik_ompl.tasks.setting import world_of_motion
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 BLEND = 0.05  # [rad] or [m]

@@ -7,11 +7,11 @@ import sys
 from dataclasses import dataclass
 
 from rrtik_ompl.description.catalog import robot_called
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.planning.plan import Plan
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.subject import Showable
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

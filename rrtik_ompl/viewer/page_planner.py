@@ -23,6 +23,7 @@ from rrtik_ompl.kernels.tables.solid_tables import SLACK_PER_METRE as SOLID_SLAC
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.kernels.wasm.image import MemoryImage
 from rrtik_ompl.kernels.wasm.page_kernels import page_kernels
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.problem_files.problem import problem_data
@@ -31,7 +32,6 @@ from rrtik_ompl.viewer.page_fixed import packed, standing_parts
 from rrtik_ompl.viewer.page_tables import BASE, add_limb, layout_numbers, page_tables
 from rrtik_ompl.viewer.page_tips import dragged_tips, tip_entry
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.world import World
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.units import shown_unit
 from rrtik_ompl.model.goal import Goal, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.judgement import FARTHEST, ClearanceCurve, PathContact, Verdict
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.transitions import moved, route_length, transitions
@@ -24,9 +25,6 @@ from rrtik_ompl.viewer.drawing.viewpoint import overview
 from rrtik_ompl.viewer.page_tips import tip_entry
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
-from rrtik_ompl.world.clearance_curve import FARTHEST, ClearanceCurve
-from rrtik_ompl.world.path_contacts import PathContact
-from rrtik_ompl.world.played import Verdict
 
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path

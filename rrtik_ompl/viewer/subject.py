@@ -12,16 +12,14 @@ from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.model.goal import Goal, JointGoal, MultiGoal
+from rrtik_ompl.model.judgement import ClearanceCurve, PathContact, Verdict
+from rrtik_ompl.model.path import JointPath, fitted
 from rrtik_ompl.model.robot import Robot, require_joints
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.fingers import Fingers
-from rrtik_ompl.world.clearance_curve import ClearanceCurve
-from rrtik_ompl.world.path import JointPath, fitted
-from rrtik_ompl.world.path_contacts import PathContact
-from rrtik_ompl.world.played import Verdict
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

@@ -5,51 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
-from rrtik_ompl.world.proof import Gap
-from rrtik_ompl.world.world import Proof, World
+from rrtik_ompl.model.judgement import FARTHEST, ClearanceCurve
+from rrtik_ompl.model.proof import Gap, Proof
+
+if TYPE_CHECKING:
+    from rrtik_ompl.world.world import World
 
 PLACES = 240  # on a path, beside its waypoints
-NEAREST, FARTHEST = 1e-5, 2.0  # [m] of clearances that are told apart
-STEPS = 255  # between these two, in equal ratios: one is 5 % more than the one before
+NEAREST = 1e-5  # [m] of clearances that are told apart
+STEPS = 255  # between that and the farthest, in equal ratios: one is 5 % more than the one before
 LEVELS = frozen(np.append(0.0, np.geomspace(NEAREST, FARTHEST, STEPS)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ClearanceCurve:
-    """Distances from obstacles beyond their margins, at places along a path; proven, so the true ones are not smaller.
-
-    Attributes:
-        motions: Number of the motion that each place is on, shape (m,).
-        shares: Where on it, from 0 to 1, shape (m,).
-        distances: Shape (m,) [m]; ``FARTHEST`` if no obstacle is nearer, 0 if not even that is proven.
-        pairs: Names of the two nearest bodies at each place; ("", "") if none is near.
-        unproven: Numbers of the motions that are not proven free.
-    """
-
-    motions: NDArray[np.int64]
-    shares: Vector
-    distances: Vector
-    pairs: tuple[tuple[str, str], ...]
-    unproven: tuple[int, ...]
-
-    @property
-    def least(self) -> int:
-        """Number of the place where the arm is nearest to an obstacle."""
-        return int(self.distances.argmin())
-
-    def __str__(self) -> str:
-        k = self.least
-        if self.distances[k] >= FARTHEST:
-            return f"no obstacle within {FARTHEST:g} m"
-        where = f"motion {self.motions[k] + 1} at {100.0 * self.shares[k]:.0f} % of it"
-        return (
-            f"least clearance {1e3 * self.distances[k]:.3g} mm, {where}: '{self.pairs[k][0]}' and '{self.pairs[k][1]}'"
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.transitions import length_of
-from rrtik_ompl.world.world import Proof, World
+from rrtik_ompl.world.world import World
 
 SIZES = (0.01, 0.03, 0.1, 0.3)  # of a detour, shares of the stretch's length
 POINTS = 12  # of each size

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, not_negative
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.world.world import FINEST_RESOLUTION, World, form_of
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
+from rrtik_ompl.world.world import World, form_of
 
 CLEARANCE = 1e-3  # [m] that is kept where nobody says
 SPARE = 1e-3  # [m] that searches keep on top, but not more than twice: they look at points of a motion alone
@@ -142,6 +144,23 @@ def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> 
     for kept in sorted({room.kept, world.settings.kept}, reverse=True) if room is not None else ():
         if world.prover.route(rows, clearance=kept).proven:
             yield kept
+
+
+def proved(path: JointPath, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
+    """As :meth:`rrtik_ompl.JointPath.proved`, of a path of the world's robot."""
+    kept = world.settings.kept if clearance is None else clearance
+    return path.with_proof(world.prover.route(path.waypoints, clearance=kept, seconds=seconds))
+
+
+def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:
+    """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
+    found = proved(path, world, clearance=clearance)
+    least = world.settings.kept
+    for kept in sorted({max(min(clearance, CLEARANCE), least), least} - {clearance}, reverse=True):
+        if found.proven:
+            break
+        found = proved(path, world, clearance=kept)
+    return found
 
 
 def _most(world: World, q: Matrix, refused: float) -> float:

@@ -7,8 +7,8 @@ from typing import Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.world.clearance_curve import clearance_along
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import how_checked
 from rrtik_ompl.world.world import World

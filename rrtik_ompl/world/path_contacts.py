@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.collision.contacts import Contact
+from rrtik_ompl.model.judgement import PathContact
 from rrtik_ompl.world.clearance_curve import places_along
-from rrtik_ompl.world.world import World
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PathContact:
-    """A stretch of a path in which the same bodies touch, or are nearer than their margins allow.
-
-    Attributes:
-        begin, end: Where it begins and ends: number of the motion plus the share of it.
-        deepest: The worst contact of it.
-        names: Of all bodies that touch.
-    """
-
-    begin: float
-    end: float
-    deepest: Contact
-    names: frozenset[str]
+if TYPE_CHECKING:
+    from rrtik_ompl.world.world import World
 
 
 def contacts_along(world: World, waypoints: Matrix) -> tuple[PathContact, ...]:

@@ -6,78 +6,29 @@ All of it is said of the motion itself, a path or a timed one, however many pict
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.world.clearance_curve import ClearanceCurve, Course, clearance_on, course_along
-from rrtik_ompl.world.path_contacts import PathContact, contacts_at
+from rrtik_ompl.model.judgement import Judged, Verdict
+from rrtik_ompl.world.clearance_curve import Course, clearance_on, course_along
+from rrtik_ompl.world.path_contacts import contacts_at
 from rrtik_ompl.world.route_check import as_it_stands, route_violations, verification_resolution
-from rrtik_ompl.world.world import World
+
+if TYPE_CHECKING:
+    from rrtik_ompl.world.world import World
 
 BISECTIONS = 12  # of a place at which a contact begins or ends
 
 Fault: TypeAlias = tuple[int, float, str]  # the piece, where on it, and what is wrong there
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """Whether a motion is proven free.
-
-    Attributes:
-        proven: All of it.
-        text: The same for a person, in one line; with ``doubt`` what follows it.
-        unproven: Numbers of the moves that are drawn on which it is not.
-        doubt: How much is not proven, for a person, where that is told by the moves that are drawn; or "".
-    """
-
-    proven: bool
-    text: str
-    unproven: tuple[int, ...] = ()
-    doubt: str = ""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Judged:
-    """A verdict with its pictures.
-
-    Attributes:
-        verdict: The verdict.
-        curve: How far the motion stays from obstacles; None if none is near, or nothing is known of them.
-        contacts: Where bodies touch.
-    """
-
-    verdict: Verdict
-    curve: ClearanceCurve | None
-    contacts: tuple[PathContact, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Played:
-    """A motion as a picture plays it: all that a viewer is given of it.
-
-    Attributes:
-        waypoints: The configurations that are drawn, shape (k, dof).
-        times: When each is reached [s], shape (k,); None for a path, which has no times.
-        judged: What is said of it, by the moves between these configurations; None where there is no world for it.
-    """
-
-    waypoints: Matrix
-    times: Vector | None
-    judged: Judged | None
-
-
-def played_path(rows: Matrix, world: World | None) -> Played:
-    """A path, waypoints of shape (k, dof), as it is played in a world; see :meth:`rrtik_ompl.JointPath.played`."""
-    return Played(rows, None, None if world is None else _judged_path(rows, world))
-
-
-def _judged_path(rows: Matrix, world: World) -> Judged:
-    """The verdict on a path; if it is a single waypoint, on the posture."""
+def judged_path(rows: Matrix, world: World) -> Judged:
+    """The verdict on a path, waypoints of shape (k, dof); if it is a single one, on the posture."""
     course = course_along(world, rows)
     found, faults = judged_course(world, course, partial(_faults_of_path, world, rows))
     unproven = found.verdict.unproven

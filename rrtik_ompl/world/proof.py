@@ -7,24 +7,29 @@ planners use, and nothing else: their forward kinematics are their own, in float
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
-from typing import Any, ClassVar, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, in_blocks
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, in_blocks
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.geometry.collision.digests import world_digest
+from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
+from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest, world_digest
 from rrtik_ompl.geometry.collision.solids import of_each
 from rrtik_ompl.kernels.proof.layout import WAYS, ProofTable
+from rrtik_ompl.kernels.proof.log import ProofLog
 from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
+from rrtik_ompl.model.certificate import Certificate, MotionEntries
+from rrtik_ompl.model.proof import Gap, Proof
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.arm_cache import MAX_ROBOTS, Pairs, strokes
 from rrtik_ompl.world.coal_proof import CoalProof, Told, distance_between
@@ -37,83 +42,7 @@ MOTIONS_AT_ONCE = 64  # in one call of the kernel, between two looks at the cloc
 FEW = 200  # configurations
 PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
 DOUBLE, INT = 8, 4  # bytes of a number
-NOWHERE = partial(float, "nan")
 Ends: TypeAlias = tuple[Matrix, Matrix]  # where motions begin, and where they end
-
-
-@dataclass(frozen=True, slots=True)
-class Gap:
-    """A place on a motion that is not proven free.
-
-    Attributes:
-        motion: Number of the motion.
-        share: Where on it, from 0 at its start to 1 at its end; nan if the whole motion was not looked at.
-        first, second: Names of the two bodies that are not proven apart. Without a second one, the first says what else
-            is wrong; both are "" if there was no time to look.
-    """
-
-    motion: int
-    share: float
-    first: str
-    second: str
-    _measure: Callable[[], float] = field(default=NOWHERE, repr=False, compare=False)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Gap, (self.motion, self.share, self.first, self.second, partial(float, self.distance))
-
-    @property
-    def pair(self) -> tuple[str, str]:
-        """Names of the two bodies."""
-        return self.first, self.second
-
-    @property
-    def distance(self) -> float:
-        """How far the two are apart at that place, as coal measures it [m]; nan where there is no place or pair."""
-        return self._measure()
-
-    def __str__(self) -> str:
-        if not self.second:
-            return f"motion {self.motion}: {self.first or 'not looked at'}"
-        text = f"motion {self.motion} at {self.share:.4f} of it: '{self.first}' and '{self.second}'"
-        distance = self.distance
-        return f"{text}, {1e3 * distance:.4g} mm apart" if distance >= 0.0 else text
-
-
-@dataclass(frozen=True, slots=True)
-class Proof:
-    """What is proven of the motions between waypoints.
-
-    Attributes:
-        motions: How many there are.
-        clearance: What each keeps from every obstacle beside its margin [m].
-        unproven: The places that are not proven, at most one of each motion.
-        margin: The least margin of the obstacles [m]; every obstacle's own is kept.
-    """
-
-    motions: int
-    clearance: float
-    unproven: tuple[Gap, ...]
-    margin: float = 0.0
-    _digest: str = field(default="", repr=False, compare=False)
-    _prover: Prover | None = field(default=None, repr=False, compare=False)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Proof, (self.motions, self.clearance, self.unproven, self.margin, self.digest)
-
-    @property
-    def digest(self) -> str:
-        """Of the robot's and the scene's geometry that the motions are proven for: 32 digits in hexadecimal."""
-        return self._digest if self._prover is None else self._prover.digest
-
-    @property
-    def prover(self) -> Prover | None:
-        """What made it; None in another process."""
-        return self._prover
-
-    @property
-    def proven(self) -> bool:
-        """Whether every motion is proven free."""
-        return not self.unproven
 
 
 @dataclass(eq=False)
@@ -162,7 +91,7 @@ class Prover:
 
     @property
     def digest(self) -> str:
-        """See :attr:`Proof.digest`."""
+        """Of the geometry that its proofs are about, see :attr:`rrtik_ompl.model.proof.Proof.digest`."""
         return world_digest(self.robot, tuple(self.bodies), self.pairs)
 
     @cached_property
@@ -192,7 +121,7 @@ class Prover:
         places = [replace(gap, _measure=partial(self._distance, rows, gap)) for gap in gaps]
         if self.constraints is not None:
             places = self._with_breaches(self.constraints, rows, places)
-        return Proof(count, clearance, tuple(places), self.margin, _prover=self)
+        return Proof(count, clearance, tuple(places), self.margin, maker=self)
 
     def _with_breaches(self, constraints: HeldRegions, rows: Matrix, gaps: list[Gap]) -> list[Gap]:
         """The gaps of a route, and a gap for each other motion of it that is not held."""
@@ -200,6 +129,26 @@ class Prover:
         left = np.flatnonzero(~constraints.route_held(rows)).tolist()
         breaches = [Gap(k, float("nan"), constraints.why(rows[k], rows[k + 1]), "") for k in left if k not in known]
         return sorted(gaps + breaches, key=lambda gap: gap.motion)
+
+    def certificate(self, rows: Matrix, clearance: float) -> Certificate | None:
+        """The certificate of a path, waypoints of shape (k, dof), for a clearance [m].
+
+        Returns:
+            None if not every motion is proven.
+
+        Raises:
+            InputError: If the scene has a cloud.
+        """
+        if clouds := [body.name for body in self.bodies if isinstance(body.geometry, CloudSolid)]:
+            raise InputError(
+                f"a certificate names planes of solids, and '{clouds[0]}' is a cloud; plan.proven says as much"
+            )
+        told = self.logged(np.vstack([rows, rows]) if len(rows) == 1 else rows, clearance=clearance)
+        if told is None:
+            return None
+        digests = robot_digest(self.robot), scene_digest(tuple(self.bodies), self.pairs)
+        motions = tuple(_entries(*each) for each in told)
+        return Certificate(self.robot.name, *digests, clearance, self.self_margin, frozen(rows), motions)
 
     def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[Told] | None:
         """By what each motion between waypoints, shape (k, dof), is proven; None if one of them is not."""
@@ -246,7 +195,7 @@ class Prover:
 
     def made(self, proof: Proof) -> bool:
         """Whether a proof is one of these bodies, by this object or its like for another thread."""
-        return proof.prover is not None and proof.prover.kin is self.kin
+        return isinstance(proof.maker, Prover) and proof.maker.kin is self.kin
 
     def still_proven(self, rows: Matrix, *, clearance: float) -> Mask:
         """Which configurations, shape (m, dof), are proven free, with a clearance [m]. Shape (m,).
@@ -348,3 +297,16 @@ def _joints(robot: Robot) -> tuple[Matrix, Vector, bool]:
     ends = np.stack([robot.lower, robot.upper])
     bounded = bool(np.isfinite(ends).all() and np.abs(robot.chain.joint_values(ends)).max() < 0.5 * LARGEST_VALUE)
     return gain, robot.chain.offset, bounded
+
+
+def _entries(told: ProofLog, measured: NDArray[np.int64]) -> MotionEntries:
+    """What a verifier does not find by itself; a motion that stands still is one interval of level 0."""
+    intervals = told.intervals.copy()
+    if len(intervals) and (intervals == intervals[0]).all():  # one interval alone is all of the motion
+        intervals[:] = 0
+    links = (told.solids[:, None, ::2] == measured[None, :, :2]).all(axis=2).any(axis=1)
+    needed = ((intervals[:, 0] > 0) | told.normals.any(axis=1)) & ~links
+    whole = np.insert(measured[:, :2], [1, 2], -1, axis=1)
+    solids, intervals = np.vstack([told.solids[needed], whole]), np.vstack([intervals[needed], measured[:, 2:]])
+    normals = np.vstack([told.normals[needed], np.zeros((len(measured), 3))])
+    return MotionEntries(frozen(solids, np.int64), frozen(intervals, np.int64), frozen(normals))

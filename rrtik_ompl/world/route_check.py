@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,33 +13,29 @@ from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
+from rrtik_ompl.model.judgement import Violation
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.transitions import in_parts, subdivided
-from rrtik_ompl.world.world import FINEST_RESOLUTION, Proof, World
+from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
+
+if TYPE_CHECKING:
+    from rrtik_ompl.world.world import World
 
 VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a motion is checked again
 MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
 AT_ONCE = 200_000  # of them, so that a long path needs no more memory than a short one
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Violation:
-    """Why a path is not valid.
-
-    Attributes:
-        edge: Number of the edge, from 0; waypoint ``edge`` is its beginning.
-        q: The offending configuration, shape (n,).
-        reason: A line for a person: the pair in collision, or the joint and its limit.
-    """
-
-    edge: int
-    q: Vector
-    reason: str
-
-
 def verification_resolution(world: World) -> float:
     """Largest step of any point of the arm between two configurations of the second check [m]."""
     return max(world.motion_resolution / VERIFICATION_DENSITY, FINEST_RESOLUTION)
+
+
+def violations_of(world: World, rows: Matrix, resolution: float | None = None) -> tuple[Violation, ...]:
+    """As :meth:`rrtik_ompl.World.violations`, of waypoints that are trusted, shape (k, dof)."""
+    fine = verification_resolution(world) if resolution is None else resolution
+    return route_violations(world, np.vstack([rows, rows]) if len(rows) == 1 else rows, fine)
 
 
 def motion_taken(world: World, a: Vector, b: Vector) -> bool:

@@ -15,10 +15,10 @@ from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.certificate import Certificate
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
 from rrtik_ompl.model.robot import inside_limits
+from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.world.arrangement import Arrangement
 from rrtik_ompl.world.exact_checks import ExactChecker, one_way
 from rrtik_ompl.world.proof import Prover
-from rrtik_ompl.world.settings import WorldSettings
 
 
 def _second_checker(solids: Arrangement, clearance: float) -> Certificate:

@@ -19,22 +19,21 @@ from rrtik_ompl.base.sharing import Shared
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs
 from rrtik_ompl.geometry.collision.certificate import Certificate
-from rrtik_ompl.geometry.collision.contacts import Contact as Contact
 from rrtik_ompl.geometry.collision.contacts import inside, measured
 from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
+from rrtik_ompl.model.judgement import Contact, Judge, Judged, Violation
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Scene
 from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.model.world_settings import MOTION_RESOLUTION, WorldSettings, checked_settings
 from rrtik_ompl.world.arrangement import Arrangement, arranged
 from rrtik_ompl.world.exact_checks import ExactChecker
-from rrtik_ompl.world.proof import Gap as Gap
-from rrtik_ompl.world.proof import Proof as Proof
+from rrtik_ompl.world.played import judged_path
 from rrtik_ompl.world.proof import Prover
+from rrtik_ompl.world.route_check import violations_of
 from rrtik_ompl.world.row_checks import RowChecks
-from rrtik_ompl.world.settings import ACCURACIES as ACCURACIES
-from rrtik_ompl.world.settings import FINEST_RESOLUTION as FINEST_RESOLUTION
-from rrtik_ompl.world.settings import MOTION_RESOLUTION, WorldSettings, checked_settings
 
 
 def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
@@ -55,7 +54,7 @@ PROVERS = Shared(_prover_of)  # arrangement, held regions
 HELD = Shared(_held_regions)  # robot, what is attached, regions
 
 
-class World:
+class World(Judge):
     """Exact collision checks of a robot in a scene; several threads may ask one world, each in memory of its own.
 
     Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
@@ -238,7 +237,7 @@ class World:
         """The same world but for some of its settings; it shares what does not depend on them.
 
         Args:
-            **changes: Values by the names of :class:`~rrtik_ompl.world.settings.WorldSettings`.
+            **changes: Values by the names of :class:`~rrtik_ompl.model.world_settings.WorldSettings`.
 
         Raises:
             InputError: If a value makes no sense.
@@ -396,6 +395,40 @@ class World:
         spare = not_negative(slack, "slack")
         limit = None if seconds is None else positive(seconds, "seconds")
         return self.prover.route(self._rows(waypoints, 2), clearance=kept, slack=spare, seconds=limit)
+
+    def has_proven(self, proof: Proof) -> bool:
+        """Whether a proof covers every motion, keeps what the world keeps, and was made by a form of the world."""
+        return proof.proven and proof.clearance >= self._settings.kept and self.prover.made(proof)
+
+    def violations(self, waypoints: ArrayLike, *, resolution: float | None = None) -> tuple[Violation, ...]:
+        """Check the straight motions between waypoints, shape (k, dof), again: the second check of a path.
+
+        A motion that is proven free for its whole length (:meth:`prove`) needs no more. Every other one is checked in
+        steps in which no point of the arm moves more than half of the motion resolution (or ``resolution`` [m], if
+        given), by :meth:`certify`.
+
+        Returns:
+            The first violation of every motion that has one.
+
+        Raises:
+            InputError: If a waypoint is no finite row of ``dof`` numbers, there are too many checks, or ``resolution``
+                is not positive.
+
+        Example:
+            >>> problem = rrtik.load_problem("planar3_boxes")
+            >>> [each.edge for each in problem.world.violations([problem.start, problem.goal.q])]
+            [0]
+        """
+        fine = None if resolution is None else positive(resolution, "resolution", "give metres")
+        return violations_of(self, self._rows(waypoints, 2), fine)
+
+    def judged(self, waypoints: ArrayLike) -> Judged:
+        """What is said of the straight motions between waypoints, shape (k, dof), where they are drawn.
+
+        Raises:
+            InputError: If a waypoint is no finite row of ``dof`` numbers.
+        """
+        return judged_path(self._rows(waypoints, 2), self)
 
     def _proven_clearance(self, asked: float | None) -> float:
         return self._settings.kept if asked is None else not_negative(asked, "clearance")

@@ -10,7 +10,7 @@ import time
 import pytest
 
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.world.path import load_path
+from rrtik_ompl.model.path import load_path
 from rrtik_tests.command_line import rrtik
 
 

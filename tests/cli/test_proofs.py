@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from rrtik_ompl.world.path import load_path
+from rrtik_ompl.model.path import load_path
 from rrtik_tests.command_line import rrtik
 
 pytestmark = pytest.mark.kernels

@@ -14,9 +14,9 @@ import rrtik_ompl
 from rrtik_ompl.benchmark import load_suite
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.model.path import load_path
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.problem_files.run import RunSection
-from rrtik_ompl.world.path import load_path
 from rrtik_tests.places import ROOT
 
 LIBRARY = ROOT / "rrtik_ompl"

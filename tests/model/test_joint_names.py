@@ -12,7 +12,7 @@ from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.viewer.subject import subject_of
 
 MOTIONS = re.compile(r"\b(JointPath|Trajectory|HasWaypoints|ShownPath)\b")
-ROBOTS = re.compile(r"\b(Robot|World|Problem|Showable)\b")
+ROBOTS = re.compile(r"\b(Robot|World|Judge|Problem|Showable)\b")
 NAMES = ("first", "second", "third")
 LIMITS = rrtik.RateLimits(1.0, 2.0)
 

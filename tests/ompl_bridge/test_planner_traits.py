@@ -15,6 +15,7 @@ from rrtik_ompl.base.errors import PlannerError
 from rrtik_ompl.description import catalog
 from rrtik_ompl.ik.genetic.options import PRESETS
 from rrtik_ompl.ik.trajectory import list_ik_trajectory_methods
+from rrtik_ompl.model.world_settings import ACCURACIES
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
 from rrtik_ompl.ompl_bridge.planner_names import find_planner
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
@@ -28,7 +29,6 @@ from rrtik_ompl.ompl_bridge.planner_traits import (
 )
 from rrtik_ompl.planning.shortening import METHODS
 from rrtik_ompl.replanning import PLANNERS
-from rrtik_ompl.world.world import ACCURACIES
 
 LIBRARY = Path(rrtik_ompl.__file__).parent
 # Replanners, methods of shortening and of improving have names of their own, some of them those of planners; a page has

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.routes.follower import REACTION_SECONDS, Follower
-from rrtik_ompl.world.path import JointPath
 from rrtik_tests.pilot_session import ROBOT
 
 CORNERS = np.zeros((4, 6))

@@ -14,6 +14,7 @@ from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.model.goal import PoseGoal, PositionGoal
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.ompl_bridge.planner_names import find_planner, list_planners
@@ -22,7 +23,6 @@ from rrtik_ompl.planning.plan import plan, plan_counted
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.exact_checks import ExactChecker
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_robots.titan4.singular_samples import configurations_inside

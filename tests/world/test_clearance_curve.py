@@ -5,9 +5,10 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.model.judgement import FARTHEST
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Sphere
-from rrtik_ompl.world.clearance_curve import FARTHEST, clearance_along
+from rrtik_ompl.world.clearance_curve import clearance_along
 
 
 def true_distance(world, q):

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.geometry.collision.bodies import link_bodies
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.scene import load_scene, save_scene
 from rrtik_ompl.world.moving_world import MovingWorld
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_tests.by_coal import free_by_coal

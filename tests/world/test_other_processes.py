@@ -92,7 +92,7 @@ THROUGH = {
     "pickle": lambda value: pickle.loads(pickle.dumps(value)),
     "joblib and Dask": lambda value: cloudpickle.loads(cloudpickle.dumps(value)),
 }
-OWN = {"_digest", "_measure", "_prover", "problem"}  # of one process; plans are sent without their problem
+OWN = {"_digest", "_measure", "maker", "problem"}  # of one process; plans are sent without their problem
 NOT_COMPARED = OWN | {"closed_form", "model", "collision", "looks"}
 
 

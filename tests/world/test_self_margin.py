@@ -11,6 +11,7 @@ from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.geometry.collision.digests import scene_digest
 from rrtik_ompl.geometry.collision.overlap_depth import OverlapDepth
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Sphere
 from rrtik_ompl.planning.plan import plan
@@ -19,7 +20,6 @@ from rrtik_ompl.problem_files.problem import load_problem, save_problem
 from rrtik_ompl.world.certificates.verify import verify_certificate
 from rrtik_ompl.world.certificates.write import certificate_of
 from rrtik_ompl.world.moving_world import MovingWorld
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_tests.by_coal import free_by_coal

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import coal
 import numpy as np
@@ -11,53 +10,12 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.cloud_solid import Ends
 from rrtik_ompl.geometry.collision.margins import kept_apart, request
 from rrtik_ompl.geometry.collision.own_distances import is_ours, own_gap, own_nearest
 from rrtik_ompl.geometry.collision.solids import is_mesh, solids_of
-
-TOUCHING = 1e-6  # [m] of overlap, below which bodies only touch: coal tells no less
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Contact:
-    """Two bodies that touch or are nearer than they may be, or the two that are nearest to that.
-
-    Attributes:
-        first, second: Names of link, obstacle or attached object.
-        distance: Signed distance [m]: positive is a gap, negative a penetration depth.
-        point_first, point_second: Witness points in the world [m], shape (3,).
-        margin: Distance that must be kept between the two [m]; negative is a depth to which they may overlap.
-    """
-
-    first: str
-    second: str
-    distance: float
-    point_first: Vector
-    point_second: Vector
-    margin: float = 0.0
-
-    __reduce__, __repr__ = as_value, in_one_line
-
-    @property
-    def clearance(self) -> float:
-        """The distance less the margin [m]; what is not above 0 is not allowed."""
-        return self.distance - self.margin
-
-    def __str__(self) -> str:
-        pair = f"'{self.first}' and '{self.second}'"
-        if self.margin < self.distance < 0.0:
-            return f"{pair} overlap by {-1e3 * self.distance:.3g} mm, and may by {-1e3 * self.margin:.3g} mm"
-        if self.distance > self.margin:
-            return f"{pair} are {1e3 * self.distance:.4g} mm apart"
-        if self.distance > 0.0:
-            return f"{pair} are {1e3 * self.distance:.4g} mm apart, within the margin of {1e3 * self.margin:.4g} mm"
-        known = np.isfinite(self.point_first).all()
-        if known and abs(self.distance) < TOUCHING:
-            return f"{pair} touch"
-        return f"{pair} overlap{f' by {1e3 * abs(self.distance):.3g} mm' if known else ''}"
+from rrtik_ompl.model.judgement import Contact
 
 
 def measured(

@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, bounded_array, not_negative
 from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot, require_joints
 from rrtik_ompl.motion.trajectory.blending import blended, fault_finder, stopped
 from rrtik_ompl.motion.trajectory.corners import vertices
@@ -15,7 +16,6 @@ from rrtik_ompl.motion.trajectory.load import load_trajectory
 from rrtik_ompl.motion.trajectory.motion import Peaks, State, Trajectory
 from rrtik_ompl.motion.trajectory.report import MotionReport, motion_report
 from rrtik_ompl.world.kept_clearance import check_route_clearance
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 __all__ = [

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory.checks import bad_moments, proof_of_pieces
 from rrtik_ompl.motion.trajectory.corners import MERGED_SHARE, first_radii, spaced, vertices
 from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
@@ -16,7 +17,6 @@ from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.motion.trajectory.pieces import joined
 from rrtik_ompl.motion.trajectory.runs import runs
 from rrtik_ompl.world.kept_clearance import provable_clearances
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 DEVIATION_SHARE = 0.22  # of the blend: how far a motion may be from its path

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.motion.trajectory.chords import proof_by_chords
 from rrtik_ompl.motion.trajectory.cubics import even_parts
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, not_proven
-from rrtik_ompl.world.world import Proof, World
+from rrtik_ompl.world.world import World
 
 if TYPE_CHECKING:
     from rrtik_ompl.motion.trajectory.motion import Trajectory

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.motion.trajectory.cubics import even_parts
-from rrtik_ompl.world.world import Proof, World
+from rrtik_ompl.world.world import World
 
 SLACKS = (1e-4, 1e-6, 1e-8)  # [m] by which two bodies together may leave their places on the chords, tried in turn
 

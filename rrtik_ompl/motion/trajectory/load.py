@@ -11,11 +11,11 @@ from rrtik_ompl.base.arrays import finite_array
 from rrtik_ompl.base.errors import InputError, in_file, require
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import known_ending, read_text
+from rrtik_ompl.model.path import JointPath, load_path
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory.cubics import are_set_points, in_thirds
 from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.motion.trajectory.text import FORMATS, holds_motion, loads
-from rrtik_ompl.world.path import JointPath, load_path
 
 
 def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:

@@ -15,6 +15,8 @@ from rrtik_ompl.base.copies import as_value, changed, in_notebook
 from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.text import write_text
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import require_joints
 from rrtik_ompl.motion.trajectory.checks import faults_of, proof_of_pieces
 from rrtik_ompl.motion.trajectory.cubics import (
@@ -27,11 +29,10 @@ from rrtik_ompl.motion.trajectory.cubics import (
 )
 from rrtik_ompl.motion.trajectory.messages import write_mcap
 from rrtik_ompl.motion.trajectory.text import dumps, written_ending
-from rrtik_ompl.world.path import JointPath
-from rrtik_ompl.world.world import Proof, World
+from rrtik_ompl.world.world import World
 
 if TYPE_CHECKING:
-    from rrtik_ompl.world.played import Played
+    from rrtik_ompl.model.judgement import Played
 
 END_ERROR = 1e-6  # [s] before the end; a tick there is the end, for no drive takes two points at once
 FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it

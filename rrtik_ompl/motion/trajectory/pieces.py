@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory.motion import Trajectory
-from rrtik_ompl.world.path import JointPath
 
 
 class Pieces(NamedTuple):

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Vector, frozen
+from rrtik_ompl.model.judgement import ClearanceCurve, Judged, PathContact, Played, Verdict
 from rrtik_ompl.motion.trajectory.checks import faults_of, greatest_speeds
-from rrtik_ompl.world.clearance_curve import PLACES, ClearanceCurve, Course
-from rrtik_ompl.world.path_contacts import PathContact
-from rrtik_ompl.world.played import Fault, Judged, Played, Verdict, judged_course, with_reason
+from rrtik_ompl.world.clearance_curve import PLACES, Course
+from rrtik_ompl.world.played import Fault, judged_course, with_reason
 from rrtik_ompl.world.world import World
 
 if TYPE_CHECKING:

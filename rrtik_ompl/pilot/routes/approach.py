@@ -12,9 +12,9 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.follower import slack
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 MAX_JOINTS = 3  # that move between such a configuration and the grasp

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.world.path import JointPath
-from rrtik_ompl.world.world import Contact, World
+from rrtik_ompl.model.judgement import Contact
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.world.world import World
 
 FARTHEST = 256  # [mm] of a proven clearance; what is farther away is not near
 CLEARANCE_ERROR = 0.002  # [m]; the least distance that is found is at most this much too large

@@ -13,7 +13,8 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.units import joint_unit, reading
-from rrtik_ompl.world.path import JointPath, Move
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.transitions import Move
 from rrtik_ompl.world.world import World
 
 MADE = np.deg2rad(0.005)  # [rad or m]; a move is made this close to its end: the tip of an arm of 2 m is 0.2 mm off

@@ -13,10 +13,10 @@ from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.clearance import closest_pair
 from rrtik_ompl.pilot.routes.follower import slack
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 SINGULARITY_THRESHOLD = 0.05  # sine of an angle, or metres of a lever arm, that vanish in a singular posture

@@ -15,12 +15,12 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import ProblemError
 from rrtik_ompl.base.poses import apart
 from rrtik_ompl.ik.batch import solve_ik_batch
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.pilot.routes.approach import approaches
 from rrtik_ompl.pilot.routes.moves import planned
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, RouteSearch, Tail
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 END_OFFSET, END_TURN = 2e-4, np.deg2rad(0.04)  # [m], [rad] of the tip from its grasp, at the end of a route

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import merge_moves, route_length
 from rrtik_ompl.pilot.routes.clearance import executions, forgiving, free_rows, proven_clearance
 from rrtik_ompl.pilot.routes.follower import path_fault, slack
 from rrtik_ompl.pilot.routes.moves import detours, direct_routes, moved_aside, planned
 from rrtik_ompl.pilot.routes.no_route import NoRoute
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 EXECUTIONS = 100  # with errors, that measure the robustness of a route

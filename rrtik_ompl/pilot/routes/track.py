@@ -13,13 +13,14 @@ import numpy as np
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.units import joint_unit, reading
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.transitions import Move
 from rrtik_ompl.pilot.routes.clearance import proven_clearance
 from rrtik_ompl.pilot.routes.follower import MADE, TOLERANCE, Progress, slack
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening import shorten
-from rrtik_ompl.world.path import JointPath, Move
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

@@ -18,12 +18,12 @@ from rrtik_ompl.base.arrays import Matrix, Vector, whole_number
 from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.world_settings import MOTION_RESOLUTION
 from rrtik_ompl.ompl_bridge.planner_traits import planners_with
 from rrtik_ompl.planning.generated_problems.families import FAMILIES, obstacles
 from rrtik_ompl.planning.moves.staircase import staircase_orders
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.settings import MOTION_RESOLUTION
 from rrtik_ompl.world.world import World
 
 __all__ = ["FAMILIES", "generated_problem"]

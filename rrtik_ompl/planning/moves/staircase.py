@@ -16,14 +16,15 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, positive
 from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.model.robot import require_joints
 from rrtik_ompl.model.transitions import SAME, merge_moves
-from rrtik_ompl.world.kept_clearance import check_route_clearance, keeping, provable_clearances
+from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
+from rrtik_ompl.world.kept_clearance import check_route_clearance, keeping, provable_clearances, proved
 from rrtik_ompl.world.motion_queries import MotionsFree
-from rrtik_ompl.world.path import JointPath, path_through, proved, violations_of
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.route_check import VERIFICATION_DENSITY
-from rrtik_ompl.world.world import FINEST_RESOLUTION, World, form_of
+from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, violations_of
+from rrtik_ompl.world.world import World, form_of
 
 Order: TypeAlias = tuple[int, ...]  # the joints of a piece, the first to move first
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.base.units import reading, wrapped
-from rrtik_ompl.world.path import JointPath, Move
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.transitions import Move
 
 COLUMNS = ("move", "joint", "from", "to", "change", "unit")
 

@@ -18,10 +18,10 @@ from rrtik_ompl.files.text import known_ending, write_bytes
 from rrtik_ompl.geometry.collision.digests import robot_digest, world_digest
 from rrtik_ompl.kernels.search.roadmap.graph import KernelGraph
 from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, KERNELS, UNKNOWN
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.planning.search.roadmap_in_python import PythonGraph
 from rrtik_ompl.world.motion_queries import MotionQueries, Stop, decider, has_kernels, keeps_constraints
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import usable_configurations
 from rrtik_ompl.world.world import World
 

@@ -15,6 +15,7 @@ from rrtik_ompl.base.arrays import Matrix, positive, whole_number
 from rrtik_ompl.base.choices import ShorteningMethod, one_of
 from rrtik_ompl.base.errors import InputError, PathWarning, called, require
 from rrtik_ompl.description.joint_weights import weights_of
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.simplify import simplified
 from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
 from rrtik_ompl.planning.moves.axis_cut import double_axis_cut
@@ -29,7 +30,6 @@ from rrtik_ompl.planning.shortening.retraction import retract
 from rrtik_ompl.planning.shortening.sequential import sequential_cut
 from rrtik_ompl.planning.shortening.task import Task
 from rrtik_ompl.world.kept_clearance import check_route_clearance
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 
 __all__ = ["METHODS", "Method", "MoveRules", "Task", "shorten"]

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.planning.moves.clearance_levels import roomiest
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import keeping, room_between
+from rrtik_ompl.world.kept_clearance import keeping, proved_as_clear, room_between
 from rrtik_ompl.world.motion_queries import MotionQueries
-from rrtik_ompl.world.path import JointPath, proved_as_clear
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.proven_motions import proven_motions
 from rrtik_ompl.world.world import World

@@ -10,6 +10,8 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.goal import PoseGoal
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.tip_distance import metres_per_radian
 from rrtik_ompl.model.transitions import route_length
@@ -18,8 +20,7 @@ from rrtik_ompl.planning.tip_motion.freedom import centred, redundant
 from rrtik_ompl.planning.tip_motion.rails import Rail
 from rrtik_ompl.planning.tip_motion.reasons import why_blocked, why_stopped
 from rrtik_ompl.planning.tip_motion.values import SMALLEST_STEP, Leaning, Tolerance
-from rrtik_ompl.world.path import JointPath
-from rrtik_ompl.world.world import Proof, World
+from rrtik_ompl.world.world import World
 
 HALVINGS = 14  # of a motion that is not proven, to find how far it is
 LEFT = 1e-5  # [m] between what stops the arm and its last configuration, from which it has to get away again

@@ -6,8 +6,8 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import not_negative, number_rows
 from rrtik_ompl.base.errors import require
+from rrtik_ompl.model.certificate import Certificate
 from rrtik_ompl.world.certificates import verify
-from rrtik_ompl.world.certificates.certificate import Certificate
 from rrtik_ompl.world.world import World
 
 

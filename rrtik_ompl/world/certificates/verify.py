@@ -25,8 +25,8 @@ from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest
 from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, keeps_clearance, kept_apart
 from rrtik_ompl.kernels.layout import CONVEX_SOLID, HALF_SPACE_SOLID
 from rrtik_ompl.kernels.tables.solid_tables import UNKNOWN, ConvexSolid, convex_solids, placed_solids
+from rrtik_ompl.model.certificate import DEEPEST, VERSION, Certificate, MotionEntries
 from rrtik_ompl.model.robot import Chain
-from rrtik_ompl.world.certificates.certificate import DEEPEST, VERSION, Certificate, MotionEntries
 
 if TYPE_CHECKING:
     from rrtik_ompl.world.world import World

@@ -5,8 +5,9 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.geometry.collision.contacts import Contact, measured
+from rrtik_ompl.geometry.collision.contacts import measured
 from rrtik_ompl.geometry.collision.solids import bvh
+from rrtik_ompl.model.judgement import Contact
 
 SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, 0, -1.0]])
 BOWL = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])  # without a lid: a surface

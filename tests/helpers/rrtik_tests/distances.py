@@ -4,8 +4,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.shapes import Box, Cylinder, Sphere
-from rrtik_ompl.world.path import JointPath
 
 
 def least_distances(robot, scene, rows, step=0.004):

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.following.follower import Follower
 from rrtik_ompl.motion.following.links import SimulatedLink
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
 from rrtik_ompl.pilot.devices.links import ArmLink
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 TICK = 2e-3

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Sphere
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
@@ -18,7 +19,6 @@ from rrtik_ompl.motion.trajectory.curve import Curve
 from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest
 from rrtik_ompl.motion.trajectory.line import along_lines
 from rrtik_ompl.motion.trajectory.runs import PERIOD, along_curve
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 PANDA = RateLimits(

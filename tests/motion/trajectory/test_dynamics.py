@@ -7,8 +7,8 @@ import pytest
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import RateLimits, time_parameterize
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 

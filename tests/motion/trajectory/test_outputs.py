@@ -9,10 +9,10 @@ import yaml
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, load_trajectory, motion_report, time_parameterize
 from rrtik_ompl.viewer import view
 from rrtik_ompl.viewer.plots.joints import plot_joints
-from rrtik_ompl.world.path import JointPath
 
 LIMITS = RateLimits([1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [20.0, 20.0, 20.0])
 ODD = RateLimits([1.07] * 3, [2.3] * 3, [19.0] * 3)  # with them phases of a motion end between two ticks of a drive

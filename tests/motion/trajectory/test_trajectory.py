@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, load_trajectory, time_parameterize
 from rrtik_ompl.motion.trajectory.limits import default_words
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 ON_PATH = 1e-9  # [rad]

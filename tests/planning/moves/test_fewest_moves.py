@@ -11,6 +11,7 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError, PathWarning
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.transitions import route_length, single_joint, transitions
 from rrtik_ompl.ompl_bridge import SearchResult
@@ -21,7 +22,6 @@ from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.planning.shortening.fewest_moves import fewest_moves, least_moves
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_planners import FewestMoves

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.planning.moves.staircase import one_joint_moves, staircase_orders
 from rrtik_ompl.planning.moves.text import moves_csv, moves_document, spoken_moves
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 
 values = st.one_of(st.floats(-3.0, 3.0), st.integers(-2, 2).map(float))

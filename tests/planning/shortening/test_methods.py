@@ -10,6 +10,7 @@ import rrtik_ompl as rrtik
 from rrtik_bench.shortening import plane_worlds
 from rrtik_ompl.base.errors import InputError, PathWarning
 from rrtik_ompl.cli.plan import SHORTEN
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import route_length, single_joint, transitions
 from rrtik_ompl.planning.shortening import METHODS, Task
 from rrtik_ompl.planning.shortening.acceptance import Acceptance
@@ -17,7 +18,6 @@ from rrtik_ompl.planning.shortening.corners import snap_corners
 from rrtik_ompl.planning.shortening.random_cut import random_cut
 from rrtik_ompl.planning.shortening.retraction import retract
 from rrtik_ompl.planning.shortening.sequential import sequential_cut
-from rrtik_ompl.world.path import JointPath
 
 DISCS = [((2.0, 0.0), 1.0), ((5.0, 0.6), 1.2), ((8.0, -0.5), 1.0), ((5.0, -3.0), 0.8)]
 FOR_ALL_PATHS = [name for name, method in METHODS.items() if not method.keeps_moves]

@@ -7,9 +7,9 @@ import sys
 import pytest
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import RateLimits, time_parameterize
 from rrtik_ompl.viewer.plots.joints import plot_joints
-from rrtik_ompl.world.path import JointPath
 
 PATH = JointPath([[0.0, 0.0], [1.0, 0.2], [1.0, 0.0]], ["turn", "slide"], [False, True])
 

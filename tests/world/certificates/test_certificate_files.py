@@ -10,10 +10,10 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import MAX_BYTES
+from rrtik_ompl.model.certificate import Certificate, MotionEntries, from_document, load_certificate
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
-from rrtik_ompl.world.certificates.certificate import Certificate, MotionEntries, from_document, load_certificate
-from rrtik_ompl.world.proof import Proof
 from rrtik_ompl.world.world import World
 
 

@@ -7,10 +7,11 @@ import pytest
 
 import rrtik_ompl as rrtik
 from bench.proofs.cases import random_scene
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.world.certificates.verify import verify_certificate
 from rrtik_ompl.world.certificates.write import certificate_of
-from rrtik_ompl.world.path import JointPath
-from rrtik_ompl.world.proof import Proof, Prover
+from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.world import World
 from rrtik_tests.turning_slider import slider
 

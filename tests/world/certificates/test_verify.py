@@ -16,13 +16,13 @@ from bench.proofs.certificates import main
 from bench.proofs.tampering import TAMPERINGS
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.proof import layout, log
+from rrtik_ompl.model.certificate import MotionEntries, from_document
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Sphere
-from rrtik_ompl.world.certificates.certificate import MotionEntries, from_document
 from rrtik_ompl.world.certificates.verify import Motions, verify_certificate
 from rrtik_ompl.world.certificates.write import certificate_of
 from rrtik_ompl.world.coal_proof import CoalProof
-from rrtik_ompl.world.path import JointPath
 from rrtik_ompl.world.world import World
 from rrtik_tests.turning_slider import slider
 

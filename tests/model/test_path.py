@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.path import JointPath, load_path
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
-from rrtik_ompl.model.transitions import subdivided
-from rrtik_ompl.world.path import JointPath, Move, load_path
+from rrtik_ompl.model.transitions import Move, subdivided
 from rrtik_ompl.world.world import World
 
 

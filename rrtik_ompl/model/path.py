@@ -1,35 +1,36 @@
-"""A path of configurations that measures itself, checks itself against a world, and is saved and read again."""
+"""A path of configurations that measures itself, asks a world about itself, and is saved and read again."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import (
-    MOST_ROWS,
     Mask,
     Matrix,
     Vector,
     finite_array,
     frozen,
-    not_negative,
     positive,
     truths,
     usable_waypoints,
 )
-from rrtik_ompl.base.copies import as_value, changed, in_notebook, restored
+from rrtik_ompl.base.copies import as_value, changed, in_notebook
 from rrtik_ompl.base.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
+from rrtik_ompl.model.judgement import Judge, Played, Violation, require_judge
+from rrtik_ompl.model.proof import Proof, certificate_by
 from rrtik_ompl.model.robot import Robot, require_joints, unnamed_joints
 from rrtik_ompl.model.transitions import (
     SAME,
+    Move,
     length_of,
     merge_moves,
     moved,
@@ -38,14 +39,6 @@ from rrtik_ompl.model.transitions import (
     subdivided,
     transitions,
 )
-from rrtik_ompl.model.transitions import Move as Move
-from rrtik_ompl.world.kept_clearance import CLEARANCE
-from rrtik_ompl.world.route_check import VERIFICATION_DENSITY as VERIFICATION_DENSITY
-from rrtik_ompl.world.route_check import Violation, route_violations, verification_resolution
-from rrtik_ompl.world.world import Proof, World
-
-if TYPE_CHECKING:
-    from rrtik_ompl.world.played import Played
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +79,7 @@ class JointPath:
         sliding, endless = (truths(mask, "mask of a path's joints") for mask in given)
         if not len(names) == count == sliding.size == endless.size:
             raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
-        known = {
+        values: dict[str, Any] = {
             "waypoints": frozen(rows),
             "joint_names": names,
             "prismatic": frozen(sliding, bool),
@@ -94,7 +87,7 @@ class JointPath:
             "continuous": frozen(endless, bool),
             "proof": None,
         }
-        for name, value in known.items():
+        for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
@@ -110,18 +103,8 @@ class JointPath:
             InputError: If the rows do not have one value per joint of the robot.
         """
         require(robot, Robot, "robot of a path")
-        rows: Matrix = waypoints if isinstance(waypoints, np.ndarray) else np.empty(0)
-        if rows.dtype != np.float64 or rows.shape[1:] != (robot.dof,) or not np.isfinite(rows[:MOST_ROWS]).all():
-            rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
-        known = {
-            "waypoints": frozen(usable_waypoints(robot.onto_limits(rows))),
-            "joint_names": robot.joint_names,
-            "prismatic": frozen(robot.prismatic, bool),
-            "robot_name": robot.name,
-            "continuous": frozen(robot.continuous, bool),
-            "proof": None,
-        }
-        return restored(cls, known)
+        rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
+        return cls(robot.onto_limits(rows), robot.joint_names, robot.prismatic, robot.name, robot.continuous)
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
         """The same joints, other waypoints.
@@ -194,12 +177,8 @@ class JointPath:
         counts = part_counts(self.waypoints, positive(step, "resample step"))
         return path_through(self, subdivided(self.waypoints, counts)[0])
 
-    def violations(self, world: World, *, resolution: float | None = None) -> tuple[Violation, ...]:
-        """Check the path again, independently of the planner that made it.
-
-        An edge that is proven free for its whole length (:meth:`World.prove`) needs no more. Every other one is checked
-        in steps in which no point of the arm moves more than half of the world's motion resolution (or ``resolution``
-        [m], if given), by :meth:`World.certify`.
+    def violations(self, world: Judge, *, resolution: float | None = None) -> tuple[Violation, ...]:
+        """Check the path again, independently of the planner that made it: :meth:`rrtik_ompl.World.violations`.
 
         Returns:
             The first violation of every edge that has one; empty for a valid path.
@@ -208,29 +187,26 @@ class JointPath:
             InputError: If the path moves other joints than the world's robot, or these in another order, is too long
                 for its checks, or ``resolution`` is not positive.
         """
-        require(world, World, "world of a path's check")
+        require_judge(world, "world of a path's check")
         require_joints(world.robot, self.joint_names, "path")
-        fine = None if resolution is None else positive(resolution, "resolution", "give metres")
-        return violations_of(world, self.waypoints, fine)
+        return world.violations(self.waypoints, resolution=resolution)
 
-    def proved(self, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
-        """The same path with what is proven of its motions, see :meth:`World.prove`.
+    def proved(self, world: Judge, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
+        """The same path with what is proven of its motions: :meth:`rrtik_ompl.World.prove`.
 
         Raises:
             InputError: If the path is another robot's, there is no world, or the clearance is negative or infinite.
         """
-        require(world, World, "world of a path's proof")
+        require_judge(world, "world of a path's proof")
         require_joints(world.robot, self.joint_names, "path")
-        kept = None if clearance is None else not_negative(clearance, "clearance")
-        limit = None if seconds is None else positive(seconds, "seconds")
-        return proved(self, world, clearance=kept, seconds=limit)
+        return self.with_proof(world.prove(self.waypoints, clearance=clearance, seconds=seconds))
 
     def with_proof(self, proof: Proof) -> JointPath:
         """The same path with what somebody else has proven of its motions."""
         return changed(self, proof=proof)
 
-    def played(self, world: World | None) -> Played:
-        """The path as a picture plays it, and what is said of it there: by :meth:`proved` and :meth:`violations`.
+    def played(self, world: Judge | None) -> Played:
+        """The path as a picture plays it, and what is said of it there: :meth:`rrtik_ompl.World.judged`.
 
         Args:
             world: In which it is judged; None where there is none.
@@ -238,24 +214,20 @@ class JointPath:
         Raises:
             InputError: If the path moves other joints than the world's robot, or these in another order.
         """
-        from rrtik_ompl.world.played import played_path
-
-        require(world, World | None, "world of a path to play")
-        if world is not None:
-            require_joints(world.robot, self.joint_names, "path")
-        return played_path(self.waypoints, world)
+        if world is None:
+            return Played(self.waypoints, None, None)
+        require_judge(world, "world of a path to play", "NoneType")
+        require_joints(world.robot, self.joint_names, "path")
+        return Played(self.waypoints, None, world.judged(self.waypoints))
 
     @property
     def proven(self) -> bool:
         """Whether its proof covers every motion; False without a proof."""
         return self.proof is not None and self.proof.proven
 
-    def proven_in(self, world: World) -> bool:
+    def proven_in(self, world: Judge) -> bool:
         """Whether its proof covers every motion, keeps what the world keeps, and was made by a form of the world."""
-        proof = self.proof
-        return (
-            proof is not None and proof.proven and proof.clearance >= world.settings.kept and world.prover.made(proof)
-        )
+        return self.proof is not None and world.has_proven(self.proof)
 
     def save(self, path: str | os.PathLike[str], *, proof: bool = False) -> None:
         """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
@@ -280,8 +252,6 @@ class JointPath:
         document, ending = self.document(), known_ending(path, FORMATS, "path")
         if proof:
             known_ending(path, FORMATS[:1], "path with its proof")
-            from rrtik_ompl.world.certificates.write import certificate_by
-
             document["certificate"] = certificate_by(self.proof, self.waypoints).document()
         write_text(path, dumps(document, ending))
 
@@ -303,29 +273,6 @@ class JointPath:
 def path_through(path: JointPath, rows: Matrix) -> JointPath:
     """As :meth:`JointPath.with_waypoints`, of rows that are known to be finite and of its joints, shape (k, n)."""
     return changed(path, waypoints=frozen(rows), proof=None)
-
-
-def violations_of(world: World, rows: Matrix, resolution: float | None = None) -> tuple[Violation, ...]:
-    """As :meth:`JointPath.violations`, of waypoints of the world's robot, shape (k, dof)."""
-    fine = verification_resolution(world) if resolution is None else resolution
-    return route_violations(world, np.vstack([rows, rows]) if len(rows) == 1 else rows, fine)
-
-
-def proved(path: JointPath, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
-    """As :meth:`JointPath.proved`, of a path of the world's robot."""
-    kept = world.settings.kept if clearance is None else clearance
-    return path.with_proof(world.prover.route(path.waypoints, clearance=kept, seconds=seconds))
-
-
-def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:
-    """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
-    found = proved(path, world, clearance=clearance)
-    least = world.settings.kept
-    for kept in sorted({max(min(clearance, CLEARANCE), least), least} - {clearance}, reverse=True):
-        if found.proven:
-            break
-        found = proved(path, world, clearance=kept)
-    return found
 
 
 def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:
