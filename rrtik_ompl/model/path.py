@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -95,8 +96,8 @@ class JointPath:
         size = f"{k} waypoints of {n} joints, {self.transitions} transitions"
         return f"JointPath({size}, length {self.length:.3g} {self.unit})"
 
-    @classmethod
-    def of(cls, robot: Robot, waypoints: ArrayLike) -> JointPath:
+    @staticmethod
+    def of(robot: Robot, waypoints: ArrayLike) -> JointPath:
         """A path of this robot through ``waypoints``, shape (k, dof); :meth:`rrtik_ompl.Robot.onto_limits` applies.
 
         Raises:
@@ -104,7 +105,7 @@ class JointPath:
         """
         require(robot, Robot, "robot of a path")
         rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
-        return cls(robot.onto_limits(rows), robot.joint_names, robot.prismatic, robot.name, robot.continuous)
+        return path_through(_at_zero(robot), usable_waypoints(robot.onto_limits(rows)))
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
         """The same joints, other waypoints.
@@ -273,6 +274,12 @@ class JointPath:
 def path_through(path: JointPath, rows: Matrix) -> JointPath:
     """As :meth:`JointPath.with_waypoints`, of rows that are known to be finite and of its joints, shape (k, n)."""
     return changed(path, waypoints=frozen(rows), proof=None)
+
+
+@lru_cache(maxsize=64)
+def _at_zero(robot: Robot) -> JointPath:
+    """A path of a robot, from which its others are made."""
+    return JointPath(np.zeros((1, robot.dof)), robot.joint_names, robot.prismatic, robot.name, robot.continuous)
 
 
 def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:
