@@ -69,6 +69,11 @@ class WorldSettings:
         """What every motion keeps from obstacles on top of their margins, where nobody asks for more [m]."""
         return max(self.clearance, self.proving or 0.0)
 
+    @property
+    def summary(self) -> str:
+        """Robot, scene, and what is not as usual, in one line."""
+        return ", ".join([self.robot.name, str(self.scene), *self.unusual()])
+
     def unusual(self) -> Iterator[str]:
         """Each setting beside robot and scene that is not the default, as ``name=value``."""
         for each in fields(self):

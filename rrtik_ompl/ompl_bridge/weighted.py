@@ -30,7 +30,9 @@ class WeightedProblem:
         self._start = problem.start
         asked: Any = problem.world if motions is None else motions  # which has what it needs of a world
         weighted = WeightedMotions(asked, self._scale)
-        self.problem = changed(problem, world=weighted, start=frozen(problem.start * self._scale))
+        settings = changed(problem.settings, robot=weighted.robot)
+        start = frozen(problem.start * self._scale)
+        self.problem = changed(problem, settings=settings, start=start, world=weighted)
 
     def there(self, rows: Matrix) -> Matrix:
         """Configurations in these coordinates, shape (m, dof)."""

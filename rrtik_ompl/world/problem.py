@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -21,8 +22,9 @@ from rrtik_ompl.model.goal import Goal, JointGoal, MultiGoal, PoseGoal, parts_of
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.shapes import PointCloud
 from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.world.route_check import verification_resolution
-from rrtik_ompl.world.world import World, form_of
+from rrtik_ompl.world.world import World, form_of, like
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -32,21 +34,23 @@ class Problem:
     Values up to 1e-5 outside a limit are moved onto it. For continuous joints the goal is turned to the equivalent
     value nearest to the start, so that the straight motion goes the short way round.
 
+    It is data: it is copied, pickled and changed by its fields.
+
     Attributes:
-        world: Robot, scene and collision checks.
+        settings: Of its world: robot, scene, and how is checked.
         start: Shape (dof,), read-only.
         goal: What to reach; a :class:`JointGoal` has been checked to be free.
         name: For messages and files.
         planner: Name of the planner that :func:`rrtik_ompl.plan` uses where none is named, or None.
-        constraints: Regions that a frame must not leave on the whole path, those ``from_start`` placed in the world.
-            In the world only motions that keep them are free then. Those that the given world has are among them.
 
     Args:
-        world: Robot and scene.
+        world: Robot and scene, in which start and goal are checked.
         start: Configuration, shape (dof,), rad or m, or the name of a posture.
         goal: A goal, a configuration, the name of a posture, or a pose (``pinocchio.SE3`` or shape (4, 4)).
         name: For messages and files.
         planner: Name of one of :func:`rrtik_ompl.list_planners`; it is looked up when it is used.
+        constraints: Regions that a frame must not leave on the whole path, beside those that the world has. In the
+            world of the problem only motions that keep them are free.
 
     Raises:
         ProblemError: If start or goal is in collision, within an obstacle's margin, outside the limits or outside the
@@ -60,12 +64,11 @@ class Problem:
         (7,)
     """
 
-    world: World
+    settings: WorldSettings
     start: Vector
     goal: Goal
     name: str
     planner: str | None
-    constraints: tuple[TaskRegion, ...]
 
     def __init__(
         self,
@@ -104,27 +107,31 @@ class Problem:
         if isinstance(wanted, MultiGoal):
             goal_regions(world.robot, world.scene, wanted)  # refuses links that do not exist
 
-        values = {
-            "world": world,
-            "start": first,
-            "goal": wanted,
-            "name": name,
-            "planner": planner,
-            "constraints": regions,
-        }
+        values = {"settings": world.settings, "start": first, "goal": wanted, "name": name, "planner": planner}
         for field, value in values.items():
             object.__setattr__(self, field, value)
+        object.__setattr__(self, "world", world)  # what has been asked already is asked again
 
     __reduce__ = as_value
     _repr_html_ = in_notebook
 
     def __repr__(self) -> str:
-        return f"Problem('{self.name}', {self.world}, to a {type(self.goal).__name__})"
+        return f"Problem('{self.name}', World({self.settings.summary}), to a {type(self.goal).__name__})"
+
+    @cached_property
+    def world(self) -> World:
+        """Robot, scene and collision checks: the engine, made from the settings when it is first asked for."""
+        return like(self.settings)
 
     @property
     def robot(self) -> Robot:
         """The robot of the world."""
-        return self.world.robot
+        return self.settings.robot
+
+    @property
+    def constraints(self) -> tuple[TaskRegion, ...]:
+        """Regions that a frame must not leave on the whole path, those ``from_start`` placed in the world."""
+        return self.settings.constraints
 
     def with_resolution(self, motion_resolution: float) -> Problem:
         """The same problem, its motions checked in steps of another size [m] (:meth:`World.with_resolution`)."""
@@ -138,22 +145,22 @@ class Problem:
 
     def with_world(self, world: World) -> Problem:
         """The same start and goal in another form of the same world; neither is checked again."""
-        return changed(self, world=world)
+        return changed(self, settings=world.settings, world=world)
 
     def reached(self, q: ArrayLike) -> bool:
         """Whether a configuration, shape (dof,), satisfies the goal."""
-        return bool(self.goal.satisfied(self.world.robot, self.world.robot.configuration(q)[None])[0])
+        return bool(self.goal.satisfied(self.robot, self.robot.configuration(q)[None])[0])
 
 
 def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Problem:
     """A problem whose start, shape (dof,), and goal somebody has checked already; no joint may be continuous."""
     known = {
-        "world": world,
+        "settings": world.settings,
         "start": frozen(start),
         "goal": goal if isinstance(goal, JointGoal) else JointGoal(goal),
         "name": "problem",
         "planner": None,
-        "constraints": (),
+        "world": world,
     }
     return restored(Problem, known)
 

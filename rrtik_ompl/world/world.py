@@ -136,7 +136,7 @@ class World(Judge):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy answers as the world does, and may be used in another thread or process."""
-        return _quietly, (self.settings,)
+        return like, (self.settings,)
 
     checks: ThreadOwn[RowChecks] = ThreadOwn()
     resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
@@ -152,7 +152,7 @@ class World(Judge):
         return self.checks.prover
 
     def __repr__(self) -> str:
-        return f"World({', '.join([self.robot.name, str(self.scene), *self._settings.unusual()])})"
+        return f"World({self._settings.summary})"
 
     @property
     def settings(self) -> WorldSettings:
@@ -549,8 +549,8 @@ def _and_more(contacts: tuple[Contact, ...]) -> str:
     return f" (and {more} more pair{'s' * (more > 1)})" if more else ""
 
 
-def _quietly(settings: WorldSettings) -> World:
-    """A world like one that there is already; what it doubts was said there."""
+def like(settings: WorldSettings) -> World:
+    """A world of the settings of one that there was already; what it doubts was said there."""
     with warnings.catch_warnings():
         for doubt in (MeshWarning, DescriptionWarning):
             warnings.simplefilter("ignore", doubt)
