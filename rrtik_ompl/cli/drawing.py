@@ -99,9 +99,10 @@ def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
         return question, question.robot, ""
     except ProblemError as error:
         fault = str(error)
-    world, start, goal = load_unchecked(name)
+    settings, start, goal = load_unchecked(name)
     note(fault)
-    return Shown(world.robot, world.scene, goal, start, contacts_along(world, start[None])), world.robot, fault
+    touching = contacts_along(World.of(settings), start[None])
+    return Shown(settings.robot, settings.scene, goal, start, touching), settings.robot, fault
 
 
 def play(

@@ -32,6 +32,8 @@ class Violation:
     q: Vector
     reason: str
 
+    __reduce__ = as_value
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
@@ -106,6 +108,8 @@ class ClearanceCurve:
     pairs: tuple[tuple[str, str], ...]
     unproven: tuple[int, ...]
 
+    __reduce__ = as_value
+
     @property
     def least(self) -> int:
         """Number of the place where the arm is nearest to an obstacle."""
@@ -166,6 +170,8 @@ class Played:
     waypoints: Matrix
     times: Vector | None
     judged: Judged | None
+
+    __reduce__ = as_value
 
 
 class Judge(ABC):

@@ -22,6 +22,7 @@ from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.problem_files.goal import GoalSection, StartSection, build_goal, goal_data
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
@@ -86,9 +87,12 @@ def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
 
         return load_motion_bench_maker(path, robot=robot)
     entry = parse(document, ProblemFile)
-    world, start, goal = _parts(document, entry, robot)
+    settings = _settings(document, entry, robot)
+    with document.at(("scene",)):
+        world = World.of(settings)  # refuses a scene that does not fit the robot
+    start, goal = _ends(document, entry, settings.robot)
     planner = _planner(document, entry.planner)
-    constraints = build_constraints(document, entry.path_constraints, world.robot)
+    constraints = build_constraints(document, entry.path_constraints, settings.robot)
     with document.at(("path_constraints",)) if constraints else nullcontext():
         try:
             return Problem(world, start, goal, name=path.stem, planner=planner, constraints=constraints)
@@ -98,22 +102,23 @@ def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
             raise
 
 
-def load_unchecked(name_or_file: FilePath) -> tuple[World, Vector, Goal]:
-    """World, start and goal of a problem file, which may be in collision: to look at what is wrong.
+def load_unchecked(name_or_file: FilePath) -> tuple[WorldSettings, Vector, Goal]:
+    """What a problem file says, as values: settings of the world, start and goal. No world is asked about them.
 
     Raises:
-        InputError: As for :func:`load_problem`.
+        InputError: As for :func:`load_problem`, but for what only a world can say.
     """
     document = _read(problem_path(name_or_file))
-    return _parts(document, parse(document, ProblemFile), None)
+    entry = parse(document, ProblemFile)
+    settings = _settings(document, entry, None)
+    return settings, *_ends(document, entry, settings.robot)
 
 
-def _parts(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath | None) -> tuple[World, Vector, Goal]:
-    world = _world(document, entry, robot)
+def _ends(document: YamlDocument, entry: ProblemFile, robot: Robot) -> tuple[Vector, Goal]:
     with document.at(("start",)):
-        start = entry.start.configuration(world.robot)
+        start = entry.start.configuration(robot)
     with document.at(("goal",)):
-        return world, start, build_goal(entry.goal, world.robot)
+        return start, build_goal(entry.goal, robot)
 
 
 def _is_motion_bench_maker(data: Mapping[str, Any]) -> bool:
@@ -157,12 +162,12 @@ def problem_data(problem: Problem, folder: Path) -> dict[str, Any]:
     Raises:
         InputError: If the format has no words for something in the problem.
     """
-    world = problem.world
-    data: dict[str, Any] = {"version": 1, "robot": robot_data(world.robot.source, folder)}
-    scene = scene_data(world.scene, folder)
+    settings = problem.settings
+    data: dict[str, Any] = {"version": 1, "robot": robot_data(settings.robot.source, folder)}
+    scene = scene_data(settings.scene, folder)
     data |= {"scene": scene} if scene else {}
     data |= {"start": {"joints": problem.start.tolist()}, "goal": goal_data(problem.goal)}
-    data |= world_data(world.settings)
+    data |= world_data(settings)
     held = [constraint_data(region) for region in problem.constraints]
     data |= {"path_constraints": held} if held else {}
     return data if problem.planner is None else data | {"planner": problem.planner}
@@ -206,7 +211,7 @@ def _planner(document: YamlDocument, name: str | None) -> str | None:
     return name
 
 
-def _world(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath | None) -> World:
+def _settings(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath | None) -> WorldSettings:
     if robot is None:
         with document.at(("robot",)):
             robot = robot_from_entry(document.data["robot"], document.path.parent)
@@ -214,4 +219,4 @@ def _world(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath |
         robot = load_robot(robot)
     scene = entry.scene.build(document)
     with document.at(("scene",)):
-        return entry.world(robot, scene)
+        return entry.settings(robot, scene)

@@ -1,4 +1,4 @@
-"""The keys of our YAML files that say how a world checks <-> the settings of a `World` beside its robot and scene."""
+"""The keys of our YAML files that say how a world checks <-> the settings of a world beside its robot and scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from rrtik_ompl.files.sections import NotNegative, Positive, Section
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION, MOTION_RESOLUTION, WorldSettings
-from rrtik_ompl.world.world import World
 
 ELSEWHERE = ("robot", "scene", "constraints")  # settings that have sections of their own
 
@@ -38,13 +37,13 @@ class WorldKeys(Section):
         description="[m] of clearance with which motions must be proven to count as free; in steps if absent",
     )
 
-    def world(self, robot: Robot, scene: Scene) -> World:
-        """A robot in a scene, with these settings.
+    def settings(self, robot: Robot, scene: Scene) -> WorldSettings:
+        """Of the world of a robot in a scene.
 
         Raises:
-            InputError: If the scene does not fit the robot.
+            InputError: If the robot is none that a world can be made of.
         """
-        return World(robot, scene, **{name: getattr(self, name) for name in WorldKeys.model_fields})
+        return WorldSettings(robot, scene, **{name: getattr(self, name) for name in WorldKeys.model_fields})
 
 
 def world_data(settings: WorldSettings) -> dict[str, Any]:

@@ -200,7 +200,7 @@ def _world(document: YamlDocument, entry: TaskPlanFile, part: WorldEntry, place:
             raise InputError(f"robot '{robot.name}' has other joints than the plan's: {', '.join(entry.joint_names)}")
     scene = part.scene.build(document, (*place, "scene"))
     with document.at((*place, "scene")):
-        return entry.world(robot, scene)
+        return World.of(entry.settings(robot, scene))
 
 
 def _world_data(world: World, folder: Path) -> dict[str, Any]:

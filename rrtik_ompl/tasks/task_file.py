@@ -243,7 +243,7 @@ def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
         robot = robot_from_entry(document.data["robot"], document.path.parent)
     scene = entry.scene.build(document)
     with document.at(("scene",)):
-        world = entry.world(robot, scene)
+        world = World.of(entry.settings(robot, scene))
     with document.at(("start",)):
         given = entry.start.configuration(robot)
         begun = Setting.beginning(world, robot.configuration(given, "start"))

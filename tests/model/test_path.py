@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.path import JointPath, load_path
 from rrtik_ompl.model.scene import Obstacle, Scene
-from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.model.transitions import Move, subdivided
 from rrtik_ompl.world.world import World
 
@@ -208,3 +209,33 @@ def test_a_check_in_steps_of_nothing_is_refused(resolution):
     world = World(load_robot("planar3"))
     with pytest.raises(InputError, match="resolution"):
         JointPath.of(world.robot, [[0.0] * 3, [1.0] * 3]).violations(world, resolution=resolution)
+
+
+@pytest.mark.parametrize("ask", [JointPath.violations, JointPath.proved, JointPath.played])
+def test_only_a_world_can_be_asked_about_a_path(ask):
+    path = JointPath([[0.0] * 3, [1.0] * 3])
+    with pytest.raises(InputError, match=r"world of a path.* must be of type World.*, got Scene"):
+        ask(path, Scene())
+
+
+def test_a_path_says_what_its_world_says_of_its_waypoints():
+    ball = Obstacle("ball", Sphere(0.2), pose([0.0, 2.0, 0.0]))
+    world = World(load_robot("planar3"), Scene([ball]))
+    rows = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [2.5, 0.0, 0.0]])
+    path = JointPath.of(world.robot, rows)
+    said = [(each.edge, each.reason) for each in world.violations(rows)]
+    assert [edge for edge, _ in said] == [1]
+    assert [(each.edge, each.reason) for each in path.violations(world)] == said
+    assert path.proved(world).proof == world.prove(rows)
+    assert path.played(world).judged.verdict == world.judged(rows).verdict
+    assert path.played(None).judged is None
+
+
+def test_a_proof_counts_in_every_form_of_its_world_that_keeps_no_more_than_it(tmp_path):
+    world = World(load_robot("planar3"))
+    path = JointPath.of(world.robot, [[0.0] * 3, [0.5] * 3]).proved(world, clearance=0.01)
+    assert world.has_proven(path.proof)
+    assert path.proven_in(world)
+    assert path.proven_in(world.with_resolution(0.05))
+    assert not path.proven_in(world.with_clearance(0.02))
+    assert not path.proven_in(World(load_robot("planar3"), Scene([Obstacle("far", Sphere(0.1), pose([9, 0, 0]))])))

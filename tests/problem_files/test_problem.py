@@ -3,6 +3,7 @@
 import json
 from copy import deepcopy
 
+import coal
 import jsonschema
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from rrtik_ompl.description.catalog import list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
 from rrtik_ompl.model.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.model.task_region import TaskRegion
-from rrtik_ompl.problem_files.problem import load_problem, problem_schema, save_problem
+from rrtik_ompl.problem_files.problem import load_problem, load_unchecked, problem_schema, save_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -360,3 +361,18 @@ def test_the_world_of_a_loaded_problem_is_a_world_with_its_scene(tmp_path):
 def test_a_wrong_padding_is_told_where_it_stands(tmp_path, padding, message):
     with pytest.raises(InputError, match=message):
         load(tmp_path, text(robot=f"{{name: xarm7, padding: {padding}}}"))
+
+
+def test_the_values_of_a_file_are_read_without_asking_coal_or_making_a_world(tmp_path, monkeypatch):
+    def refused(*_):
+        raise AssertionError("asked")
+
+    for name in ("collide", "distance"):
+        monkeypatch.setattr(coal, name, refused)
+    monkeypatch.setattr(World, "of", refused)
+    content = text(rest=WALL.replace("X", "2.5").replace("Y", "0") + "clearance: 0.01\n")  # the start is in the wall
+    (tmp_path / "task.yaml").write_text(content)
+    settings, start, goal = load_unchecked(tmp_path / "task.yaml")
+    assert (settings.robot.dof, settings.scene.names, settings.clearance) == (3, ("wall",), 0.01)
+    assert start.tolist() == [0.0, 0.0, 0.0]
+    np.testing.assert_allclose(goal.q, [np.pi / 2, 0.0, 0.0])

@@ -59,8 +59,9 @@ def test_a_start_in_collision_is_shown_with_its_bodies_red(tmp_path, capsys):
     (tmp_path / "bad.yaml").write_text(text)
     assert run(["show", str(tmp_path / "bad.yaml"), "--html", str(tmp_path / "bad.html")]) == 1
     assert "start is in collision" in capsys.readouterr().err
-    world, start, _ = load_unchecked(tmp_path / "bad.yaml")
-    shown = Shown(world.robot, world.scene, None, start, contacts_along(world, start[None]))
+    settings, start, _ = load_unchecked(tmp_path / "bad.yaml")
+    touching = contacts_along(rrtik.World.of(settings), start[None])
+    shown = Shown(settings.robot, settings.scene, None, start, touching)
     (told,) = story_of(subject_of(shown), draw(subject_of(shown))[1], "")["contacts"]
     assert "'prism_10'" in told["text"]
     assert ["obstacles", ":prism_10"] in told["nodes"]

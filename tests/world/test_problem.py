@@ -1,17 +1,22 @@
 """A problem exists only if it is well posed."""
 
+import copy
+import pickle
 import re
+from dataclasses import fields, replace
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from rrtik_ompl.base.copies import changed
 from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.goal import GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -173,3 +178,43 @@ def test_start_and_goal_may_be_named_postures(titan):
     assert np.array_equal(problem.goal.q, titan.posture("ready"))
     with pytest.raises(UnknownNameError, match="no posture of robot 'titan4' 'redy'"):
         Problem(World(titan), "stowed", "redy")
+
+
+# --- a problem is data -------------------------------------------------------------------------------------------
+
+
+def test_a_problem_goes_to_another_process_without_its_world_and_makes_one_there(world):
+    problem = Problem(world, FREE, FREE + 0.1, name="reach", planner="bicrdt")
+    again = pickle.loads(pickle.dumps(problem))
+    assert [each.name for each in fields(Problem)] == ["settings", "start", "goal", "name", "planner"]
+    assert vars(again).keys() == {each.name for each in fields(Problem)}
+    assert repr(again) == repr(problem)
+    assert vars(again).keys() == {each.name for each in fields(Problem)}
+    assert again.world is again.world
+    assert again.world.settings is again.settings
+    assert again.world.valid(FREE)
+
+
+def test_a_problem_keeps_the_world_in_which_it_was_checked_and_each_that_it_is_given(world):
+    problem = Problem(world, FREE, FREE + 0.1)
+    assert problem.world is world
+    wide = world.with_clearance(0.01)
+    assert problem.with_world(wide).world is wide
+    assert problem.with_world(wide).settings is wide.settings
+
+
+def test_a_problem_with_other_settings_has_another_world_that_shares_its_parts(world):
+    problem = Problem(world, FREE, FREE + 0.1)
+    other = changed(problem, settings=replace(problem.settings, motion_resolution=0.03))
+    assert other.world.motion_resolution == 0.03
+    assert other.world.checks.solids is world.checks.solids
+    assert other.world.checks.checker is world.checks.checker
+    assert copy.copy(problem).world.checks.prover is world.checks.prover
+
+
+def test_path_constraints_of_a_problem_are_settings_of_its_world(world):
+    region = TaskRegion(pin.SE3.Identity(), np.tile([-9.0, 9.0], (6, 1)))
+    problem = Problem(world, FREE, FREE + 0.1, constraints=[region])
+    assert problem.constraints == problem.settings.constraints == problem.world.settings.constraints
+    assert len(problem.constraints) == 1
+    assert Problem(world, FREE, FREE + 0.1).constraints == ()
