@@ -85,7 +85,7 @@ def show(
 def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
     """What is shown, its robot, and why its start is no start, "" if it is one."""
     from rrtik_ompl import Scene, World, list_problems, list_robots, load_problem, load_robot, load_scene
-    from rrtik_ompl.problem_files.problem import load_unchecked
+    from rrtik_ompl.problem_files.problem_values import load_unchecked
     from rrtik_ompl.viewer.subject import Shown
     from rrtik_ompl.world.path_contacts import contacts_along
 

@@ -11,7 +11,8 @@ from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory.limits import RateLimits
-from rrtik_ompl.problem_files.problem import ProblemFile, load_problem, problem_path
+from rrtik_ompl.problem_files.problem import load_problem
+from rrtik_ompl.problem_files.problem_values import ProblemFile, problem_path
 from rrtik_ompl.problem_files.run import RunSection
 from rrtik_ompl.replanning import ReplanRun, ReplanSettings, replan_with
 from rrtik_ompl.replanning.feed import Source

@@ -1,6 +1,8 @@
 """Problem files: every kind of robot, start and goal; writing and reading; errors with file and line; the schema."""
 
 import json
+import subprocess
+import sys
 from copy import deepcopy
 
 import coal
@@ -16,7 +18,8 @@ from rrtik_ompl.description.catalog import list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
 from rrtik_ompl.model.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.model.task_region import TaskRegion
-from rrtik_ompl.problem_files.problem import load_problem, load_unchecked, problem_schema, save_problem
+from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem_values import load_unchecked, problem_schema
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -376,3 +379,15 @@ def test_the_values_of_a_file_are_read_without_asking_coal_or_making_a_world(tmp
     assert (settings.robot.dof, settings.scene.names, settings.clearance) == (3, ("wall",), 0.01)
     assert start.tolist() == [0.0, 0.0, 0.0]
     np.testing.assert_allclose(goal.q, [np.pi / 2, 0.0, 0.0])
+
+
+def test_reading_a_file_loads_neither_kernels_nor_worlds(tmp_path):
+    (tmp_path / "task.yaml").write_text(text(rest=WALL.replace("X", "2.5").replace("Y", "0")))
+    work = f"""
+import sys
+from rrtik_ompl.problem_files.problem_values import load_unchecked
+print(load_unchecked({str(tmp_path / "task.yaml")!r})[0])
+print([name for name in sys.modules if name.startswith(("rrtik_ompl.world", "rrtik_ompl.kernels"))])
+"""
+    told = subprocess.run([sys.executable, "-c", work], check=True, capture_output=True, text=True).stdout
+    assert told.splitlines()[-1] == "[]"

@@ -8,7 +8,8 @@ from rrtik_ompl.description.catalog import find_problem, list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.model.goal import JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.planning.plan import plan
-from rrtik_ompl.problem_files.problem import load_problem, problem_schema, save_problem
+from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem_values import problem_schema
 
 NAMES = [
     *("cut_disc", "cut_polygons", "cut_two_ls", "env_e"),

@@ -10,7 +10,7 @@ from PIL import Image
 import rrtik_ompl as rrtik
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.description.catalog import find_problem
-from rrtik_ompl.problem_files.problem import load_unchecked
+from rrtik_ompl.problem_files.problem_values import load_unchecked
 from rrtik_ompl.viewer import film as module
 from rrtik_ompl.viewer.film import BROWSERS, film
 from rrtik_ompl.viewer.picture import draw

@@ -1,0 +1,129 @@
+"""What a problem file says, as values: settings of a world, start, goal; nothing is asked of a world."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.catalog import find_problem, list_planners, load_robot, robot_from_entry, task_files
+from rrtik_ompl.files.sections import Version, parse, without_null
+from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
+from rrtik_ompl.files.text import file_name
+from rrtik_ompl.model.goal import Goal
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.world_settings import WorldSettings
+from rrtik_ompl.problem_files.goal import GoalSection, StartSection, build_goal
+from rrtik_ompl.problem_files.path_constraints import ConstraintSection
+from rrtik_ompl.problem_files.robot import RobotEntry
+from rrtik_ompl.problem_files.run import RunSection
+from rrtik_ompl.problem_files.scene import SceneEntry
+from rrtik_ompl.problem_files.world import WorldKeys
+
+FilePath = str | os.PathLike[str]
+ONLY_PATHS = (".csv", ".txt")  # endings; a .json may be either
+NO_GOAL = "it has stages and no goal"
+OF_TASKS = {"task": NO_GOAL, "goals": "it has several goals, to be reached in order"}  # by keys
+OF_PATHS = ("waypoints", "points")  # keys of files of paths and of trajectories
+
+
+class ProblemFile(WorldKeys):
+    """A motion planning problem. Lengths in metres; angles in radians, in degrees where a key ends in _deg."""
+
+    version: Version
+    robot: RobotEntry
+    scene: SceneEntry = Field(default=SceneEntry())
+    start: StartSection
+    goal: GoalSection
+    planner: str | None = Field(None, description="planner that is used where none is named (rrtik list planners)")
+    path_constraints: list[ConstraintSection] = Field(
+        default=[], description="regions that a frame of the arm must not leave on the whole path"
+    )
+    run: RunSection | None = Field(None, description="how to replan while the obstacles move (rrtik replan)")
+
+
+def load_unchecked(name_or_file: FilePath) -> tuple[WorldSettings, Vector, Goal]:
+    """What a problem file says, as values: settings of the world, start and goal. No world is asked about them.
+
+    Raises:
+        InputError: As for :func:`load_problem`, but for what only a world can say.
+    """
+    document = problem_document(problem_path(name_or_file))
+    entry = parse(document, ProblemFile)
+    settings = settings_of(document, entry, None)
+    return settings, *ends_of(document, entry, settings.robot)
+
+
+def ends_of(document: YamlDocument, entry: ProblemFile, robot: Robot) -> tuple[Vector, Goal]:
+    """Start, shape (dof,), and goal."""
+    with document.at(("start",)):
+        start = entry.start.configuration(robot)
+    with document.at(("goal",)):
+        return start, build_goal(entry.goal, robot)
+
+
+def settings_of(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath | None) -> WorldSettings:
+    """The settings of its world: of the robot that it names, or of another one."""
+    if robot is None:
+        with document.at(("robot",)):
+            robot = robot_from_entry(document.data["robot"], document.path.parent)
+    elif not isinstance(robot, Robot):
+        robot = load_robot(robot)
+    scene = entry.scene.build(document)
+    with document.at(("scene",)):
+        return entry.settings(robot, scene)
+
+
+def planner_of(document: YamlDocument, name: str | None) -> str | None:
+    """The name of a planner, if there is such a planner."""
+    if name is not None and name.lower() not in list_planners():
+        from rrtik_ompl.ompl_bridge.planner_files import is_planner_file  # loads OMPL, which few files need
+        from rrtik_ompl.ompl_bridge.planner_names import options_of
+
+        with document.at(("planner",)):
+            if is_planner_file(name):
+                raise InputError(f"'{name}': a problem file runs no code; give it with --planner")
+            options_of(name)
+    return name
+
+
+def problem_document(path: Path) -> YamlDocument:
+    """The content of a problem file; whoever names a path alone is told what is missing."""
+    document = None if path.suffix.lower() in ONLY_PATHS and os.path.isfile(path) else read_yaml(path)
+    if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
+        name = path.name
+        raise InputError(f"{path}: a path, not a problem; name its problem before it: rrtik check PROBLEM {name}")
+    if isinstance(document.data, dict) and "goal" not in document.data:
+        for key, what in OF_TASKS.items():
+            if key in document.data:
+                raise InputError(f"{path}: a task, not a problem: {what}; use rrtik task {path.name}")
+    return document
+
+
+def problem_path(name_or_file: FilePath) -> Path:
+    """The file of a problem: a bare word is the name of a shipped one, or a file if there is no such name.
+
+    Raises:
+        UnknownNameError: If it is a bare word, and neither.
+    """
+    path = file_name(name_or_file)
+    if not isinstance(name_or_file, str) or path.suffix or len(path.parts) > 1:
+        return path
+    try:
+        return Path(find_problem(name_or_file))
+    except UnknownNameError:
+        if os.path.isfile(path):
+            return path
+        if name_or_file in task_files():
+            raise InputError(f"'{name_or_file}' is a task, not a problem: {NO_GOAL}; use rrtik task {path}") from None
+        raise
+
+
+def problem_schema() -> dict[str, Any]:
+    """JSON schema of the problem file, made from the same models that check it."""
+    schema = without_null(ProblemFile.model_json_schema())
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
