@@ -14,7 +14,7 @@ from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.model.goal import PoseGoal, PositionGoal
-from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.judgement import Violation
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.ompl_bridge.planner_names import find_planner, list_planners
@@ -128,9 +128,8 @@ def test_a_planner_that_gives_up_early_is_started_again(closed):
 
 def test_a_path_that_the_second_check_rejects_is_never_returned(wall, monkeypatch):
     monkeypatch.setattr("rrtik_ompl.world.proof.library", lambda name: None)  # what is proven needs no more checks
-    monkeypatch.setattr(
-        JointPath, "violations", lambda self, world, **_: (type("V", (), {"edge": 0, "reason": "no"})(),)
-    )
+    refused = (Violation(0, wall.start, "no"),)
+    monkeypatch.setattr("rrtik_ompl.planning.second_check.violations_of", lambda world, rows: refused)
     found = plan(wall, "bicrdt", seconds=5.0, seed=1, restarts=2)
     assert not found.found
     assert found.statistics["rejected"] == 4  # the first attempt begins with a brief one
