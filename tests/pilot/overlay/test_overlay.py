@@ -5,6 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from bench.shared.reference_z_buffer import reference_z_buffer
 from rrtik_ompl import load_robot
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose
@@ -14,7 +15,6 @@ from rrtik_ompl.pilot.overlay import augment
 from rrtik_ompl.pilot.overlay.augment import MAX_LAYERS, Augmenter, Ghost
 from rrtik_ompl.pilot.overlay.canvas import FARTHEST_DRAWN, Canvas
 from rrtik_ompl.pilot.overlay.figure import figure_of, placed
-from rrtik_ompl.pilot.overlay.reference_z_buffer import reference_z_buffer
 from rrtik_ompl.pilot.overlay.surfaces import obstacle_surfaces, robot_surfaces, surface_of_shape
 from rrtik_ompl.pilot.overlay.virtual_camera import background, orbit_pose, pinhole_camera
 from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
@@ -74,7 +74,8 @@ def test_a_half_space_has_no_surface():
 
 
 def test_the_arm_is_drawn_and_hidden_by_what_is_really_there():
-    robot, grey = load_robot("titan4"), np.full((480, 640), 120, np.uint8)
+    robot = load_robot("titan4")
+    grey = np.full((480, 640), 120, np.uint8)
     augmenter = Augmenter(robot, CAMERA)
     q = np.zeros(6)
     plain = augmenter.draw(grey, EYE, q)
@@ -89,9 +90,11 @@ def test_the_arm_is_drawn_and_hidden_by_what_is_really_there():
 
 
 def test_ghosts_trails_and_frames_are_seen_through_and_leave_the_picture_as_it_was():
-    robot, grey = load_robot("ur5"), np.full((480, 640, 3), 120, np.uint8)
+    robot = load_robot("ur5")
+    grey = np.full((480, 640, 3), 120, np.uint8)
     augmenter = Augmenter(robot, CAMERA)
-    q, other = np.zeros(6), np.full(6, 0.4)
+    q = np.zeros(6)
+    other = np.full(6, 0.4)
     ghost = augmenter.draw(grey, EYE, ghosts=[Ghost(other, "#00ff00", 0.5)])
     rows = (ghost != 120).any(axis=2)
     assert rows.sum() > 500
@@ -104,7 +107,8 @@ def test_ghosts_trails_and_frames_are_seen_through_and_leave_the_picture_as_it_w
 
 def test_a_gripper_without_a_configuration_is_drawn_where_the_arm_would_have_it():
     robot = load_robot("titan4")
-    q, blank = robot.posture("ready"), np.zeros((CAMERA.height, CAMERA.width, 3), dtype=np.uint8)
+    q = robot.posture("ready")
+    blank = np.zeros((CAMERA.height, CAMERA.width, 3), dtype=np.uint8)
     drawing = Augmenter(robot, CAMERA, 2000)
     arm = drawing.draw(blank, EYE, ghosts=[Ghost(q, opacity=1.0)]).any(axis=2)
     gripper = drawing.draw(blank, EYE, ghosts=[Ghost(None, opacity=1.0, T_base_tip=robot.fk(q))]).any(axis=2)
@@ -116,13 +120,15 @@ def test_a_gripper_without_a_configuration_is_drawn_where_the_arm_would_have_it(
 
 def test_what_lies_behind_the_camera_is_not_drawn():
     away = pin.SE3(EYE.rotation @ np.diag([-1.0, 1.0, -1.0]), EYE.translation)
-    robot, grey = load_robot("ur5"), np.full((480, 640, 3), 120, np.uint8)
+    robot = load_robot("ur5")
+    grey = np.full((480, 640, 3), 120, np.uint8)
     out = Augmenter(robot, CAMERA).draw(grey, away, np.zeros(6), trail=np.zeros((5, 3)), frames=[pose([0, 0, 0.1])])
     assert (out == 120).all()
 
 
 def test_what_is_kept_from_picture_to_picture_is_what_would_be_drawn_anew():
-    robot, grey = load_robot("titan4"), np.full((480, 640, 3), 120, np.uint8)
+    robot = load_robot("titan4")
+    grey = np.full((480, 640, 3), 120, np.uint8)
     kept = Augmenter(robot, CAMERA)
     with pytest.raises(InputError, match="draw a picture first"):
         kept.depths()
@@ -130,7 +136,8 @@ def test_what_is_kept_from_picture_to_picture_is_what_would_be_drawn_anew():
     for q in postures:
         kept.draw(grey, EYE, q)
     aside = orbit_pose([0.8, 0.0, 0.2], 2.5, np.radians(-60.0), np.radians(25.0))
-    first, last = postures[0], postures[-1]
+    first = postures[0]
+    last = postures[-1]
     for q, eye, color in [(last, EYE, None), (first, EYE, None), (last, aside, None), (last, EYE, "#00ff00")]:
         box = [Obstacle("box", Box([0.3, 0.3, 0.3]), pose([0.6, float(q[0]), 0.2]))]
         new = Augmenter(robot, CAMERA)
@@ -157,8 +164,10 @@ def test_a_picture_of_another_size_is_refused():
 
 
 def test_ghosts_of_large_pictures_are_where_finer_ones_would_be(monkeypatch):
-    camera, robot = pinhole_camera(1280, 720), load_robot("titan4")
-    blank, q = np.zeros((720, 1280, 3), dtype=np.uint8), np.zeros(robot.dof)
+    camera = pinhole_camera(1280, 720)
+    robot = load_robot("titan4")
+    blank = np.zeros((720, 1280, 3), dtype=np.uint8)
+    q = np.zeros(robot.dof)
     coarse = Augmenter(robot, camera).draw(blank, EYE, ghosts=[Ghost(q, opacity=1.0)]).any(axis=2)
     monkeypatch.setattr(augment, "FINE_PIXELS", camera.width * camera.height)
     fine = Augmenter(robot, camera).draw(blank, EYE, ghosts=[Ghost(q, opacity=1.0)]).any(axis=2)

@@ -1,4 +1,4 @@
-"""Reference rasteriser in double precision, one triangle after the other: slow, for tests of the first one."""
+"""Reference rasteriser in double precision, one triangle after the other: slow, and it judges `overlay.canvas`."""
 
 from __future__ import annotations
 
