@@ -22,8 +22,14 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 AXIS = 0.25  # length of the axes that are drawn [m]
 SHOWN = 0.15  # nearer pairs are drawn [m]
 NEAREST_SHOWN = 0.05  # from the camera [m]
-WHITE, BLACK, DOWN, NEAR_COLOR = (255, 255, 255), (0, 0, 0), (200, 200, 80), (80, 90, 255)  # blue, green, red
-TOOL_AXIS, GRASP_AXIS = (233, 180, 86), (80, 200, 60)
+
+# Colours: blue, green, red.
+WHITE = (255, 255, 255)
+BLACK = (0, 0, 0)
+DOWN = (200, 200, 80)
+NEAR_COLOR = (80, 90, 255)
+TOOL_AXIS = (233, 180, 86)
+GRASP_AXIS = (80, 200, 60)
 
 
 class Distances(NamedTuple):
@@ -42,15 +48,16 @@ class Aids:
     """Measures for a session, anew only when something has moved."""
 
     def __init__(self, session: Session) -> None:
-        """Take the session."""
         self._session = session
         self._key: Any = None
         self._found = Distances(None, None)
 
     def distances(self) -> Distances:
         """Of the arm where it is."""
-        session, around = self._session, self._session.surroundings
+        session = self._session
+        around = session.surroundings
         key = (session.q.tobytes(), around.version, session.target)
+
         if key != self._key:
             world = around.world
             frames = world.robot.joint_frames(session.q[None])[0]
@@ -60,12 +67,15 @@ class Aids:
                 for contact in measured(world.bodies, world.pairs, frames, near_only=False)
                 if {contact.first, contact.second} & around_it
             ]
+
             tool = {*gripper_links(session.robot), *(solid.name for solid in around.held_solids(pin.SE3.Identity()))}
             seen = None if session.target is None else around.named(session.target)
             target = set() if seen is None else set(seen.object.solid_names)
             pairs = [c for c in every if {c.first, c.second} & tool and {c.first, c.second} & target]
+
             least = [min(found, key=lambda c: c.distance, default=None) for found in (every, pairs)]
-            self._key, self._found = key, Distances(*least)
+            self._key = key
+            self._found = Distances(*least)
         return self._found
 
     def document(self) -> dict[str, Any]:
@@ -87,9 +97,11 @@ def draw_aids(
     if distances.nearest is not None and 0.0 < distances.nearest.distance < SHOWN:
         gap = distances.nearest
         view.line(gap.point_first, gap.point_second, NEAR_COLOR, f"{1e3 * gap.distance:.0f} mm")
+
     seen = None if session.target is None else session.surroundings.named(session.target)
     if seen is None:
         return
+
     tip = session.robot.fk(session.q)
     at = tip.translation
     if session.state.choice is not None:
@@ -98,6 +110,7 @@ def draw_aids(
         view.line(goal.translation - AXIS * goal.rotation[:, 2], goal.translation, GRASP_AXIS)
     else:
         goal = seen.T_base_object
+
     there = goal.translation
     view.line(at, np.array([at[0], at[1], there[2]]), DOWN)
     view.line(at, there, WHITE, f"{float(np.linalg.norm(there - at)):.3f} m")
@@ -107,22 +120,27 @@ class _View:
     """A picture that lines are drawn into."""
 
     def __init__(self, drawn: NDArray[np.uint8], camera: Camera, T_base_camera: pin.SE3) -> None:
-        self._drawn, self._camera, self._T = drawn, camera, T_base_camera
+        self._drawn = drawn
+        self._camera = camera
+        self._T = T_base_camera
 
     def line(self, begin: Vector, end: Vector, color: tuple[int, int, int], text: str = "") -> None:
         """A line with a dark outline, and a text beside its middle; nothing if it comes behind the camera."""
         points = np.stack([begin, end]) @ self._T.rotation - self._T.rotation.T @ self._T.translation
         if (points[:, 2] < NEAREST_SHOWN).any():
             return
+
         a, b = (tuple(int(v) for v in np.clip(pixel, -4000, 4000)) for pixel in self._camera.project(points))
         cv2.line(self._drawn, a, b, BLACK, 4, cv2.LINE_AA)
         cv2.line(self._drawn, a, b, color, 2, cv2.LINE_AA)
+
         if text:
             self._write(text, ((a[0] + b[0]) // 2 - 30, (a[1] + b[1]) // 2 + 26))
 
     def _write(self, text: str, left_foot: tuple[int, int]) -> None:
         """Light text on a dark plate: legible on any background."""
-        font, (x, y) = (cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1), left_foot
+        font = (cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
+        x, y = left_foot
         (width, height), below = cv2.getTextSize(text, *font)
         cv2.rectangle(self._drawn, (x - 4, y - height - 4), (x + width + 4, y + below), (28, 21, 15), cv2.FILLED)
         cv2.putText(self._drawn, text, left_foot, font[0], font[1], WHITE, font[2], cv2.LINE_AA)

@@ -10,7 +10,8 @@ import numpy as np
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.messages import quoted
 
-MAX_NUMBER, MAX_WORD_LENGTH = 1e6, 100  # a number, and a word, that a command may hold
+MAX_NUMBER = 1e6  # that a command may hold
+MAX_WORD_LENGTH = 100  # of a word in a command
 
 
 def number(value: object, name: str) -> float:
@@ -41,6 +42,7 @@ def fitting(act: Callable[..., object], name: str, arguments: Mapping[str, objec
         given = ", ".join(arguments)[:MAX_WORD_LENGTH] or "none"
         takes = ", ".join(each.name for each in wanted) or "no arguments"
         raise InputError(f"{name} takes {takes}, got {given}")
+
     words = {each.name for each in wanted if each.annotation in (str, "str")}
     return {each: _value(f"{name}: {each}", each in words, value) for each, value in arguments.items()}
 

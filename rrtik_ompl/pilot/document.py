@@ -50,16 +50,23 @@ def state_document(session: Session) -> dict[str, Any]:
 
 
 def _joints(session: Session) -> list[dict[str, Any]]:
-    robot, found = session.robot, []
+    robot = session.robot
+    found = []
     for k, name in enumerate(robot.joint_names):
         unit = joint_unit(robot.prismatic[k])
         value, shown = reading(float(session.q[k]), unit)
-        low, high = float(robot.lower[k]), float(robot.upper[k])
+        low = float(robot.lower[k])
+        high = float(robot.upper[k])
         endless = not np.isfinite(low) or not np.isfinite(high)
-        found.append({
-            "name": name, "value": value, "desired": reading(float(session.state.desired[k]), unit)[0], "unit": shown,
-            "lower": None if endless else reading(low, unit)[0], "upper": None if endless else reading(high, unit)[0],
-        })  # fmt: skip
+        joint = {
+            "name": name,
+            "value": value,
+            "desired": reading(float(session.state.desired[k]), unit)[0],
+            "unit": shown,
+            "lower": None if endless else reading(low, unit)[0],
+            "upper": None if endless else reading(high, unit)[0],
+        }
+        found.append(joint)
     return found
 
 
@@ -74,7 +81,8 @@ def _object(seen: SeenObject, unseen: float) -> dict[str, Any]:
 
 def _joint_range(session: Session) -> dict[str, Any]:
     """The range of the selected joint, what ends it, and where in it the arm is near a singular posture."""
-    unit, free = joint_unit(session.robot.prismatic[session.state.selected]), session.joint_range()
+    unit = joint_unit(session.robot.prismatic[session.state.selected])
+    free = session.joint_range()
     low, high = (reading(end, unit)[0] for end in (free.low, free.high))
     singular = [[reading(a, unit)[0], reading(b, unit)[0], case] for a, b, case in free.singular]
     return {"low": low, "high": high, "below": free.below, "above": free.above, "singular": singular}
@@ -87,11 +95,14 @@ def _aim(session: Session) -> dict[str, Any]:
     seen = None if session.target is None else session.surroundings.named(session.target)
     if seen is None:
         return found
+
     choice = session.state.choice
     goal = seen.T_base_object if choice is None else seen.grasp_pose(*choice)
+
     offset = goal.translation - tip.translation
     ahead = float(offset @ tip.rotation[:, 2])
     aside = float(np.linalg.norm(offset - ahead * tip.rotation[:, 2]))
+
     return found | {
         "to": seen.object.name if choice is None else f"{choice[0]} {choice[1] + 1}",
         "distance": round(float(np.linalg.norm(offset)), 4),
@@ -103,16 +114,27 @@ def _aim(session: Session) -> dict[str, Any]:
 
 
 def _route(session: Session) -> dict[str, Any] | None:
-    route, follower = session.route, session.follower
+    route = session.route
+    follower = session.follower
     if route is None or follower is None:
         return None
+
     if route.together:
         share = 0.0 if session.progress is None else session.progress.share
         done = "done" if follower.current else "current"
-        moves = [{"joint": "all joints", "from": 0.0, "to": share, "unit": "", "text": "all joints at once",
-                  "status": done, "at": 1.0}]  # fmt: skip
+        whole = {
+            "joint": "all joints",
+            "from": 0.0,
+            "to": share,
+            "unit": "",
+            "text": "all joints at once",
+            "status": done,
+            "at": 1.0,
+        }
+        moves = [whole]
     else:
         moves = _moves(follower)
+
     progress = session.progress
     return {
         "moves": moves,
@@ -134,8 +156,17 @@ def _moves(follower: Follower | Track) -> list[dict[str, Any]]:
     ends = np.cumsum([abs(move.change) for move in follower.moves])
     moves: list[dict[str, Any]] = []
     for number, (move, text) in enumerate(zip(follower.moves, words, strict=True)):
-        (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
+        start, unit = reading(move.start, move.unit)
+        end, _ = reading(move.end, move.unit)
         status = "done" if number < follower.current else "current" if number == follower.current else "ahead"
-        moves.append({"joint": move.joint, "from": start, "to": end, "unit": unit, "text": text, "status": status,
-                      "at": float(ends[number] / ends[-1])})  # fmt: skip
+        shown = {
+            "joint": move.joint,
+            "from": start,
+            "to": end,
+            "unit": unit,
+            "text": text,
+            "status": status,
+            "at": float(ends[number] / ends[-1]),
+        }
+        moves.append(shown)
     return moves

@@ -33,7 +33,7 @@ class Simulated(Protocol):
     """What has a simulated time."""
 
     def advance(self, seconds: float) -> None:
-        """Advance it."""
+        """Let so much of it pass [s]."""
 
 
 class Engine:
@@ -57,10 +57,13 @@ class Engine:
             further: Cameras that may be looked through in place of the view from outside, by name.
             pictures: Where the pictures are recorded.
         """
-        self.session, self.perception, self._simulated = session, perception, simulated
+        self.session = session
+        self.perception = perception
+        self._simulated = simulated
         self._camera_view = CameraView(perception.camera, session)
         self.outside = OutsideView(session)
-        self._further, self._through = dict(further or {}), ""  # and the one that is looked through
+        self._further = dict(further or {})
+        self._through = ""  # the one of them that is looked through
         self._pictures = pictures
         self._advanced = 0.0
         self._drawn: tuple[Hashable, ...] = ()
@@ -74,14 +77,17 @@ class Engine:
             sight: What the pilot's page had shown; None without a page.
         """
         self._advance(time)
+
         arguments = dict(command)
         name = quoted(arguments.pop("name", ""))
         if "object" in arguments:  # which one, for "name" is that of the command
             arguments["name"] = arguments.pop("object")
+
         if name not in VIEW_COMMANDS:
             self.session.command(name, time, sight, **arguments)
             self._return_to_now()
             return
+
         try:
             self._change_view(name, arguments)
         except InputError as error:
@@ -117,22 +123,21 @@ class Engine:
 
     def camera_picture(self) -> bytes:
         """The picture of the camera with the arm, the route and the chosen grasp drawn over it; JPEG."""
-        if self.perception.T_base_camera is None:
-            return _jpeg(self.perception.picture)
-        return _jpeg(
-            self._camera_view.draw(
-                self.perception.picture, self.perception.T_base_camera, self.perception.arm_in_picture
-            )
-        )
+        seen = self.perception
+        if seen.T_base_camera is None:
+            return _jpeg(seen.picture)
+        return _jpeg(self._camera_view.draw(seen.picture, seen.T_base_camera, seen.arm_in_picture))
 
     def outside_picture(self, anew: bool = False) -> bytes | None:
         """The view from outside, JPEG; None if it would be the same as last time and ``anew`` is false."""
         if self._through:
             picture = self._further[self._through].picture()
             return None if picture is None else _jpeg(picture)
+
         key = self.outside.key()
         if key == self._drawn and not anew:
             return None
+
         self._drawn = key
         return _jpeg(self.outside.draw())
 
@@ -144,6 +149,7 @@ class Engine:
     def _advance(self, time: float) -> None:
         for each in self._simulated:
             each.advance(max(time - self._advanced, 0.0))
+
         self._advanced = max(time, self._advanced)
         self.session.tick(time)
         self._return_to_now()
@@ -152,6 +158,7 @@ class Engine:
         wanted = VIEW_COMMANDS[name]
         if set(given) != set(wanted):
             raise InputError(f"{name} takes {', '.join(wanted)}")
+
         if name == "turn":
             self.outside.turn(number(given["right"], "right"), number(given["up"], "up"))
         elif name == "zoom":
@@ -160,7 +167,8 @@ class Engine:
             view = quoted(given["view"])
             if view not in (*PRESETS, *self._further):
                 raise UnknownNameError("view", view, (*PRESETS, *self._further))
-            self._through, self._drawn = (view if view in self._further else ""), ()
+            self._through = view if view in self._further else ""
+            self._drawn = ()
             self.outside.preset(view)
         else:
             self.outside.share = None if given["share"] is None else number(given["share"], "share")

@@ -20,7 +20,6 @@ class FeasibilityCache:
     """What the arm can do from its configuration in some surroundings; the last results are kept."""
 
     def __init__(self) -> None:
-        """Begin empty."""
         self._lamps: tuple[Hashable, tuple[Lamp, ...]] = ((), ())
         self._fault: tuple[Hashable, str] = ((), "")
         self._range: tuple[Hashable, JointRange | None] = ((), None)
@@ -30,6 +29,7 @@ class FeasibilityCache:
         seen = None if target is None else around.named(target)
         if seen is None:
             return ()
+
         key = (target, around, around.world_at(q, target).valid(q))
         if key != self._lamps[0]:
             holding = around.holding(seen.object.name)
@@ -44,11 +44,13 @@ class FeasibilityCache:
         seen = None if target is None else around.named(target)
         if lamp is None or seen is None or len(lamp.grasps) or has_closed_form(around.world.robot):
             return lamp
-        holding, key = around.holding(seen.object.name), self._lamps[0]
-        again = lamps(
-            around.world, seen.object, seen.T_base_object, q, holding=holding, seconds=PATIENT_SECONDS
-        )  # fmt: skip
-        self._lamps, self._fault = (key, again), ((), "")
+
+        holding = around.holding(seen.object.name)
+        key = self._lamps[0]
+        again = lamps(around.world, seen.object, seen.T_base_object, q, holding=holding, seconds=PATIENT_SECONDS)
+
+        self._lamps = (key, again)
+        self._fault = ((), "")
         return self._lamp(around, target, choice, q)
 
     def _lamp(self, around: Surroundings, target: str | None, choice: tuple[str, int] | None, q: Vector) -> Lamp | None:
@@ -59,6 +61,7 @@ class FeasibilityCache:
         seen = around.named(target)
         if seen is None or lamp.stage is None:
             return ""
+
         key = (self._lamps[0], lamp.type, lamp.level)
         if key != self._fault[0]:
             worlds = around.world, around.holding(target)

@@ -56,6 +56,7 @@ def _planned(means: Means, state: State, found: Route | NoRoute) -> State:
         advice = escape_advice(world_by_hand(left), left.q) or otherwise
         return left.say(refused(f"no route: {grasp_fault(means, left) or found}; {advice}"))
     aimed = state.around.named(state.target) if state.target and state.choice else None
+
     made = proposed(means, state, found, aimed)
     if aimed is None:
         return made
@@ -73,6 +74,7 @@ def proposed(means: Means, state: State, route: Route, aimed: SeenObject | None 
     """
     kind = Track if route.together else Follower
     list_of_moves = state.way.list_of_moves if route.together else route
+
     way = Way(route, kind(route.path, means.rates), list_of_moves=list_of_moves, aimed=aimed)
     made = replace(state, way=way, mode=PROPOSED, desired=frozen(route.path.end))
     return made.say(news(route.summary() + "; 'accept' or 'reject'"))
@@ -80,11 +82,14 @@ def proposed(means: Means, state: State, route: Route, aimed: SeenObject | None 
 
 def together(means: Means, state: State) -> State:
     """Propose the same route with all joints at once, or the list of moves again."""
-    route, list_of_moves = state.way.route, state.way.list_of_moves
+    route = state.way.route
+    list_of_moves = state.way.list_of_moves
     if route is None or list_of_moves is None:
         raise InputError("there is no route; 'plan' proposes one")
+
     if route.together:
         return proposed(means, state, list_of_moves, state.way.aimed)
+
     search = partial(track.together, route, world_by_hand(state), means.rates, means.seed)
     return state.do(FindRoute(search, _put_together))
 
@@ -99,19 +104,22 @@ def accept(_: Means, state: State) -> State:
     """Follow the route that is proposed."""
     if state.way.follower is None:
         raise InputError("there is no route to accept; 'plan' proposes one")
+
     follower, progress = state.way.follower.update(state.q)
     here = state.on_its_way(follower=follower)
     if progress.advice == "lost":
         away = f"the arm is not where the route starts: {progress.fault}"
         return here.say(refused(f"{away}; 'replan' starts it from here"))
+
     if fault := fault_of_rest(here):
         return withdrawn(here, fault)
+
     accepted = replace(here.on_its_way(progress=progress, withdrawn=""), mode=FOLLOWING)
     return show_due(accepted).say(news("accepted; hold 'next' to make the next move"))
 
 
 def reject(_: Means, state: State) -> State:
-    """Leave the route."""
+    """Leave the route that is proposed or followed."""
     return replace(leave(state.do(Stop())), desired=state.q).say(news("rejected"))
 
 
@@ -119,9 +127,11 @@ def back(means: Means, state: State) -> State:
     """Propose the way back: the moves that were made, reversed."""
     if state.way.follower is None:
         raise InputError("there is no route to go back on")
+
     reverse = type(state.way.follower)(state.way.follower.back(state.q), means.rates)
     moves = len(reverse.moves)
     how = f"{moves} moves" if moves else "all joints at once"
+
     made = state.do(Stop()).on_its_way(follower=reverse, progress=None, withdrawn="", aimed=None)
     return replace(made, mode=PROPOSED).say(news(f"the way back: {how}; 'accept' or 'reject'"))
 
@@ -131,8 +141,10 @@ def settle(_: Means, state: State) -> State:
     due = state.way.follower
     if due is None or due.joint() is None:
         raise InputError("no move is due")
+
     passed, joint, left = due.pass_on(state.q)
     follower, progress = passed.update(state.q)
+
     after = show_due(state.on_its_way(follower=follower, progress=progress))
     return after.say(refused(f"{joint} comes no nearer than {left} to its end; release, then hold 'next' again"))
 
@@ -145,8 +157,10 @@ def watch(means: Means, state: State) -> State:
     due = state.way.follower
     if due is None or state.mode != FOLLOWING:
         return state
+
     follower, progress = due.update(state.q)
     after = state.on_its_way(follower=follower, progress=progress)
+
     if progress.advice == "lost":
         lost = after.stand_still()
         return lost.say(alarm(f"off the route: {progress.fault}; 'replan' finds a new one from here"))
@@ -154,6 +168,7 @@ def watch(means: Means, state: State) -> State:
         return after if after.drive.active else _ended(means.robot, after, follower)
     if follower.current == due.current:
         return after
+
     done = f"move {follower.current} of {len(follower.moves)} is done; 'next' makes the next"
     return show_due(after).say(news(done))
 
@@ -161,9 +176,11 @@ def watch(means: Means, state: State) -> State:
 def _ended(robot: Robot, state: State, follower: Follower | Track) -> State:
     """All moves are made: whether the tip is where the route ends."""
     ended = replace(state, mode=MANOEUVRE)
+
     away, turned = apart(robot.fk(follower.path.end), robot.fk(state.q))
     if away <= MAX_END_OFFSET and turned <= MAX_END_TURN:
         return ended.say(news(MADE))
+
     far = f"{1e3 * away:.1f} mm and {np.rad2deg(turned):.2f} deg"
     missed = f"all moves are made, but the tip is {far} away from the end of the route; 'replan' may go nearer"
     return ended.say(refused(missed))
@@ -173,10 +190,12 @@ def check(state: State) -> State:
     """After a change of the scene: a route that is not free any more is withdrawn."""
     if state.way.follower is None or state.mode not in (FOLLOWING, PROPOSED):
         return state
+
     fault = fault_of_rest(state)
     if fault:
         stopped = replace(state.stand_still().on_its_way(withdrawn=fault), mode=PROPOSED)
         return stopped.say(alarm(WITHDRAWN.format(fault)))
+
     if not state.way.withdrawn:
         return state
     return state.on_its_way(withdrawn="").say(news("the route is free again; 'accept' follows it"))
@@ -195,6 +214,7 @@ def over(state: State, verb: str) -> str:
 def show_due(state: State) -> State:
     """Select the joint of the current move; its end is the desired value."""
     follower = state.way.follower
+
     joint = None if follower is None else follower.joint()
     if follower is None or joint is None:
         return state
@@ -213,7 +233,8 @@ def fault_of_rest(state: State) -> str:
         return ""
     if moved := _target_moved(state):
         return moved
-    around, target = state.around, state.target
+    around = state.around
+    target = state.target
     grasping = target is not None and state.choice is not None and around.named(target) is not None
     world = around.holding(str(target)) if grasping else world_by_hand(state)
     return path_fault(world, state.way.follower.rest(state.q))
@@ -225,15 +246,17 @@ def _target_moved(state: State) -> str:
     now = None if aimed is None else state.around.named(aimed.object.name)
     if aimed is None or now is None:
         return ""
+
     away, turned = apart(aimed.T_base_object, now.T_base_object)
     if away <= MAX_SHIFT and turned <= MAX_TURN:
         return ""
+
     far = f"{1e3 * away:.0f} mm and {np.rad2deg(turned):.1f} deg"
     return f"{aimed.object.name} has moved by {far} since the route was planned"
 
 
 def leave(state: State) -> State:
-    """Forget the route."""
+    """Forget the route; a grasp stays chosen."""
     return replace(state, way=Way(), mode=CHOOSING if state.choice else MANOEUVRE)
 
 

@@ -14,7 +14,10 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from rrtik_ompl.pilot.state import State
 
-MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING = "manoeuvre", "choosing", "proposed", "following"
+MANOEUVRE = "manoeuvre"
+CHOOSING = "choosing"
+PROPOSED = "proposed"
+FOLLOWING = "following"
 MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
 STALE_SECONDS = 0.5  # a picture older than that does not show the present
 UNSEEN_SECONDS = 2.0  # what has been out of view for longer is no basis of a route, where the vehicle moves
@@ -125,6 +128,7 @@ def refusal(verb: Verb, mode: str, known: Knowledge) -> str:
     """
     if mode not in verb.modes:
         return verb.otherwise
+
     if verb.present and known.trouble:
         return f"refused: {known.trouble}" + (f"; {ACKNOWLEDGE}" if known.trouble == known.fault else "")
     if verb.guided and known.unseen:

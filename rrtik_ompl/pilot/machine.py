@@ -122,7 +122,8 @@ def _executed(means: Means, state: State, event: Command, renewed: bool) -> Stat
 
 
 def _select(means: Means, state: State, joint: float) -> State:
-    robot, number = means.robot, int(joint)
+    robot = means.robot
+    number = int(joint)
     if not 0 <= number < robot.dof:
         raise InputError(f"joint must be 1 to {robot.dof}, got {number + 1}")
     return replace(state, selected=number).say(news(f"{robot.joint_names[number]} selected"))
@@ -131,6 +132,7 @@ def _select(means: Means, state: State, joint: float) -> State:
 def _object(_: Means, state: State, name: str) -> State:
     if state.around.named(name) is None:
         raise UnknownNameError("object in view", name, [each.object.name for each in state.around.seen])
+
     chosen = replace(state, target=name, choice=None, mode=CHOOSING)
     return chosen.say(news(f"{name} chosen; now a grasp"))
 
@@ -138,6 +140,7 @@ def _object(_: Means, state: State, name: str) -> State:
 def _grasp(means: Means, state: State, type: str, level: float) -> State:
     state.around.check_grasp(state.target, type, int(level))
     chosen = replace(state, choice=(type, int(level)), mode=CHOOSING)
+
     fault = grasp_fault(means, chosen)
     place = f"{type} at level {int(level) + 1}"
     return chosen.say(refused(f"{place}: {fault}") if fault else news(f"{place}: can be reached"))
@@ -188,13 +191,16 @@ def _seen(_: Means, state: State, event: Seen) -> State:
     if state.holds:
         at[state.holds] = event.time  # it is where the arm is
     now = replace(state, time=max(state.time, event.time), pictures=Pictures(event.time, "", at))
+
     around = state.around.see(event.objects)
     if around is state.around:
         return now
+
     target = state.target
     if target is None:
         graspable = (each.object for each in event.objects if each.object.role == "target" and each.object.grasps)
         target = next((each.name for each in graspable), None)
+
     changed = replace(now, around=around, target=target)
     return _check_motion(changed.do(Write("seen", event.time, {"objects": around.places()})))
 
@@ -218,14 +224,16 @@ def _measured(means: Means, state: State, event: Measured) -> State:
         now = now.do(Write("joints", event.time, {"q": now.q.tolist()}))
         around = now.around.settle(now.q)
         now = now if around is now.around else _check_motion(replace(now, around=around))
+
     now = replace(now, check=now.check.read(now.q, event.time))
     now, expired = held.expire(now)
-    return now if means.recorded else now.say(expired)
+    return now if means.recorded else now.say(expired)  # of a record it was said when it was made
 
 
 def _judged(means: Means, state: State, event: Judged) -> State:
     """The arm stops where it errs, or the present is not known any more; else its progress is noted."""
     state = replace(held.watch(means, state, event.standing), fault=event.fault)
+
     state = _watch(means, state)
     state = _watch_view(means, state)
     return guide.watch(means, state)
@@ -236,13 +244,16 @@ def _watch(means: Means, state: State) -> State:
     trouble = known(means, state).trouble
     if trouble == state.trouble:
         return state
+
     named = trouble == state.fault
     how = f"; {ACKNOWLEDGE}" if named else ""
     now = replace(state, trouble=trouble, fault_at=state.time if named else state.fault_at)
+
     if not trouble:
         return now.say(news("picture and arm are known again; the arm stands still"))
     if state.mode != FOLLOWING and not state.drive.active:
         return now.do(Stop()).say(alarm(trouble + how))
+
     stopped, said = _end_motion(now)
     return _write_stop(stopped).say(alarm(f"{trouble}: {said}{how}"))
 
@@ -255,8 +266,10 @@ def _watch_view(means: Means, state: State) -> State:
         return now
     if not unseen:
         return now.say(news("all that routes stand on is in view"))
+
     if state.mode != FOLLOWING:
         return now.say(alarm(f"{unseen}: no route is led past it, and by hand it may be elsewhere"))
+
     stopped, said = _end_motion(now)
     return _write_stop(stopped).say(alarm(f"{unseen}: {said}"))
 

@@ -62,14 +62,16 @@ class LivePerception:
 
     def __init__(self, sensor: Sensor, source: PictureSource, *, arm_in_picture: bool = False) -> None:
         """Take the parts; see `Perception`."""
-        self.camera, self.arm_in_picture = sensor.camera, arm_in_picture
+        self.camera = sensor.camera
+        self.arm_in_picture = arm_in_picture
         self.picture = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
         self.T_base_camera: pin.SE3 | None = sensor.marker_map.T_base_camera
         self.others: tuple[NDArray[np.uint8], ...] = ()
         self.lost = self.hint = ""
         self._explain_again = -np.inf
         self._last: Picture | None = None
-        self._sensor, self.source = sensor, source
+        self._sensor = sensor
+        self.source = source
 
     def update(self, session: Session, time: float) -> None:
         """Process the newest picture, and give the objects in it to the session."""
@@ -85,23 +87,30 @@ class LivePerception:
         except RrtikError as error:
             self.lost = str(error)
             if self.lost != ENDED:  # the last picture of a film was a good one
-                session.see_no_use(self.lost)
+                session.see_unusable(self.lost)
             return
-        self.lost, self.picture = "", taken.pixels
+
+        self.lost = ""
+        self.picture = taken.pixels
         self.others = tuple(each.pixels for each in taken.others)
         session.see(view.placed, time)
+
         if tip := tip_seen(self._sensor.marker_map, view.seen):
             session.see_arm(*tip, time)
+
         self.hint = self._why_nothing(view, time, known=bool(session.surroundings.seen))
         if not view.why_not_placed:
             self.T_base_camera, _ = base_from_camera(self._sensor.marker_map, view.seen)
 
     def _frozen(self, taken: Picture) -> bool:
         """Whether a picture, or that of another camera of the rig, is the last one again: it shows no present."""
-        before, self._last = self._last, taken
+        before = self._last
+        self._last = taken
         if before is None or len(before.others) != len(taken.others):
             return False
-        now, then = (taken, *taken.others), (before, *before.others)
+
+        now = (taken, *taken.others)
+        then = (before, *before.others)
         return any(each.repeats(last) for each, last in zip(now, then, strict=True))
 
     def close(self) -> None:
@@ -132,7 +141,6 @@ class CameraOfRig:
     """The second camera of a rig, whose pictures are sensed with those of the first."""
 
     def __init__(self, perception: LivePerception) -> None:
-        """Take what senses them."""
         self._perception = perception
 
     def picture(self) -> NDArray[np.uint8] | None:
@@ -153,8 +161,11 @@ class SimulatedSource:
 
     def __init__(self, camera: SimulatedCamera, arm: Arm, motion: BaseMotion | None = None) -> None:
         """Take camera and arm, and how their base moves."""
-        self.camera, self.arm, self._motion = camera, arm, motion
-        self._count, self._time = 0, 0.0
+        self.camera = camera
+        self.arm = arm
+        self._motion = motion
+        self._count = 0
+        self._time = 0.0
         self._was_closed = False
         self._carried: tuple[str, pin.SE3] | None = None  # an object that the gripper has taken, and T_tip_object
 
@@ -171,15 +182,18 @@ class SimulatedSource:
         q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
         if isinstance(arm, SimulatedArm):
             self._carry(arm, arm.robot.fk(q))
+
         tip = self.camera.T_start_base * self.camera.robot.fk(q)
         on_arm = {each.name: tip for each in self.camera.marker_map.objects if each.role == "arm"}
         if on_arm:
             self.camera.places = {**self.camera.places, **on_arm}
+
         return self.camera.picture(q, float(self._count))
 
     def _carry(self, arm: SimulatedArm, T_base_tip: pin.SE3) -> None:
         """Objects that can be carried move with a closed gripper, if it was closed where they can be grasped."""
-        tip, camera = self.camera.T_start_base * T_base_tip, self.camera
+        tip = self.camera.T_start_base * T_base_tip
+        camera = self.camera
         if arm.closed and not self._was_closed:
             near = [
                 (float(np.linalg.norm(tip.actInv(camera.places[thing.name] * level).translation)), thing.name)
@@ -188,11 +202,14 @@ class SimulatedSource:
                 for grasp in thing.grasps
                 for level in grasp.levels
             ]
+
             if near and min(near)[0] <= FINGERS:
                 name = min(near)[1]
                 self._carried = (name, tip.actInv(camera.places[name]))
+
         if self._carried is not None:
             camera.places = {**camera.places, self._carried[0]: tip * self._carried[1]}
+
         if not arm.closed:  # it was laid where the gripper has opened
             self._carried = None
         self._was_closed = arm.closed

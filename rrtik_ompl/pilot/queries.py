@@ -54,6 +54,7 @@ def world_by_hand(state: State) -> World:
 def lamps(means: Means, state: State) -> tuple[Lamp, ...]:
     """Lamps of the chosen object where it is and for where the arm is; none is green if no route can be led."""
     found = means.feasibility.lamps(state.around, state.target, state.q)
+
     unseen = out_of_view(means, state)
     if not unseen:
         return found

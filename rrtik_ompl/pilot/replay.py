@@ -28,7 +28,8 @@ class RecordedArm:
 
     def __init__(self, robot: Robot, start: Vector) -> None:
         """Begin at a configuration, shape (dof,)."""
-        self.robot, self.lost = robot, ""
+        self.robot = robot
+        self.lost = ""
         self.q = robot.configuration(start, "start")
 
     def read(self) -> Vector:
@@ -69,8 +70,13 @@ class RecordedPerception:
             pictures: That were recorded too; else the scene is drawn.
         """
         self._structure = structure
-        self._entries, self._arm, self._world, self._next = entries, arm, world, 0
-        self.camera, self.T_base_camera, self.arm_in_picture = world.camera, world.T_base_camera, True
+        self._entries = entries
+        self._arm = arm
+        self._world = world
+        self._next = 0
+        self.camera = world.camera
+        self.T_base_camera = world.T_base_camera
+        self.arm_in_picture = True
         self.picture: NDArray[np.uint8] = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
         self.lost = self.hint = ""
         self._pictures = pictures
@@ -121,15 +127,17 @@ def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker
         InputError: If the file cannot be read, belongs to another problem, or an entry does not fit.
     """
     entries = list(read_record(path))
-    begin = next((entry for entry in entries if entry["kind"] == "begin"), {})
+    begin = _begin(entries)
     if begin.get("problem", problem) != problem:
         raise InputError(f"{path}: is a record of the problem '{begin['problem']}', not of '{problem}'")
+
     for count, entry in enumerate(entries, start=1):
         try:
             _check(entry, robot, marker_map)
         except (KeyError, TypeError, ValueError, InputError) as error:
             why = f"lacks {error}" if isinstance(error, KeyError) else str(error)
             raise InputError(f"{path}:{count}: a line '{str(entry['kind'])[:20]}' that does not fit: {why}") from None
+
     if not begin:
         raise InputError(f"{path}: holds no line 'begin'; give a record of rrtik pilot")
     return entries
@@ -137,8 +145,13 @@ def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker
 
 def start_of(entries: list[Entry], usual: Vector) -> tuple[Vector, int]:
     """Where the arm stood when a record began, and the seed of its random numbers."""
-    begin = next((entry for entry in entries if entry["kind"] == "begin"), {})
+    begin = _begin(entries)
     return np.asarray(begin.get("q", usual)), int(begin.get("seed", 0))
+
+
+def _begin(entries: list[Entry]) -> Entry:
+    """The line that a record begins with; an empty one if it has none."""
+    return next((entry for entry in entries if entry["kind"] == "begin"), {})
 
 
 def _check(entry: Entry, robot: Robot, marker_map: MarkerMap) -> None:
@@ -159,6 +172,7 @@ def _check(entry: Entry, robot: Robot, marker_map: MarkerMap) -> None:
 
 def _seen(marker_map: MarkerMap, entry: Entry) -> SeenObject:
     thing = marker_map.named(entry["name"])
-    xyz, turn = finite_array(entry["xyz"], (3,), "xyz"), finite_array(entry["rotation"], (3, 3), "rotation")
+    xyz = finite_array(entry["xyz"], (3,), "xyz")
+    turn = finite_array(entry["rotation"], (3, 3), "rotation")
     spread = finite_array(entry.get("covariance", np.zeros((6, 6))), (6, 6), "covariance")
     return SeenObject(thing, pin.SE3(turn, xyz), spread, None, entry.get("sigmas", SIGMAS))

@@ -20,7 +20,8 @@ from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.world.motion_queries import Stop, no_stop
 
 PERIOD_SECONDS = 1.0 / 32.0  # a little less than a camera's, so that none of its pictures is left out
-CAMERA, OUTSIDE = "C", "O"
+CAMERA = "C"  # kinds of pictures, see `web.server`
+OUTSIDE = "O"
 MAX_SEQUENCE = 2**53  # the largest number that a page counts to
 
 Sent: TypeAlias = tuple[int, dict[str, Any]]  # number of a page, and its command
@@ -49,11 +50,14 @@ class Loop:
             server: Of the page.
             watch_only: Execute only commands that concern the view, and "pause": for a record.
         """
-        self._engine, self._server, self._watch_only = engine, server, watch_only
+        self._engine = engine
+        self._server = server
+        self._watch_only = watch_only
         self._answered: dict[int, int] = {}
         self._begin = clock.monotonic()
         self._paused_at: float | None = None
-        self._audience, self._outside_too = 0, False
+        self._audience = 0
+        self._outside_too = False
         self.reported = self._begin
         self.fault: Callable[[], str] = str
 
@@ -72,21 +76,27 @@ class Loop:
                 self._execute_one(left)
 
     def _step(self) -> None:
-        engine, server = self._engine, self._server
+        engine = self._engine
+        server = self._server
         self.reported = clock.monotonic()
         engine.update(self.time)
         if fault := self.fault():
             engine.session.say(alarm(fault))
         self._show_state()
         self._execute_all()
-        audience, self._audience = self._audience, len(server.clients)
+
+        audience = self._audience
+        self._audience = len(server.clients)
         if not self._audience:
             return
+
         server.show_frame(CAMERA, engine.session.state.pictures.time, engine.camera_picture())
         self._execute_all()
+
         self._outside_too = not self._outside_too
         if not self._outside_too and self._audience == audience:
             return  # every second time is enough for the outside view
+
         outside = engine.outside_picture(anew=self._audience != audience)
         if outside is not None:
             server.show_frame(OUTSIDE, self.time, outside)
@@ -110,10 +120,12 @@ class Loop:
             client, command = commands.get(block=patience > 0.0, timeout=patience or None)
         except queue.Empty:  # a stop has left out what waited
             return
+
         with commands.mutex:
             after = commands.queue[0] if commands.queue else None
         if after is not None and _renews(after, (client, command)):
             return
+
         sequence = command.pop("seq", None)
         sight = Sight(self._age(command.pop("seen", None)), self._age(command.pop("picture", None)))
         try:
@@ -122,6 +134,7 @@ class Loop:
             self._engine.session.stand_still()
             what = f"'{quoted(command.get('name'))}' broke: {quoted(error) or type(error).__name__}"
             self._engine.session.say(alarm(f"{what}; the arm was stopped"))
+
         if isinstance(sequence, int) and sequence is not True and 0 <= sequence <= MAX_SEQUENCE:
             self._answered[client] = sequence
             while len(self._answered) > MAX_PAGES:  # of pages that have left
@@ -150,4 +163,5 @@ class Loop:
         if self._paused_at is None:
             self._paused_at = now
         else:
-            self._begin, self._paused_at = clock.monotonic() - now, None
+            self._begin = clock.monotonic() - now
+            self._paused_at = None

@@ -90,11 +90,13 @@ class Session:
             recorded=recorded,
             patience=patience,
         )
+
         self.arm = arm
         self.master = master
         self.supervisor = Supervisor(problem.robot, self.means.rates)
         q = frozen(arm.read())
         self.state = State(Surroundings(problem.world, structure), q, q)
+
         self._grasp_servo = GraspServo(problem.robot)
         self._record = record or Record(None)
         self._read_by_arm = isinstance(arm, LineArm)  # its own thread gives its readings to the supervisor
@@ -111,20 +113,23 @@ class Session:
         """Where a picture shows the tip, with its covariance (6, 6); nothing moves where the joints say otherwise."""
         self._take(events.TipSeen(T_base_tip, covariance, time))
 
-    def see_no_use(self, why: str) -> None:
+    def see_unusable(self, why: str) -> None:
         """A photograph, or picture of a film, could not be used."""
         self._take(events.Unusable(why))
 
     def tick(self, time: float) -> None:
         """Read the arm and update its progress along the route; stop it where the present is not known any more."""
         self._take(events.Measured(self.arm.read(), time, self.arm.lost))
+
         standing = None
         if not self.means.recorded:
             now = self._arms_time()
             if not self._read_by_arm:
                 self.supervisor.read(self.state.q, now)
             standing = self.supervisor.standing(now)
+
         self._take(events.Judged(self.supervisor.fault, standing))
+
         if ended := self._record.news():
             self.say(alarm(ended))
 
@@ -157,11 +162,13 @@ class Session:
     def _take(self, event: events.Event) -> None:
         """Go on to the next state, and carry out what is to be done; an answer to that is the next event, at once."""
         self.state, effects = handle(self.means, self.state, event)
+
         for effect in effects:
             try:
                 following = self._carry_out(effect)
             except RrtikError as error:
                 following = events.Failed(str(error))
+
             if following is not None:
                 self._take(following)
 
@@ -239,7 +246,7 @@ class Session:
 
     @property
     def level(self) -> Level:
-        """Of that line."""
+        """Of the line that was said last."""
         return self.state.answer.level
 
     @property

@@ -89,12 +89,15 @@ def open_session(options: SessionOptions) -> OpenSession:
         return _replay(options, problem, options.replay)
     if options.arm is not None and isinstance(options.source, Path):
         raise InputError("--arm: an arm is moved by a camera's pictures, not by photographs or a film: leave one out")
+
     vehicle = None if options.source is not None else _vehicle(options, problem)
     arm: Arm = _simulated_arm(vehicle, problem) if options.arm is None else _line_arm(problem, options.arm)
     source = None if vehicle is None else SimulatedSource(_simulated(vehicle, problem), arm, vehicle.base_motion)
+
     perception = _perception(options, vehicle, source)
     record = Record(options.record)
     record.write("begin", 0.0, problem=problem.name, seed=options.seed, q=arm.read().tolist())
+
     past = isinstance(options.source, Path)
     master = None if options.master is None else _line_arm(problem, options.master, "--master")
     session = Session(
@@ -102,14 +105,19 @@ def open_session(options: SessionOptions) -> OpenSession:
         patience=_patience(vehicle),
     )  # fmt: skip
     simulated = [each for each in (arm, source) if isinstance(each, SimulatedArm | SimulatedSource)]
-    closing, reports = [perception.close, record.close], perception.reports()
+
+    closing = [perception.close, record.close]
+    reports = perception.reports()
     if master is not None:
         closing.append(master.close)
+
     if isinstance(arm, LineArm):
         closing.insert(0, arm.close)
         reports["the line to the arm"] = lambda: arm.reported
+
     pictures = _picture_record(options, record)
     further = _further(options, vehicle, problem, perception)
+
     engine = Engine(session, perception, simulated=simulated, further=further, pictures=pictures)
     return OpenSession(engine, (*closing, engine.close), reports, record)
 
@@ -128,10 +136,12 @@ def _further(
 ) -> dict[str, FurtherCamera]:
     """Cameras beside the first one, by name."""
     found: dict[str, FurtherCamera] = {}
-    source, second = perception.source, options.second
+    source = perception.source
+    second = options.second
     if vehicle is not None and isinstance(source, SimulatedSource):
         for mount in vehicle.further:
             found[mount.name] = SimulatedFurtherCamera(mount, _simulated(vehicle, problem), source.camera, source.arm)
+
     if second is not None and options.rig is not None:
         found["second"] = CameraOfRig(perception)
     elif second is not None:
@@ -165,22 +175,29 @@ def _perception(
     if vehicle is not None and simulated is not None:
         sensor = Sensor(vehicle.camera, vehicle.marker_map, sigmas=options.sigmas)
         return LivePerception(sensor, simulated, arm_in_picture=True)
+
     eye = None if options.rig is None else load_rig(options.rig)
     for name, file in (("--camera-file", options.rig or options.camera_file), ("--map", options.map_file)):
         if file is None:
             raise InputError(f"pictures need {name} FILE (see: rrtik markers --help)")
-    source, second = options.source, options.second
+
+    source = options.source
+    second = options.second
     if source is None:
         raise InputError("there is no source of pictures")
-    marker_map, paced = load_marker_map(str(options.map_file)), not isinstance(source, int)
+    marker_map = load_marker_map(str(options.map_file))
+    paced = not isinstance(source, int)
+
     if eye is None:
         camera = load_camera(str(options.camera_file))
         sensor = Sensor(camera, marker_map, sigmas=options.sigmas)
         return LivePerception(sensor, Feed(lambda: _fitting(pictures_from(source), (camera,)), paced=paced))
+
     if options.camera_file is not None or second is None or len(eye.cameras) != len((source, second)):
         raise InputError(
             f"--rig {options.rig}: needs two cameras, the pictures of the second by --second, and no --camera-file"
         )
+
     both = [str(source), str(second)]
     feed = Feed(lambda: _fitting(_together(both), eye.cameras), paced=paced)
     return LivePerception(Sensor(eye, marker_map, sigmas=options.sigmas), feed)
@@ -213,7 +230,9 @@ def _recorded(options: SessionOptions, problem: Problem) -> SimulatedVehicle:
     """What a record is shown with: a simulated vehicle, or the camera and map that it was made with."""
     if options.camera_file is None or options.map_file is None:
         return _vehicle(options, problem)
-    camera, marker_map = load_camera(options.camera_file), load_marker_map(options.map_file)
+
+    camera = load_camera(options.camera_file)
+    marker_map = load_marker_map(options.map_file)
     return SimulatedVehicle(
         camera, marker_map, {}, marker_map.T_base_camera or orbit_pose(np.zeros(3), *DEFAULT_CAMERA_POSE)
     )
@@ -236,10 +255,12 @@ def _line_arm(problem: Problem, address: str, option: str = "--arm") -> LineArm:
 def _replay(options: SessionOptions, problem: Problem, file: Path) -> OpenSession:
     vehicle = _recorded(options, problem)
     entries = entries_for(file, problem.name, problem.robot, vehicle.marker_map)
+
     start, seed = start_of(entries, problem.start)
     arm = RecordedArm(problem.robot, start)
     structure = _structure(vehicle)
     pictures = RecordedPictures(beside(file)) if beside(file).exists() else None
+
     perception = RecordedPerception(entries, arm, _simulated(vehicle, problem), structure, pictures)
     session = Session(problem, arm, seed=seed, past=True, recorded=True, structure=structure)
     return OpenSession(Engine(session, perception), (perception.close,))

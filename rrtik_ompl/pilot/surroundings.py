@@ -29,8 +29,10 @@ from rrtik_ompl.tasks.contact_life import (
 )
 from rrtik_ompl.world.world import World
 
-MAX_SHIFT, MAX_TURN = 5e-3, np.deg2rad(1.0)  # [m], [rad]; a target that has moved farther is not where a route ends
-MIN_SHIFT, MIN_ROTATION = 1e-3, np.deg2rad(0.2)  # [m], [rad]; smaller changes are noise
+MAX_SHIFT = 5e-3  # [m]; a target that has moved farther is not where a route ends
+MAX_TURN = np.deg2rad(1.0)  # nor one that has turned by more
+MIN_SHIFT = 1e-3  # [m]; smaller changes are noise
+MIN_ROTATION = np.deg2rad(0.2)
 
 
 class Structure(NamedTuple):
@@ -53,7 +55,7 @@ class HeldObject(NamedTuple):
     rests: tuple[Touching, ...]
 
 
-class Grip(NamedTuple):
+class MayTouch(NamedTuple):
     """What the gripper, with what it holds, may touch of an object.
 
     Attributes:
@@ -84,7 +86,7 @@ class Surroundings:
     _let_go: Mapping[str, pin.SE3] = field(default_factory=dict)  # where the tip was in what was put down, T_object_tip
     _made: World | None = None  # of what was seen and is held; None before there was anything
     _holding: dict[str, World] = field(default_factory=dict)  # kept results, of these surroundings
-    _grips: dict[str, Grip] = field(default_factory=dict)  # kept results, as long as the same thing is held
+    _grips: dict[str, MayTouch] = field(default_factory=dict)  # kept results, as long as the same thing is held
 
     @property
     def world(self) -> World:
@@ -114,9 +116,11 @@ class Surroundings:
         """
         if name is None:
             raise InputError("no object is chosen; choose one that is in view")
+
         seen = self.named(name)
         if seen is None:
             raise InputError(f"{name} was not seen yet")
+
         count = len(seen.object.grasp(type).levels)
         if not 0 <= level < count:
             raise InputError(f"level must be 1 to {count}, got {level + 1}")
@@ -134,6 +138,7 @@ class Surroundings:
         news = [each for each in objects if each.object.name != held and self._moved(each)]
         if not news:
             return self
+
         seen = {**self._seen, **{each.object.name: each for each in news}}
         return self._renewed(_seen=seen)
 
@@ -145,10 +150,12 @@ class Surroundings:
         others = {name: each for name, each in self._seen.items() if name != seen.object.name}
         taken = HeldObject(seen, T_tip_object, ())
         world = replace(self, held=taken, _seen=others, _grips={}).world_with(())
+
         mine = seen.object.solid_names
         near = [frozenset((contact.first, contact.second)) for contact in world.contacts(q)]
         rests = {pair: allowed(world.bodies, *sorted(pair)) for pair in near if pair & set(mine)}
         rests |= {each.pair: each.going_on() for name in mine for each in touching_at(world, q, name)}
+
         return self._renewed(held=taken._replace(rests=tuple(rests.values())), _seen=others, _grips={})
 
     def release(self, T_base_tip: pin.SE3) -> Surroundings:
@@ -158,6 +165,7 @@ class Surroundings:
             return self
         name = held.seen.object.name
         placed = replace(held.seen, T_base_object=T_base_tip * held.T_tip_object, sighting=None)
+
         let_go = {**self._let_go, name: held.T_tip_object.inverse()}
         return self._renewed(held=None, _seen={**self._seen, name: placed}, _let_go=let_go, _grips={})
 
@@ -166,6 +174,7 @@ class Surroundings:
         held = self.held
         if held is None or not held.rests:
             return self
+
         rests = tuple(contact for contact in held.rests if not parted(self.world, q, contact))
         return self if rests == held.rests else self._renewed(held=held._replace(rests=rests))
 
@@ -173,6 +182,7 @@ class Surroundings:
         """What is held would be left deep inside something by an arm at q, shape (dof,), in words; "" if not."""
         names = () if self.held is None else self.held.seen.object.solid_names
         around = {each.name for each in self.world.scene.obstacles}
+
         touching = [near for name in names for near in touching_at(self.world, q, name) if near.second in around]
         deepest = min(touching, key=lambda near: near.distance, default=None)
         return left_inside(deepest) if deepest is not None and deepest.too_deep else ""
@@ -194,7 +204,7 @@ class Surroundings:
         solids = sorted({solid for _, solid in self._grip(name).buried})
         return f" (the gripper is not compared with {', '.join(solids)})" if solids else ""
 
-    def _grip(self, name: str) -> Grip:
+    def _grip(self, name: str) -> MayTouch:
         """What the gripper may touch of an object, and what it holds: no deeper than at one of the object's grasps.
 
         What it holds may come a millimetre nearer than there. The gripper itself may be as far off as an object may
@@ -202,10 +212,13 @@ class Surroundings:
         """
         if name in self._grips:
             return self._grips[name]
+
         near = self._at_grasps(name)
+
         links = gripper_links(self.given.robot)
         contacts = []
         buried = []
+
         for pair, each in near.items():
             part, solid = pair
             leeway = DEEPER + MAX_SHIFT if part in links else DEEPER
@@ -213,7 +226,8 @@ class Surroundings:
                 buried.append(pair)
             else:
                 contacts.append(Touching(part, solid, max(min(each.distance, 0.0) - leeway, -each.deepest)))
-        self._grips[name] = Grip(tuple(contacts), tuple(buried))
+
+        self._grips[name] = MayTouch(tuple(contacts), tuple(buried))
         return self._grips[name]
 
     def _at_grasps(self, name: str) -> dict[tuple[str, str], Nearness]:
@@ -223,16 +237,20 @@ class Surroundings:
         attached = tuple(self._attached())
         thing = seen.object
         parts = (*gripper_links(robot), *(item.name for item in attached))
+
         q = robot.clamp(np.zeros((1, robot.dof)))[0]
         tip = robot.fk(q)
+
         tips = [level for grasp in thing.grasps for level in grasp.levels]
         found: dict[tuple[str, str], Nearness] = {}
+
         for T_object_tip in (*tips, *([self._let_go[name]] if name in self._let_go else [])):
             there = replace(seen, T_base_object=tip * T_object_tip.inverse())
             world = self.given.with_scene(Scene(there.solids(), attached))
             for part, solid in product(parts, thing.solid_names):
                 apart = Nearness(part, solid, np.inf, deepest_contact(world.bodies, part, solid))
                 found.setdefault((part, solid), apart)
+
             for near in (near for solid in thing.solid_names for near in touching_at(world, q, solid)):
                 pair = near.second, near.first
                 if pair in found and near.distance < found[pair].distance:
@@ -246,6 +264,7 @@ class Surroundings:
         """
         if target is None or target not in self._seen or self.world.valid(q):
             return self.world
+
         holding = self.holding(target)
         return holding if holding.valid(q) else self.world
 
@@ -253,6 +272,7 @@ class Surroundings:
         old = self._seen.get(new.object.name)
         if old is None:
             return True
+
         shifted, turned = apart(old.T_base_object, new.T_base_object)
         wider = max(_margins(new), default=0.0) - max(_margins(old), default=0.0)
         return shifted > MIN_SHIFT or turned > MIN_ROTATION or abs(wider) > MIN_SHIFT
@@ -282,10 +302,13 @@ class Surroundings:
 
     def _attached(self) -> list[AttachedObject]:
         """What is held, as part of the arm; how far its place is uncertain adds to its margin."""
-        held, robot = self.held, self.given.robot
+        held = self.held
+        robot = self.given.robot
         if held is None:
             return []
-        near, thing = gripper_links(robot), held.seen.object
+
+        near = gripper_links(robot)
+        thing = held.seen.object
         return [
             AttachedObject(
                 name,
@@ -300,10 +323,13 @@ class Surroundings:
 
     def _fixed_scene(self) -> Scene:
         """The problem's scene where the structure is seen; how far that is uncertain is the margin of its obstacles."""
-        given, fixed = self.given.scene, self.structure
+        given = self.given.scene
+        fixed = self.structure
+
         seen = None if fixed is None else self._seen.get(fixed.name)
         if fixed is None or seen is None:
             return given
+
         from_object = fixed.T_base_object.inverse()
         local = [replace(each, pose=from_object * each.pose) for each in given.obstacles]
         moved = [
@@ -326,6 +352,7 @@ def gripper_links(robot: Robot) -> tuple[str, ...]:
     """The links that the last joint before the tip carries, with all that hangs on them."""
     model: Any = robot.model
     last = model.frames[model.getFrameId(robot.tip)].parentJoint
+
     below = set(model.subtrees[last])
     bodies = (frame for frame in model.frames if frame.type == pin.FrameType.BODY)
     return tuple(frame.name for frame in bodies if frame.parentJoint in below)

@@ -21,8 +21,10 @@ from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 LAMP_COLORS = {GREEN: "#1b9e3a", AMBER: "#e6a100", RED: "#c62828"}
-NEXT_MOVE, OUTLINE = "#56b4e9", "#ffffff"
-VIRTUAL_ARM, VIRTUAL_OPACITY = "#e4ebf5", 0.6  # of the arm drawn over a picture: not to be taken for the real one
+NEXT_MOVE = "#56b4e9"
+OUTLINE = "#ffffff"
+VIRTUAL_ARM = "#e4ebf5"  # the arm drawn over a picture: not to be taken for the real one
+VIRTUAL_OPACITY = 0.6
 SKY = 0.22  # brightness of the outside view's background, which lies beside a dark page
 TRAIL_POINTS = 60  # points of a trail
 OUTSIDE_TRIANGLES = 8_000
@@ -38,8 +40,10 @@ class CameraView:
 
     def __init__(self, camera: Camera, session: Session) -> None:
         """Prepare the arm's triangles once."""
-        self._session, self._arm = session, Augmenter(session.robot, camera)
-        self._camera, self.aids = camera, Aids(session)
+        self._session = session
+        self._arm = Augmenter(session.robot, camera)
+        self._camera = camera
+        self.aids = Aids(session)
 
     def draw(
         self, picture: NDArray[np.uint8], T_base_camera: pin.SE3, arm_in_picture: bool = False
@@ -53,6 +57,7 @@ class CameraView:
                 over it, only its planned motion.
         """
         session = self._session
+
         real = session.surroundings.world.scene.obstacles  # what is known hides the drawn arm, seen or given
         drawn = self._arm.draw(
             picture, T_base_camera, None if arm_in_picture else session.q,
@@ -68,7 +73,8 @@ class OutsideView:
 
     def __init__(self, session: Session, width: int = 640, height: int = 480) -> None:
         """Begin with the view from a corner."""
-        self._session, self._camera = session, pinhole_camera(width, height)
+        self._session = session
+        self._camera = pinhole_camera(width, height)
         self._arm = Augmenter(session.robot, self._camera, OUTSIDE_TRIANGLES)
         self._sky = np.rint(SKY * background(self._camera)).astype(np.uint8)
         reach = float(np.linalg.norm(session.robot.fk(session.q).translation))
@@ -104,6 +110,7 @@ class OutsideView:
         eye = orbit_pose(self.centre, self.distance, self.azimuth, self.elevation)
         shown = session.q if self.share is None else along(session, self.share)
         around = session.surroundings
+
         obstacles = (*around.world.scene.obstacles, *around.held_solids(session.robot.fk(shown)))
         return self._arm.draw(
             self._sky, eye, shown, ghosts=ghosts(session), obstacles=obstacles,
@@ -115,9 +122,11 @@ def ghosts(session: Session) -> list[Ghost]:
     """The chosen grasp in the colour of its lamp, or the next move of a route."""
     if session.follower is not None and session.mode in (PROPOSED, FOLLOWING):
         return [Ghost(session.follower.target, NEXT_MOVE, 0.4, outline=OUTLINE)]
+
     lamp = session.lamp()
     if lamp is None:
         return []
+
     if np.isnan(lamp.q[1]).any():  # no configuration holds the object: the gripper alone at the grasp
         return [Ghost(None, LAMP_COLORS[lamp.color], 0.55, at, OUTLINE) for at in _chosen(session)]
     return [Ghost(lamp.q[1], LAMP_COLORS[lamp.color], 0.45, outline=OUTLINE)]
@@ -127,6 +136,7 @@ def trail(session: Session) -> Matrix | None:
     """Positions of the tip along the route, shape (k, 3), None without one."""
     if session.follower is None:
         return None
+
     path = session.follower.path
     rows = path.resample(max(path.length / TRAIL_POINTS, 1e-3)).waypoints
     return np.asarray(session.robot.fk_batch(rows)[:, :3, 3])
@@ -136,6 +146,7 @@ def along(session: Session, share: float) -> Vector:
     """The configuration at a share of a route's travel. Shape (dof,)."""
     if session.follower is None:
         return session.q
+
     rows = session.follower.path.waypoints
     lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).sum(axis=1))])
     at = float(np.clip(share, 0.0, 1.0)) * lengths[-1]

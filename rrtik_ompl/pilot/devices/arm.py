@@ -49,6 +49,7 @@ def joint_rates(robot: Robot, rates: ArrayLike | None = None) -> Vector:
     if rates is None:
         usual = np.where(robot.prismatic, DEFAULT_SLIDING_RATE, DEFAULT_RATE)
         return np.minimum(usual, robot.velocity)
+
     given = finite_array(rates, (robot.dof,), "rates")
     if (given <= 0.0).any():
         raise InputError(f"rates must be positive, got {given.tolist()}")
@@ -65,7 +66,8 @@ class SimulatedArm:
             InputError: If the configuration does not fit the robot.
         """
         self.robot = robot
-        self.lost, self.closed = "", False
+        self.lost = ""
+        self.closed = False
         self._q = robot.configuration(start, "start")
         self._rates = joint_rates(robot, rates)
         self._goal: tuple[int, float] | None = None
@@ -86,8 +88,10 @@ class SimulatedArm:
 
     def move(self, joint: int, target: float) -> None:
         """Send one joint to a value [rad or m], inside its limits."""
-        low, high = float(self.robot.lower[joint]), float(self.robot.upper[joint])
-        self._goal, self._course = (joint, min(max(target, low), high)), None
+        low = float(self.robot.lower[joint])
+        high = float(self.robot.upper[joint])
+        self._goal = (joint, min(max(target, low), high))
+        self._course = None
 
     def follow(self, q: ArrayLike) -> None:
         """Send all joints to a configuration, each as fast as it goes; for set points that come one after the other.
@@ -95,7 +99,8 @@ class SimulatedArm:
         Raises:
             InputError: If it does not fit the robot.
         """
-        self._goal, self._course = None, self.robot.clamp(self.robot.configuration(q, "set point"))
+        self._goal = None
+        self._course = self.robot.clamp(self.robot.configuration(q, "set point"))
 
     def stop(self) -> None:
         """Stop at once."""
@@ -106,16 +111,18 @@ class SimulatedArm:
         self.closed = closed
 
     def advance(self, seconds: float) -> None:
-        """Advance the simulated time."""
+        """Let simulated time pass [s]: what was sent on its way moves on."""
         if self._course is not None:
             most = self._rates * seconds
             self._q = self._q + np.clip(self._course - self._q, -most, most)
         if self._goal is None:
             return
+
         joint, target = self._goal
         step = self._rates[joint] * seconds
         away = target - self._q[joint]
         if abs(away) <= step:
-            self._q[joint], self._goal = target, None
+            self._q[joint] = target
+            self._goal = None
         else:
             self._q[joint] += np.sign(away) * step

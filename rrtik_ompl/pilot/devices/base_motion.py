@@ -12,7 +12,9 @@ from rrtik_ompl.base.arrays import Vector, finite_array, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose_from_rpy
 
-MIN_PERIOD, MAX_SPEED, MAX_AMPLITUDE = 0.2, 2.0, 2.0  # [s], [m/s], [m]
+MIN_PERIOD = 0.2  # [s]
+MAX_SPEED = 2.0  # [m/s]
+MAX_AMPLITUDE = 2.0  # [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

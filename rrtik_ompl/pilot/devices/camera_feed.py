@@ -48,12 +48,16 @@ class Feed:
         Raises:
             InputError: If not even the first picture can be read.
         """
-        self._open, self._paced = open_pictures, paced
+        self._open = open_pictures
+        self._paced = paced
+
         pictures = open_pictures()
         self._newest: Picture | None = next(pictures, None)
         self._lost = ""
         self.reported = np.inf if paced else time.monotonic()
-        self._lock, self._ended = threading.Lock(), threading.Event()
+
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._read, args=(pictures,), daemon=True)
         self._thread.start()
 
@@ -64,7 +68,8 @@ class Feed:
             CameraLostError: While there is no camera.
         """
         with self._lock:
-            picture, self._newest = self._newest, None
+            picture = self._newest
+            self._newest = None
             if picture is None and self._lost:
                 raise CameraLostError(self._lost)
         return picture
@@ -91,7 +96,8 @@ class Feed:
                 if self._ended.wait(max(begin + picture.time - time.monotonic(), 0.0) if self._paced else 0.0):
                     break
                 with self._lock:
-                    self._newest, self._lost = picture, ""
+                    self._newest = picture
+                    self._lost = ""
                 self._report()
         except RrtikError as error:
             return str(error)

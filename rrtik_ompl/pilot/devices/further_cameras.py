@@ -42,7 +42,6 @@ class LiveCamera:
     """A camera, or a film."""
 
     def __init__(self, source: PictureSource) -> None:
-        """Take the source."""
         self._source = source
         self._last: NDArray[np.uint8] | None = None
 
@@ -52,6 +51,7 @@ class LiveCamera:
             taken = self._source.latest()
         except RrtikError:
             return None if self._last is None else np.asarray(self._last // 3, dtype=np.uint8)
+
         if taken is not None:
             grey = taken.pixels.ndim == 2
             self._last = np.repeat(taken.pixels[..., None], 3, axis=2) if grey else taken.pixels
@@ -74,16 +74,22 @@ class SimulatedFurtherCamera:
             first: The vehicle's first camera: things are where that has them.
             arm: The arm.
         """
-        self._mount, self._camera, self._first, self._arm = mount, camera, first, arm
+        self._mount = mount
+        self._camera = camera
+        self._first = first
+        self._arm = arm
         self._count = 0
 
     def picture(self) -> NDArray[np.uint8]:
         """The picture of now."""
-        camera, arm = self._camera, self._arm
+        camera = self._camera
+        arm = self._arm
         q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
         carried = camera.robot.fk(q) if self._mount.at_tip else pin.SE3.Identity()
         camera.T_base_camera = carried * self._mount.pose
-        camera.places, camera.T_start_base = self._first.places, self._first.T_start_base
+
+        camera.places = self._first.places
+        camera.T_start_base = self._first.T_start_base
         self._count += 1
         return camera.picture(q, float(self._count)).pixels
 

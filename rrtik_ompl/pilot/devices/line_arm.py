@@ -41,7 +41,8 @@ from rrtik_ompl.files.messages import message_in, quoted
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 
-PROTOCOL, VERSION = "rrtik-arm", 1
+PROTOCOL = "rrtik-arm"
+VERSION = 1
 POLL_SECONDS = 1.0 / 30.0  # between two requests for the joints
 DRIVEN_POLL_SECONDS = 0.02  # the same while an arm with a judge is driven
 RENEW_SECONDS = 0.1  # for as long is the last set point sent again: an arm that does what it is told is there by then
@@ -58,7 +59,6 @@ class Line:
     """Whole JSON objects over a socket."""
 
     def __init__(self, connection: socket.socket) -> None:
-        """Take a connection."""
         connection.settimeout(TIMEOUT_SECONDS)
         self._socket = connection
         self._rest = b""
@@ -80,8 +80,10 @@ class Line:
             self._rest += more
             if not more or len(self._rest) > MAX_LINE_BYTES:
                 raise ConnectionError("the other side has closed the connection" if not more else "an endless line")
+
         line, _, self._rest = self._rest.partition(b"\n")
         self._socket.settimeout(TIMEOUT_SECONDS)
+
         found = message_in(line)
         if found is None:
             raise ConnectionError("the other side does not send JSON lines")
@@ -129,14 +131,19 @@ class LineArm:
         Raises:
             InputError: If there is no server, or it offers another arm.
         """
-        self.robot, self._address, self.lost = robot, (host, port), ""
+        self.robot = robot
+        self._address = (host, port)
+        self.lost = ""
         self.reported = time.monotonic()
         self.judge: Judge | None = None
         self._request: dict[str, Any] | None = None
         self._set_point: dict[str, Any] | None = None  # what the arm was told last, if it was not a stop
-        self._told_at, self._holds = -np.inf, 0.0  # when that was, and for how long what was sent last holds
+        self._told_at = -np.inf  # when that was
+        self._holds = 0.0  # for how long what was sent last does [s]
         self._grip: dict[str, Any] | None = None  # goes first, and no move takes its place
-        self._lock, self._ended, self._wake = threading.Lock(), threading.Event(), threading.Event()
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
+        self._wake = threading.Event()
         try:
             self._line = self._connect()
             self._q = self._exchange({"do": "read"})
@@ -242,15 +249,18 @@ class LineArm:
                 young = time.monotonic() - self._told_at < RENEW_SECONDS
                 message = self._set_point if young else {"do": "stop"}
                 self._set_point = self._set_point if young else None
+
         message = message or {"do": "read"}
         if self.judge is None:
             return message
         if self.judge.fault:
             message = {"do": "stop"}
+
         if message["do"] == "stop":
             self._holds = 0.0
         if message["do"] not in SET_POINTS:
             return message
+
         left = UNSEEN_SECONDS * self.judge.room() - self._holds  # what was sent before still holds
         self._holds = max(min(left, 0.5 * UNSEEN_SECONDS), SHORTEST_SECONDS)
         return message | {"seconds": self._holds}
@@ -269,14 +279,17 @@ class LineArm:
         while True:
             self._wake.wait(DRIVEN_POLL_SECONDS if self._holds else POLL_SECONDS)
             self._wake.clear()
+
             message = self._next_request()
             try:
                 if self.lost:
-                    self._line, message = self._connect(), {"do": "read"}  # a move from before is out of date
+                    self._line = self._connect()
+                    message = {"do": "read"}  # a move from before is out of date
                 q = self._exchange(message)
                 self._judge(q)
                 with self._lock:
-                    self._q, self.lost = q, ""
+                    self._q = q
+                    self.lost = ""
             except Exception as error:  # nothing that comes over the line ends this thread
                 self._line.close()
                 with self._lock:
@@ -326,6 +339,7 @@ class LineServer:
             except OSError:  # a client that has gone already, or no file handle is left: others will be
                 self._ended.wait(POLL_SECONDS)
                 continue
+
             line = Line(connection)
             with suppress(Exception):  # the client has gone, is silent, or sends what is no request
                 line.send(protocol=PROTOCOL, version=VERSION, joints=list(self.arm.robot.joint_names))
@@ -344,8 +358,10 @@ class LineServer:
                 self.arm.stop()
                 before = until
                 until = np.inf
+
             self.arm.advance(now - before)
             before = now
+
             fault = self._execute(request)
             if request.get("do") in SET_POINTS and not fault:
                 until = now + request.get("seconds", np.inf)
@@ -353,10 +369,13 @@ class LineServer:
 
     def _execute(self, request: dict[str, Any]) -> str:
         """Execute a request; returns what is wrong with it, "" if nothing is."""
-        what, joint, target = request.get("do"), request.get("joint"), request.get("target")
+        what = request.get("do")
+        joint = request.get("joint")
+        target = request.get("target")
         seconds = request.get("seconds", 1.0)
         if what in SET_POINTS and not (type(seconds) in (int, float) and 0.0 < seconds < LARGEST):
             return f"{what} needs seconds above 0, if any"
+
         if what == "stop":
             self.arm.stop()
         elif what == "move":

@@ -11,7 +11,6 @@ class ArmLink:
     """A simulated arm, or one on the other side of a connection, that follows a trajectory."""
 
     def __init__(self, arm: SimulatedArm | LineArm) -> None:
-        """Take an arm."""
         self.arm = arm
 
     def positions(self) -> Vector:

@@ -146,7 +146,9 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
         further = tuple(each.build() for each in entry.further_cameras)
         if len({each.name for each in further}) < len(further):
             raise InputError("two further cameras have the same name; give each its own")
-    camera, T = load_camera(folder / entry.camera), entry.camera_pose.build()
+
+    camera = load_camera(folder / entry.camera)
+    T = entry.camera_pose.build()
     patience = UNSEEN_SECONDS if entry.patience is None and motion is not None else entry.patience
     return SimulatedVehicle(camera, marker_map, places, T, faults, motion, structure, further, patience)
 

@@ -27,7 +27,8 @@ from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 
 PIXELS_PER_CELL = 24  # of a marker's image
 WATER = ((96, 84, 60), (60, 52, 40))  # blue, green, red above and below
-NOISE, NOISE_PICTURES = 2.0, 4  # grey levels; pictures of noise, taken in turn
+NOISE = 2.0  # grey levels
+NOISE_PICTURES = 4  # taken in turn
 PICTURE_RATE = 30.0  # pictures a second
 TRIANGLES = 8_000  # of the arm
 
@@ -58,16 +59,21 @@ class SimulatedCamera:
             seed: Of the noise.
             fixed: The obstacles stand on the ground like the objects, and do not move with the base.
         """
-        self.camera, self.marker_map = camera, marker_map
+        self.camera = camera
+        self.marker_map = marker_map
         self.T_base_camera = rigid(T_base_camera, "pose of the camera")
         self.places = {name: rigid(T, f"pose of object '{name}'") for name, T in places.items()}
         self.T_start_base = pin.SE3.Identity()  # where the base is
         self._fixed = fixed
         self.robot = robot
-        self._scene, self._arm = scene, Augmenter(robot, camera, TRIANGLES)
-        rng, size = np.random.default_rng(seed), (camera.height, camera.width, 1)
+        self._scene = scene
+        self._arm = Augmenter(robot, camera, TRIANGLES)
+
+        rng = np.random.default_rng(seed)
+        size = (camera.height, camera.width, 1)
         grey = [np.rint(rng.normal(0.0, NOISE, size)).astype(np.int16) for _ in range(NOISE_PICTURES)]
         self._noise = [np.repeat(each, 3, axis=2) for each in grey]
+
         self._kept: Any = (None, None, None)
         self._kept_arm: Any = (None, None, None)
 
@@ -96,12 +102,15 @@ class SimulatedCamera:
             around = self._scene.obstacles
             if self._fixed:
                 around = tuple(replace(each, pose=T_base_start * each.pose) for each in around)
+
             solids = [*around, *self._object_solids(places)]
             drawn = self._arm.draw(_water(self.camera), self.T_base_camera, obstacles=solids, opacity=1.0)
-            depths, T_camera_base = self._arm.depths(), self.T_base_camera.inverse()
+            depths = self._arm.depths()
+            T_camera_base = self.T_base_camera.inverse()
             for thing in self.marker_map.objects:
                 if thing.name in places:
                     self._lay_markers(drawn, depths, thing, T_camera_base * places[thing.name])
+
             self._kept = (key, drawn, solids)
         return self._kept[1], self._kept[2]
 
@@ -121,6 +130,7 @@ class SimulatedCamera:
             T = T_camera_object * marker.T_object_marker
             if float(T.rotation[:, 2] @ T.translation) >= 0.0:
                 continue  # seen from behind
+
             sheet = np.pad(marker_cells(self.marker_map.dictionary, marker.number), 1, constant_values=255)
             half = 0.5 * marker.side * len(sheet) / (len(sheet) - 2)
             corners = np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
@@ -136,24 +146,28 @@ class SimulatedCamera:
         pixels: Matrix,
         T: pin.SE3,
     ) -> None:
-        fine = np.kron(30 + (sheet // 255) * 190, np.ones((PIXELS_PER_CELL, PIXELS_PER_CELL), dtype=np.uint8)).astype(
-            np.uint8
-        )
+        grey = 30 + (sheet // 255) * 190
+        cell = np.ones((PIXELS_PER_CELL, PIXELS_PER_CELL), dtype=np.uint8)
+        fine = np.kron(grey, cell).astype(np.uint8)
+
         size = len(fine)
         square = np.array([[0, 0], [size, 0], [size, size], [0, size]], dtype=np.float32) - 0.5
         low = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - 2, 0)
         high = np.minimum(np.ceil(pixels.max(axis=0)).astype(int) + 3, (self.camera.width, self.camera.height))
         if (high <= low).any():
             return
+
         ss = 3  # rays through a pixel, squared
         shape = (ss * (high - low)).tolist()
         target = ((pixels - low + 0.5) * ss - 0.5).astype(np.float32)
         bend = cv2.getPerspectiveTransform(square, target)
+
         laid = cv2.warpPerspective(fine, bend, shape, flags=cv2.INTER_AREA, borderValue=(0.0,))
         there = cv2.warpPerspective(np.full_like(fine, 255), bend, shape, flags=cv2.INTER_LINEAR, borderValue=(0.0,))
         small = tuple((high - low).tolist())
         share = cv2.resize(there, small, interpolation=cv2.INTER_AREA).astype(np.float32)[..., None] / 255.0
         value = cv2.resize(laid, small, interpolation=cv2.INTER_AREA).astype(np.float32)[..., None]
+
         box = np.s_[low[1] : high[1], low[0] : high[0]]
         share[depths[box] < T.translation[2] - 0.02 - 0.5 * np.ptp(pixels) / self.camera.matrix[0, 0]] = 0.0
         piece = drawn[box].astype(np.float32)

@@ -40,7 +40,10 @@ class Watchdog:
             tell: Called with each new fault, for where no page shows it.
         """
         self.fault = ""
-        self._arm, self._reports, self._patience, self._tell = arm, dict(reports), patience, tell
+        self._arm = arm
+        self._reports = dict(reports)
+        self._patience = patience
+        self._tell = tell
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, daemon=True)
 
@@ -61,8 +64,9 @@ class Watchdog:
             if silent - known:
                 with suppress(Exception):  # whatever is wrong with the arm, the others are watched on
                     self._arm.stop()
-            self.fault = f"{', '.join(sorted(silent))}: no report for {self._patience:g} s; the arm was stopped"
-            self.fault = self.fault if silent else ""
+
+            said = f"{', '.join(sorted(silent))}: no report for {self._patience:g} s; the arm was stopped"
+            self.fault = said if silent else ""  # in one step: another thread reads it
             if self._tell is not None and silent - known:
                 with suppress(Exception):  # a terminal that has gone must not end the watch
                     self._tell(self.fault)

@@ -82,11 +82,15 @@ class WrongArm(SimulatedArm):
         """
         super().__init__(robot, start, rates)
         each = faults.for_robot(robot)
-        self._lag, self._stick, self._overshoot = float(faults.lag), each["stick"], each["overshoot"]
-        self._half, self._offset = 0.5 * each["backlash"], each["offset"]
+        self._lag = float(faults.lag)
+        self._stick = each["stick"]
+        self._overshoot = each["overshoot"]
+        self._half = 0.5 * each["backlash"]
+        self._offset = each["offset"]
         self._links = self._q.copy()
         self._coasting = np.zeros(robot.dof)  # way that is left of going too far, with its sign
-        self._began, self._now = 0.0, 0.0
+        self._began = 0.0
+        self._now = 0.0
         self._waiting: deque[tuple[float, Callable[[], None]]] = deque()
 
     def read(self) -> Vector:
@@ -143,20 +147,26 @@ class WrongArm(SimulatedArm):
 
     def _go(self, seconds: float) -> None:
         """Move on, with no command in between."""
-        left, goal = np.full(self.robot.dof, seconds), self._goal
+        left = np.full(self.robot.dof, seconds)
+        goal = self._goal
         if goal is not None:
-            joint, needed = goal[0], abs(goal[1] - float(self._q[goal[0]])) / float(self._rates[goal[0]])
+            joint, target = goal
+            needed = abs(target - float(self._q[joint])) / float(self._rates[joint])
             left[joint] = max(seconds - needed, 0.0)
+
         super().advance(seconds)
         if goal is not None and self._goal is None:
             self._coast(goal[0], float(np.sign(goal[1] - self._began)))
+
         step = np.clip(self._coasting, -self._rates * left, self._rates * left)
         self._coasting = self._coasting - step
         self._q = self.robot.clamp(self._q + step)
         self._links = np.clip(self._links, self._q - self._half, self._q + self._half)
 
     def _end(self) -> None:
-        goal, self._goal, self._course = self._goal, None, None
+        goal = self._goal
+        self._goal = None
+        self._course = None
         if goal is not None:
             self._coast(goal[0], float(np.sign(goal[1] - self._q[goal[0]])))
 

@@ -27,7 +27,8 @@ from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.world import World
 
-REACH, TURN = 0.015, np.deg2rad(10.0)  # [m], [rad]; a gripper that closes this near to a grasp holds the object
+REACH = 0.015  # [m]; a gripper that closes this near to a grasp holds the object
+TURN = np.deg2rad(10.0)  # and turned by no more than this
 LIFT_SECONDS = 0.2  # for the posture at the end of a lift
 NOTHING = "closed; nothing is between the fingers"
 
@@ -49,10 +50,12 @@ def close(_: Means, state: State) -> State:
 
 def _closed(means: Means, state: State, q: Vector) -> State:
     after = replace(state, q=frozen(q), gripper=replace(state.gripper, closed=True))
+
     tip = means.robot.fk(after.q)
     near = sorted(
         ((apart(tip, pose), seen, lift) for seen, lift, pose in _grasps(after.around)), key=lambda each: each[0][0]
     )
+
     if not near:
         return after.say(refused(NOTHING))
     there = next((each for each in near if _within(each[0])), None)
@@ -60,12 +63,16 @@ def _closed(means: Means, state: State, q: Vector) -> State:
         away, turned = near[0][0]
         far = f"{1e3 * away:.0f} mm and {np.rad2deg(turned):.0f} deg away"
         return after.say(refused(f"{NOTHING}; the nearest grasp is {far}"))
+
     _, seen, lift = there
     name = seen.object.name
+
     if not seen.object.loose:
         return replace(after, gripper=Gripper(True, name, lift)).say(news(f"closed on {name}"))
+
     around = after.around.hold(seen, tip.actInv(seen.T_base_object), after.q)
     until = "".join(f"; {contact} until they part" for contact in around.rests)
+
     holding = replace(
         guide.leave(after),
         around=around,
@@ -86,9 +93,11 @@ def open_hand(_: Means, state: State) -> State:
 
 def _opened(means: Means, state: State, q: Vector) -> State:
     after = replace(state, q=frozen(q), gripper=replace(state.gripper, closed=False, fixed=""))
+
     name = after.holds
     if not name:
         return after.say(news("open"))
+
     inside = after.around.left_inside(after.q)
     around = after.around.release(means.robot.fk(after.q))
     left = replace(guide.leave(after), around=around, target=name, choice=None, mode=MANOEUVRE)
@@ -99,9 +108,11 @@ def lift(means: Means, state: State) -> State:
     """Propose a route straight up from where something was taken."""
     if not state.holds:
         raise InputError("nothing is held; close the gripper at a grasp first")
+
     tip = means.robot.fk(state.q)
     goal = pin.SE3(tip.rotation, tip.translation + np.array([0.0, 0.0, state.gripper.lift]))
     world = state.around.world_at(state.q, None)
+
     search = partial(_route_up, means, world, state.q, goal, state.holds)
     return state.do(FindRoute(search, _lifted))
 
@@ -112,6 +123,7 @@ def _route_up(means: Means, world: World, q: Vector, goal: pin.SE3, name: str) -
     if not found.found:
         why = found.detail or found.reason
         return NoRoute(f"{why}; choose where {name} goes, or drive the arm")
+
     return route_to(world, q, found.solutions[0], means.rates, means.seed)
 
 

@@ -40,10 +40,12 @@ def release(means: Means, state: State) -> State:
     after = state.released()
     if not state.drive.active:
         return after
+
     follower = state.way.follower
     if state.mode != FOLLOWING or follower is None or follower.joint() is None:
         going_on = state.mode == FOLLOWING
         return after.say(news("released: hold 'next' to go on" if going_on else "released"))
+
     joint, end = state.press.due
     left, unit = reading(abs(end - float(state.q[joint])), joint_unit(means.robot.prismatic[joint]))
     name = means.robot.joint_names[joint]
@@ -56,11 +58,15 @@ def jog(means: Means, state: State, direction: float, press: float) -> State:
     pressed, _ = begins(state, "jog", press)
     if sign == 0.0:
         return pressed.at_rest().say(news("released"))
-    joint, room = state.selected, joint_range(means, state)
+
+    joint = state.selected
+    room = joint_range(means, state)
     goal, end = (room.high, room.above) if sign > 0.0 else (room.low, room.below)
-    if room.low == room.high:
-        goal, end = way_out(world_by_hand(state), state.q, joint, sign), "out of contact"
+    if room.low == room.high:  # the arm touches something where it is
+        goal = way_out(world_by_hand(state), state.q, joint, sign)
+        end = "out of contact"
     at_goal = refused(f"end of the range: {end}")
+
     driven = _drive(means, pressed, joint, goal, min(abs(direction), 1.0), at_goal)
     if not driven.drive.active:
         return driven
@@ -69,24 +75,21 @@ def jog(means: Means, state: State, direction: float, press: float) -> State:
 
 def move(means: Means, state: State, target: float) -> State:
     """Say where the selected joint is to go; `go`, held, drives it there."""
-    joint, world = state.selected, world_by_hand(state)
-    check = check_move(world, state.q, joint, target)
-    if not check.allowed:
-        raise InputError(move_refusal(world, state.q, joint, target, check))
+    joint = state.selected
+    warnings = _check(state, joint, target)
+
     place = f"{_place(means.robot, joint, target)}: hold Enter to drive there"
-    said = "; ".join(filter(None, (place, *check.warnings, out_of_view(means, state))))
+    said = "; ".join(filter(None, (place, *warnings, out_of_view(means, state))))
     return replace(state, desired=_with(state.q, joint, target)).say(news(said))
 
 
 def go(means: Means, state: State, press: float) -> State:
     """Drive the selected joint to where it is to go."""
-    joint, target = state.selected, float(state.desired[state.selected])
+    joint = state.selected
+    target = float(state.desired[joint])
     pressed, anew = begins(state, "go", press)
     if anew:
-        world = world_by_hand(state)
-        check = check_move(world, state.q, joint, target)
-        if not check.allowed:
-            raise InputError(move_refusal(world, state.q, joint, target, check))
+        _check(state, joint, target)
     return _drive(means, pressed, joint, target, 1.0, news(_place(means.robot, joint, target)))
 
 
@@ -95,27 +98,24 @@ def make_next(means: Means, state: State, press: float) -> State:
     follower = state.way.follower
     if follower is None:
         raise InputError("there is no route to follow; 'plan' proposes one")
+
     pressed, anew = begins(state, "next", press)
     if isinstance(follower, Track):
         return _along(means, pressed, follower, anew)
     return _begin_move(means, pressed, follower) if anew else _go_on(means, pressed, follower)
 
 
-VERBS = {
-    "jog": Verb(jog, present=True, held=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
-    "move": Verb(move, present=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
-    "go": Verb(go, present=True, held=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
-    "next": Verb(
-        make_next,
-        present=True,
-        held=True,
-        guided=True,
-        modes=(FOLLOWING,),
-        otherwise="no route is being followed; 'plan' and 'accept' one first",
-    ),
-    "release": Verb(release),
-    "speed": Verb(set_speed),
-}
+def _check(state: State, joint: int, target: float) -> tuple[str, ...]:
+    """What there is to warn of before a joint is driven to a value [rad or m].
+
+    Raises:
+        InputError: If it must not be driven there.
+    """
+    world = world_by_hand(state)
+    check = check_move(world, state.q, joint, target)
+    if not check.allowed:
+        raise InputError(move_refusal(world, state.q, joint, target, check))
+    return check.warnings
 
 
 # --- moves of the route ----------------------------------------------------------------------------------------------
@@ -128,8 +128,10 @@ def _along(means: Means, state: State, track: Track, anew: bool) -> State:
         state = state.on_its_way(follower=track, progress=progress)
         if fault := guide.fault_of_rest(state):
             return guide.withdrawn(state, fault)
+
     if track.done:
         return state.released().say(news("all joints are there"))
+
     share = pace(means, state)
     return lead_to(means, state, track.ahead(share * LEASH_SECONDS), share).say(news("driving all joints"))
 
@@ -141,8 +143,10 @@ def _begin_move(means: Means, state: State, due: Follower) -> State:
     here = state.on_its_way(follower=follower, progress=progress)
     if progress.advice == "lost" or joint is None:
         return here.released().say(refused(progress.fault or "all moves are done"))
+
     if fault := guide.fault_of_rest(here):
         return guide.withdrawn(here, fault)
+
     end = float(follower.target[joint])
     near = min(MADE, 0.25 * abs(end - float(state.q[joint])))  # a short move has to be made, too
     press = replace(here.press, due=(joint, end), nearest=(np.inf, state.time), near=near)
@@ -158,6 +162,7 @@ def _go_on(means: Means, state: State, follower: Follower) -> State:
         state = replace(state, press=replace(state.press, nearest=(away, state.time)))
     elif MADE < away <= float(follower.slack[joint]) and state.time - since > STUCK_SECONDS:
         return state.do(Give("settle"))
+
     name = means.robot.joint_names[joint]
     return _drive(means, state, joint, end, 1.0, news(f"{name} is there: release, then hold 'next' again"))
 
@@ -191,16 +196,22 @@ def watch(means: Means, state: State, standing: tuple[int, float, float] | None)
     """
     if standing is None:
         return state
-    robot, drive = means.robot, state.drive
+
+    robot = means.robot
+    drive = state.drive
     joint, moved, seconds = standing
-    name, prismatic = robot.joint_names[joint], bool(robot.prismatic[joint])
+    name = robot.joint_names[joint]
+    prismatic = bool(robot.prismatic[joint])
+
     left = abs(drive.goal - float(state.q[joint]))
     near = joint == drive.joint and left <= slack_of(robot)[joint]
     if near and state.press.verb == "next":
         return state  # `next` itself takes the move for made
+
     ended = state.released()
     if near:
         return ended.say(refused(f"{name} comes no nearer than {amount(left, prismatic=prismatic)}: stopped"))
+
     late = f"does not move ({amount(moved, prismatic=prismatic)} in {seconds:.1f} s)"
     stopped = f"stopped, for an arm that follows later than {FOLLOW_SECONDS:g} s is not driven"
     return ended.say(alarm(f"{name} {late}: {stopped}"))
@@ -251,14 +262,17 @@ def _drive(means: Means, state: State, joint: int, goal: float, share: float, at
     here = float(state.q[joint])
     if abs(goal - here) <= state.press.near:
         return state.released().say(at_goal)
+
     speed = max(min(state.speed * share, pace(means, state)), 1e-3)
     rate = speed * float(means.rates[joint])
     if not state.drive.goes_on_to(joint, goal):
         rested = state.at_rest()
         state = replace(rested, drive=rested.drive.begun(here, state.time))
+
     drive = state.drive.on(joint, goal, rate, here, state.time)
     ahead = np.zeros(means.robot.dof)
     ahead[joint] = rate * LEASH_SECONDS
+
     driven = replace(state, drive=drive).do(SetPoint(_with(state.q, joint, drive.point), ahead, joint))
     return driven.say(news(f"driving {means.robot.joint_names[joint]}"))
 
@@ -272,3 +286,20 @@ def _with(q: Vector, joint: int, value: float) -> Vector:
 def _place(robot: Robot, joint: int, value: float) -> str:
     number, unit = reading(value, joint_unit(robot.prismatic[joint]))
     return f"{robot.joint_names[joint]} to {number:.4g} {unit}"
+
+
+VERBS = {
+    "jog": Verb(jog, present=True, held=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
+    "move": Verb(move, present=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
+    "go": Verb(go, present=True, held=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
+    "next": Verb(
+        make_next,
+        present=True,
+        held=True,
+        guided=True,
+        modes=(FOLLOWING,),
+        otherwise="no route is being followed; 'plan' and 'accept' one first",
+    ),
+    "release": Verb(release),
+    "speed": Verb(set_speed),
+}

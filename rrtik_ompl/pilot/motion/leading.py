@@ -26,16 +26,22 @@ from rrtik_ompl.pilot.queries import unseen_for, world_by_hand
 from rrtik_ompl.pilot.state import Means, State
 from rrtik_ompl.world.world import World
 
-NEAR, TURNED = 0.15, np.deg2rad(30.0)  # [m], [rad]; from farther away there may be no straight way to a grasp
-ALIGNED, ALIGNED_SLIDING = np.deg2rad(5.0), 0.01  # [rad], [m]; a master arm that is farther away leads nothing
+NEAR = 0.15  # [m]; from farther away there may be no straight way to a grasp
+TURNED = np.deg2rad(30.0)  # nor from a tool that is turned more than this
+ALIGNED = np.deg2rad(5.0)  # a master arm any of whose joints is farther away leads nothing
+ALIGNED_SLIDING = 0.01  # [m]; the same of a joint that slides
 MAX_STEP_SECONDS = 0.2  # between two renewals
+WHY_NOT = {  # by the state of a `ServoStep`
+    "lost": "{} is not in view",
+    "jumped": "{} has jumped",
+    "blocked": "a limit or an obstacle is in the way; back off, or plan a route",
+}
 
 
 class GraspServo:
     """Leads the tip to a grasp that is seen: what it has seen of it is kept from one step to the next."""
 
     def __init__(self, robot: Robot) -> None:
-        """Begin with nothing seen."""
         self._robot = robot
         self._visual: VisualServo | None = None
         self._world: World | None = None
@@ -65,7 +71,10 @@ def servo(means: Means, state: State, press: float) -> State:
     seen = state.around.named(state.target)
     if seen is None:
         raise InputError(f"{state.target} was not seen yet")
-    goal, world = seen.grasp_pose(*state.choice), state.around.holding(state.target)
+
+    goal = seen.grasp_pose(*state.choice)
+    world = state.around.holding(state.target)
+
     pressed, anew = begins(state, "servo", press)
     before = state.servoed_at
     if anew:
@@ -74,6 +83,7 @@ def servo(means: Means, state: State, press: float) -> State:
             far = f"{100 * away:.0f} cm and {np.rad2deg(turned):.0f} deg away"
             raise InputError(f"the grasp is {far}; servoing is for the last {100 * NEAR:.0f} cm: plan a route first")
         before = state.time - LEASH_SECONDS
+
     seconds = float(np.clip(state.time - before, 1e-3, MAX_STEP_SECONDS))
     in_view = unseen_for(state, state.target) == 0.0
     asked = StepToGrasp(world, goal if in_view else None, seconds, anew, _stepped)
@@ -82,11 +92,13 @@ def servo(means: Means, state: State, press: float) -> State:
 
 def _stepped(means: Means, state: State, step: ServoStep) -> State:
     left = f"{1e3 * step.away:.1f} mm and {np.rad2deg(step.turned):.1f} deg"
+
     if step.state == "done":
         there = f"at the grasp, to {1e3 * step.away:.2f} mm and {np.rad2deg(step.turned):.2f} deg"
         return state.released().say(news(there))
     if step.state != "moving":
-        raise InputError(f"stopped {left} before the grasp: {WHY[step.state].format(state.target)}")
+        raise InputError(f"stopped {left} before the grasp: {WHY_NOT[step.state].format(state.target)}")
+
     fast = float((np.abs(step.rates) / means.rates).max()) / pace(means, state)
     led = _led(means, state, state.q + step.rates * (LEASH_SECONDS / max(fast, 1.0)))
     return led.say(news(f"servoing: {left} to the grasp"))
@@ -107,6 +119,7 @@ def _go_on_leading(means: Means, state: State, master: Vector) -> State:
     away = means.robot.clamp(master) - state.q
     most = means.rates * pace(means, state) * LEASH_SECONDS
     point = state.q + np.clip(away, -most, most)
+
     world = world_by_hand(state)
     if not world.motion_valid(state.q, point):
         touched = world.contacts(point)
@@ -130,11 +143,6 @@ def _check_aligned(robot: Robot, away: Vector) -> None:
         )
 
 
-WHY = {
-    "lost": "{} is not in view",
-    "jumped": "{} has jumped",
-    "blocked": "a limit or an obstacle is in the way; back off, or plan a route",
-}
 VERBS = {
     "servo": Verb(servo, present=True, held=True, guided=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
     "lead": Verb(lead, present=True, held=True, modes=BY_HAND, otherwise=ON_A_ROUTE),

@@ -76,11 +76,16 @@ class Supervisor:
         """
         self.fault = ""
         self._lock = threading.Lock()
-        self._names, self._prismatic, self._rates = robot.joint_names, robot.prismatic, rates
+        self._names = robot.joint_names
+        self._prismatic = robot.prismatic
+        self._rates = rates
         self._slack = slack_of(robot)
         self._q: Vector | None = None
-        self._time, self._changed, self._rest_until = -np.inf, -np.inf, -np.inf
+        self._time = -np.inf
+        self._changed = -np.inf
+        self._rest_until = -np.inf
         self._active = False
+
         zeros = np.zeros(robot.dof)
         self._way = zeros.copy()  # of each joint that is driven: 1 up, -1 down; 0 if it has to stand still
         self._aim = zeros.copy()  # where each joint is told to be
@@ -92,7 +97,8 @@ class Supervisor:
         self._good_at = zeros.copy()  # when each joint was last where it should be
         self._coasts_until = np.full(robot.dof, -np.inf)
         self._coast_way = zeros.copy()  # in which a joint that coasts was driven
-        self._mark, self._mark_time = zeros.copy(), zeros.copy()  # where each joint has moved last, and when
+        self._mark = zeros.copy()  # where each joint has moved last
+        self._mark_time = zeros.copy()  # and when
 
     def acknowledge(self) -> None:
         """The fault is known to the pilot: the arm may be driven again."""
@@ -120,11 +126,13 @@ class Supervisor:
             back = self._back.copy()
             if not self._active:
                 self._begin(q, time)
+
             away = aim - q
             way = np.where(np.abs(away) > 0.0, np.sign(away), self._way)
             turned = (way != self._way) & (self._way != 0.0)
             new = way != self._way
             again = (time <= self._rest_until) & (way == self._coast_way)  # what it did before the stop still counts
+
             self._coasts_until[turned] = time + COAST_SECONDS
             self._coast_way[turned] = self._way[turned]
             self._coasts_until[again] = -np.inf
@@ -132,6 +140,7 @@ class Supervisor:
             self._good_at[new] = time
             self._mark[new] = q[new]
             self._mark_time[new] = time
+
             self._way = way
             self._ahead = ahead
             self._aim = np.where(way != 0.0, aim, self._aim)
@@ -141,6 +150,7 @@ class Supervisor:
         with self._lock:
             if not self._active:
                 return
+
             driven = self._way != 0.0
             self._coasts_until[driven] = time + COAST_SECONDS
             self._coast_way[driven] = self._way[driven]
@@ -160,14 +170,17 @@ class Supervisor:
             if before is None or back_in_time or not watched:
                 self._begin(q, time, active=self._active)
                 return
+
             gap = min(time - self._changed, LONGEST_GAP)
             if (q != before).any():
                 self._changed = time
                 self._changes += int((time >= self._coasts_until).all())
+
             found = self._too_fast(q - before, gap)
             if found and not self._active:  # at rest an arm may be put elsewhere
                 self._begin(q, time, active=False)
                 return
+
             self.fault = self.fault or found or self._elsewhere(q, q - before, time)
             self._note_motion(q, time)
 
@@ -176,10 +189,12 @@ class Supervisor:
         with self._lock:
             if not self._active or self._q is None:
                 return None
+
             patience = np.maximum(FOLLOW_SECONDS, 0.4 * NOISE * self._slack / np.maximum(self._ahead, 1e-9))
             late = (self._way != 0.0) & (time - self._mark_time > patience)
             if not late.any():
                 return None
+
             joint = int(np.flatnonzero(late)[0])
             return joint, float(abs(self._q[joint] - self._mark[joint])), float(time - self._mark_time[joint])
 
@@ -191,23 +206,29 @@ class Supervisor:
         if self._q is None:
             self._q = q.copy()
         self._aim = np.where(self._way != 0.0, self._aim, q)
-        self._back[:], self._good_at[:] = 0.0, time
+        self._back[:] = 0.0
+        self._good_at[:] = time
         self._room = self._slack.copy()
         self._used = 0.0
-        self._changed, self._active = time, active
-        self._mark, self._mark_time = q.copy(), np.full(len(q), time)
+        self._changed = time
+        self._active = active
+        self._mark = q.copy()
+        self._mark_time = np.full(len(q), time)
 
     def _too_fast(self, change: Vector, gap: float) -> str:
         """Whether a joint has moved farther than its rate allows."""
         if not change.any():
             return ""
+
         allowed = FASTEST * self._rates * gap
         room = self._room + allowed - np.abs(change)
         self._room = np.minimum(np.maximum(room, 0.0), self._slack)
         if (room >= 0.0).all():
             return ""
+
         joint = int(room.argmin())
-        name, far = self._names[joint], self._amount(joint, float(change[joint]))
+        name = self._names[joint]
+        far = self._amount(joint, float(change[joint]))
         if abs(change[joint]) > self._slack[joint] + allowed[joint]:
             return f"{name} jumped by {far} between two readings"
         return f"{name} moves faster than {self._amount(joint, FASTEST * float(self._rates[joint]))}/s"
@@ -222,23 +243,27 @@ class Supervisor:
         self._back = np.where(turns, 0.0, np.maximum(self._back - way * change, 0.0))
         wrong = np.where(way != 0.0, self._back, np.abs(q - self._aim))
         self._good_at[wrong <= NOISE * self._slack] = time
+
         speed = wrong / np.maximum(time - self._good_at, READING_SECONDS)
         reaction = np.where(way != 0.0, HUNTING_SECONDS, REACTION_SECONDS)
         excess = np.where(wrong > NOISE * self._slack, wrong + reaction * speed, 0.0) / self._slack
         over = np.where(coasts, 0.0, self._way * (q - self._aim)) / self._slack
         self._used = float(max((wrong / self._slack).max(), over.max()))
+
         joint = int(excess.argmax())
         if excess[joint] > 1.0 and way[joint] != 0.0:
             return f"{self._names[joint]} goes the wrong way, by {self._amount(joint, float(wrong[joint]))}"
         if excess[joint] > 1.0 and (self._active or self._changes >= GOING_ON):
             return self._says(joint, float(wrong[joint]))
+
         joint = int(over.argmax())
         if over[joint] > 1.0:
             return f"{self._names[joint]} went {self._amount(joint, float(q[joint] - self._aim[joint]))} too far"
         return ""
 
     def _says(self, joint: int, wrong: float) -> str:
-        name, far = self._names[joint], self._amount(joint, wrong)
+        name = self._names[joint]
+        far = self._amount(joint, wrong)
         if not self._active:
             return f"{name} moved on by {far} after the stop"
         driven = [each for each, way in zip(self._names, self._way, strict=True) if way != 0.0]
@@ -249,4 +274,5 @@ class Supervisor:
         """Where joints that are driven have moved last, or need not move."""
         asked: Mask = self._way * (self._aim - q) >= ASKED * self._ahead
         new = ~asked | (np.abs(q - self._mark) >= NOISE * self._slack)
-        self._mark[new], self._mark_time[new] = q[new], time
+        self._mark[new] = q[new]
+        self._mark_time[new] = time

@@ -28,7 +28,8 @@ from rrtik_ompl.viewer.drawing import palette
 GHOST_TRIANGLES = 5_000
 FINE_PIXELS = 500_000  # of a picture; in larger ones ghosts are drawn half as fine, in a quarter of the time
 HALF_COVERED = 127
-MAX_FIGURES, MAX_LAYERS = 4, 6
+MAX_FIGURES = 4  # that are kept from picture to picture
+MAX_LAYERS = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,8 +78,11 @@ class Layer:
             colors, depths = (cv2.resize(each, size, interpolation=cv2.INTER_NEAREST) for each in (colors, depths))
             share = cv2.resize(255 * drawn.view(np.uint8), size, interpolation=cv2.INTER_LINEAR)
             drawn = (depths < FARTHEST_DRAWN) & (share > HALF_COVERED)  # without the steps of the coarse one
+
         left, top, width, height = cv2.boundingRect(drawn.view(np.uint8))
+
         box = np.s_[top : top + height, left : left + width]
+
         piece: Any = colors[box]
         if width > 0:
             piece = cv2.cvtColor(cv2.convertScaleAbs(piece, alpha=255.0), cv2.COLOR_RGB2BGR)
@@ -88,6 +92,7 @@ class Layer:
         """Lay it over a picture where a mask is, in place."""
         if self.painted.size == 0:
             return
+
         piece = picture[self.box]
         mixed = cv2.addWeighted(piece, 1.0 - opacity, self.painted, opacity, 0.0)
         cv2.copyTo(mixed, mask[self.box].view(np.uint8), piece)
@@ -104,16 +109,19 @@ class Augmenter:
             camera: Of the pictures, real or virtual.
             triangles: Of the whole arm, at most about.
         """
-        self.robot, self.camera = robot, camera
+        self.robot = robot
+        self.camera = camera
         self._canvas = Canvas(camera)
         large = camera.width * camera.height > FINE_PIXELS
         self._ghosts_canvas = Canvas(half_as_fine(camera)) if large else self._canvas
         self._layers: dict[Hashable, Layer] = {}
         self._arm = figure_of(robot_surfaces(robot, triangles))
+
         thin = robot_surfaces(robot, min(triangles, GHOST_TRIANGLES))
         self._tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
         self._ghost = figure_of(thin)
         self._gripper = figure_of([each for each in thin if each.frame == self._tip.parentJoint])
+
         self._figures: dict[Hashable, tuple[tuple[Obstacle, ...], Figure]] = {}
         self._shapes = ShapeSurfaces()
         self._last: Layer | None = None
@@ -149,16 +157,21 @@ class Augmenter:
         Raises:
             InputError: If the picture does not have the camera's size.
         """
-        height, width = self.camera.height, self.camera.width
+        height = self.camera.height
+        width = self.camera.width
         if picture.shape[:2] != (height, width):
             raise InputError(f"picture has shape {picture.shape[:2]}, the camera's has {(height, width)}")
+
         drawn: NDArray[np.uint8] = np.array(picture if picture.ndim == 3 else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))
         T_camera_base = rigid(T_base_camera, "pose of the camera").inverse().homogeneous
+
         hidden_by = self._depths(real, T_camera_base)
         for ghost in ghosts:
             self._draw_ghost(drawn, ghost, T_camera_base, hidden_by)
+
         solids = self._figure(obstacles)
         self._draw_arm(drawn, self._arm, q, T_camera_base, hidden_by, opacity, color, solids)
+
         if trail is not None:
             self._draw_line(drawn, trail, T_camera_base, palette.TRAIL)
         for frame in frames:
@@ -192,6 +205,7 @@ class Augmenter:
             mask = self._draw_arm(drawn, self._gripper, joint, *style)
         else:
             return
+
         if ghost.outline is not None:
             edges, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
             cv2.drawContours(drawn, edges, -1, (0.0, 0.0, 0.0), 3, cv2.LINE_AA)
@@ -210,6 +224,7 @@ class Augmenter:
     ) -> NDArray[np.bool_]:
         """Draw an arm, or a gripper; where it was drawn."""
         self._last = layer = self._layer(arm, q, solids, T_camera_base, color)
+
         mask = layer.drawn if hidden_by is None else layer.drawn & (layer.depths < hidden_by)
         layer.blend(drawn, mask, opacity)
         return mask
@@ -230,9 +245,11 @@ class Augmenter:
                 canvas.draw(shown if color is None else tinted(shown, palette.fractions(color)))
             if solids is not None:
                 canvas.draw(placed(solids, T[None]))
+
             if len(self._layers) >= MAX_LAYERS:
                 self._layers.pop(next(iter(self._layers)))
             self._layers[key] = Layer.of(canvas, self.camera)
+
         layer = self._layers[key] = self._layers.pop(key)  # the one that was used last is the last to go
         return layer
 
@@ -254,6 +271,7 @@ class Augmenter:
         if key not in self._figures:
             if len(self._figures) >= MAX_FIGURES:
                 self._figures.pop(next(iter(self._figures)))
+
             kept = tuple(obstacles)  # so that no other shape gets the identity of one that is gone
             self._figures[key] = (kept, figure_of(obstacle_surfaces(kept, self._shapes)))
         return self._figures[key][1]
@@ -264,6 +282,7 @@ class Augmenter:
         """Sixteenths of pixels of points in the base's frame, and which of them are before the camera."""
         seen = np.asarray(points, dtype=np.float64) @ T_camera_base[:3, :3].T + T_camera_base[:3, 3]
         before = seen[:, 2] > NEAREST_DRAWN
+
         pixels = np.zeros((len(seen), 2))
         if before.any():
             pixels[before] = self.camera.project(seen[before])
@@ -273,6 +292,7 @@ class Augmenter:
         self, drawn: NDArray[np.uint8], points: Matrix, T_camera_base: NDArray[np.float64], color: str
     ) -> None:
         pixels, before = self._pixels(finite_array(points, (None, 3), "trail"), T_camera_base)
+
         runs = np.split(np.arange(len(pixels)), np.flatnonzero(np.diff(before.astype(int))) + 1)
         for run in runs:
             if len(run) > 1 and before[run[0]]:

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.pilot.overlay.figure import Placed
 from rrtik_ompl.sensing.cameras.camera import Camera
 
-NEAREST_DRAWN, FARTHEST_DRAWN = 0.05, 50.0  # [m]
+NEAREST_DRAWN = 0.05  # [m]
+FARTHEST_DRAWN = 50.0  # [m]
 
 
 class Canvas:
@@ -26,7 +27,6 @@ class Canvas:
     """
 
     def __init__(self, camera: Camera) -> None:
-        """An empty picture."""
         self.camera = camera
         self._view, self._angle = _matrix(camera)
         self.colors: NDArray[np.float32] = np.zeros((camera.height, camera.width, 3), dtype=np.float32)
@@ -50,9 +50,11 @@ class Canvas:
         """
         if len(figure.faces) == 0:
             return
+
         culling = cv2.RASTERIZE_CULLING_NONE if both_sides else cv2.RASTERIZE_CULLING_CW
         settings: Any = cv2.TriangleRasterizeSettings()
         settings = settings.setShadingType(cv2.RASTERIZE_SHADING_SHADED).setCullingMode(culling)
+
         points = np.ascontiguousarray(_bent(figure.points, self.camera), dtype=np.float32)
         rasterize: Any = cv2.triangleRasterize
         self.colors, self.depths = rasterize(
@@ -80,6 +82,7 @@ def half_as_fine(camera: Camera) -> Camera:
 def _matrix(camera: Camera) -> tuple[NDArray[np.float64], float]:
     """World to OpenGL's camera (y up, looking along -z), the intrinsics folded in, and the opening angle [rad]."""
     (fx, _, cx), (_, fy, cy), _ = camera.matrix
+
     fold = np.eye(4)
     fold[0, 0] = fx / fy
     fold[0, 2] = (cx + 0.5 - 0.5 * camera.width) / fy
@@ -91,11 +94,14 @@ def _bent(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
     """Points moved aside so that a pinhole shows them where the lens does; edges between them stay straight."""
     if not camera.distortion.any():
         return points
+
     k1, k2, p1, p2, k3 = camera.distortion.astype(np.float32)
     depth = np.maximum(points[:, 2], NEAREST_DRAWN)
-    x, y = points[:, 0] / depth, points[:, 1] / depth
+    x = points[:, 0] / depth
+    y = points[:, 1] / depth
     square = np.minimum(x * x + y * y, 4.0)  # far outside the picture the polynomial turns back
     radial = 1.0 + square * (k1 + square * (k2 + square * k3))
+
     bent = points.copy()
     bent[:, 0] = depth * (x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x))
     bent[:, 1] = depth * (y * radial + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y)

@@ -56,6 +56,7 @@ def figure_of(surfaces: Sequence[Surface]) -> Figure:
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
     frames = sorted({surface.frame for surface in ranked})
     ends = [max(starts[k + 1] for k, s in enumerate(ranked) if s.frame == frame) for frame in frames]
+
     empty = np.zeros((0, 3))
     return Figure(
         np.concatenate([empty, *(s.vertices for s in ranked)]).astype(np.float32),
@@ -75,12 +76,15 @@ def placed(figure: Figure, T_camera_frames: Sequence[ArrayLike] | NDArray[np.flo
         T_camera_frames: Pose of frame k in the frame of the camera, shape (frames, 4, 4).
     """
     poses = np.asarray(T_camera_frames, dtype=np.float32)
-    points, normals = np.empty_like(figure.vertices), np.empty_like(figure.normals)
+    points = np.empty_like(figure.vertices)
+    normals = np.empty_like(figure.normals)
+
     for frame, low, high in zip(figure.frames, figure.bounds, figure.bounds[1:], strict=False):
         turn = poses[frame, :3, :3].T
         np.matmul(figure.vertices[low:high], turn, out=points[low:high])
         points[low:high] += poses[frame, :3, 3]
         np.matmul(figure.normals[low:high], turn, out=normals[low:high])
+
     lengths = np.sqrt(np.einsum("ij,ij->i", points, points))
     facing = np.abs(np.einsum("ij,ij->i", normals, points)) / np.maximum(lengths, 1e-9)
     colors = figure.colors * (AMBIENT + (1.0 - AMBIENT) * facing)[:, None]

@@ -22,7 +22,8 @@ from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.sensing.sensor import Sensor
 
 FILMS = {".mp4": "mp4v", ".avi": "MJPG"}
-DEFAULT_RATE, MAX_RATE = 30.0, 240.0  # pictures a second
+DEFAULT_RATE = 30.0  # pictures a second
+MAX_RATE = 240.0
 TRAIL_POINTS = 80
 ROOM_BYTES = 65536
 
@@ -51,12 +52,17 @@ class ArmInPictures:
         self._rows = finite_array(waypoints, (None, robot.dof), "waypoints of the film")
         if len(self._rows) == 0 or not seconds > 0.0 or not 0 <= ghosts <= 20:
             raise InputError(f"a film needs a waypoint, seconds above 0 and 0 to 20 ghosts; got {seconds:g}, {ghosts}")
+
         lengths = np.linalg.norm(np.diff(self._rows, axis=0), axis=1)
         self._shares = np.concatenate([[0.0], np.cumsum(lengths)]) / max(float(lengths.sum()), 1e-12)
-        self._robot, self._sensor, self._seconds = robot, sensor, seconds
+        self._robot = robot
+        self._sensor = sensor
+        self._seconds = seconds
+
         self._augmenter = Augmenter(robot, sensor.camera)
         self._ahead = np.linspace(0.0, 1.0, ghosts + 1)[1:]
         self._trail = robot.fk_batch(self._along(np.linspace(0.0, 1.0, TRAIL_POINTS)))[:, :3, 3]
+
         self._T_base_camera: pin.SE3 | None = None
         self._known: dict[str, SeenObject] = {}
         self._begin: float | None = None
@@ -78,8 +84,10 @@ class ArmInPictures:
             if self._T_base_camera is None:
                 self.without_base += 1
                 return picture.pixels
+
         self._known |= {each.object.name: each for each in view.placed}
         self._begin = picture.time if self._begin is None else self._begin
+
         share = min((picture.time - self._begin) / self._seconds, 1.0)
         q = self._along(np.array([share]))[0]
         ghosts = [Ghost(row) for row in self._along(self._ahead[self._ahead > share])] if len(self._rows) > 1 else []
@@ -112,12 +120,16 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
     """
     if path.suffix.lower() not in FILMS:
         raise InputError(f"{path}: a film ends in {', '.join(FILMS)}")
-    unfinished, writer, count = path.with_name(f".{path.stem}.unfinished{path.suffix}"), None, 0
+
+    unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
+    writer = None
+    count = 0
     try:
         for frame in frames:
             writer = writer or _writer(unfinished, path, rate, frame.shape)
             writer.write(frame)
             count += 1
+
         if writer is None:
             raise InputError(f"{path}: there is no picture to write")
         writer.release()

@@ -63,7 +63,6 @@ class ShapeSurfaces:
     """Surfaces of obstacles' shapes, each made once: what moves from picture to picture keeps its shape."""
 
     def __init__(self) -> None:
-        """Begin with none."""
         self._made: dict[int, tuple[Shape, Surface]] = {}  # with the shape, so that no other gets its identity
 
     def of(self, shape: Shape) -> Surface:
@@ -103,10 +102,14 @@ def _link_surfaces(bodies: Sequence[object], triangles: int) -> tuple[Surface, .
 
 
 def _link_surface(body: object, limit: int) -> Surface | None:
-    geometry, joint, placement = body.geometry, body.parentJoint, body.placement  # type: ignore[attr-defined]
+    geometry = body.geometry  # type: ignore[attr-defined]
+    joint = body.parentJoint  # type: ignore[attr-defined]
+    placement = body.placement  # type: ignore[attr-defined]
+
     color = palette.ROBOT_ALTERNATE if joint % 2 else palette.ROBOT
     if body.overrideMaterial:  # type: ignore[attr-defined]
         color = palette.hexadecimal(body.meshColor[:3])  # type: ignore[attr-defined]
+
     try:
         shape = shape_of(geometry)
     except InputError:  # a mesh without area: nothing to see
@@ -127,6 +130,7 @@ def _welded(vertices: Matrix, faces: Faces) -> tuple[Matrix, Faces]:
     """The same with vertices at one place made one, and without triangles that lose their area by that."""
     _, first, index = np.unique(np.round(vertices, 12), axis=0, return_index=True, return_inverse=True)
     merged = np.asarray(index).reshape(-1)[faces]
+
     whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
     return vertices[first], merged[whole].astype(np.int64)
 
@@ -135,8 +139,10 @@ def _normals(vertices: Matrix, faces: Faces) -> Matrix:
     """Means of the normals of the triangles at each vertex, weighted by their area."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     across = np.cross(b - a, c - a)
+
     total = np.zeros_like(vertices)
     for k in range(3):
         np.add.at(total, faces[:, k], across)
+
     unit: Matrix = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
     return unit

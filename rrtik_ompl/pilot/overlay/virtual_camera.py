@@ -32,7 +32,9 @@ def orbit_pose(centre: ArrayLike, distance: float, azimuth: float, elevation: fl
     """
     at = finite_array(centre, (3,), "centre")
     away = positive(distance, "distance")
-    turn, rise = finite_number(azimuth, "azimuth"), finite_number(elevation, "elevation")
+    turn = finite_number(azimuth, "azimuth")
+    rise = finite_number(elevation, "elevation")
+
     back = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
     right = np.array([-np.sin(turn), np.cos(turn), 0.0])
     down = np.cross(-back, right)
@@ -42,6 +44,7 @@ def orbit_pose(centre: ArrayLike, distance: float, azimuth: float, elevation: fl
 def background(camera: Camera) -> NDArray[np.uint8]:
     """A pale background. Shape (height, width, 3), blue, green, red."""
     ends = np.array([palette.fractions(c)[::-1] for c in (palette.BACKGROUND_TOP, palette.BACKGROUND_BOTTOM)])
+
     share = np.linspace(0.0, 1.0, camera.height)[:, None]
     rows = np.rint(255.0 * ((1.0 - share) * ends[0] + share * ends[1])).astype(np.uint8)
     return np.repeat(rows[:, None], camera.width, axis=1)

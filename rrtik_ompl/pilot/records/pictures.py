@@ -37,7 +37,8 @@ class PictureRecord(GrowingFile):
         Raises:
             InputError: If the file beside it cannot be written, or is there already.
         """
-        self._record, self._path = record, beside(path)
+        self._record = record
+        self._path = beside(path)
         self._last: NDArray[np.uint8] | None = None
         try:
             self._file = open(self._path, "xb")  # noqa: SIM115 - open as long as the session
@@ -50,8 +51,10 @@ class PictureRecord(GrowingFile):
         """Add a picture of a time [s], unless it is the same as the last one."""
         if self._file is None or picture is self._last:
             return
+
         self._last = picture
         _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+
         begin = self._file.tell()
         try:
             self._file.write(bytes(data))

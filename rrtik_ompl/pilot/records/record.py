@@ -25,7 +25,8 @@ class GrowingFile:
 
     def news(self) -> str:
         """Why the record has ended, the first time that this is asked; else ""."""
-        said, self._told = "" if self._told else self.fault, bool(self.fault)
+        said = "" if self._told else self.fault
+        self._told = bool(self.fault)
         return said
 
     def close(self) -> None:
@@ -45,7 +46,8 @@ class Record(GrowingFile):
         Raises:
             InputError: If the file cannot be written, or holds something: a session cannot be repeated.
         """
-        self._path, self._end = path, 0
+        self._path = path
+        self._end = 0
         if path is not None:
             try:
                 self._file = open(path, "ab", buffering=0)  # noqa: SIM115 - open as long as the session
@@ -59,6 +61,7 @@ class Record(GrowingFile):
         """Add a line. Where there is no room for it the record ends with the line before: the session goes on."""
         if self._file is None:
             return
+
         line = (json.dumps({"time": round(time, 6), "kind": kind, **values}) + "\n").encode()
         written = 0
         try:
@@ -83,6 +86,7 @@ def read_record(path: str | os.PathLike[str]) -> Iterator[dict[str, Any]]:
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not text"
         raise InputError(f"{path}: {reason.lower()}; give a record of rrtik pilot") from None
+
     for number, line in enumerate(lines, start=1):
         try:
             entry = json.loads(line)

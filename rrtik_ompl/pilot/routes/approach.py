@@ -21,7 +21,8 @@ MAX_JOINTS = 3  # that move between such a configuration and the grasp
 MAX_OFFSET = 0.02  # [m] from the pose before the object
 MAX_TILT = np.deg2rad(20.0)  # from its orientation
 STANDOFF_FACTORS = (1.0, 1.5, 2.0)  # distances from the object that are tried, over that of the pose before it
-ITERATIONS, DAMPING = 8, 1e-4  # of the search for such configurations; [m^2]
+ITERATIONS = 8  # of the search for such configurations
+DAMPING = 1e-4  # of it [m^2]
 ERROR_SAMPLES = 40  # small errors that measure the clearance of a beginning
 
 
@@ -64,19 +65,28 @@ def _beginnings(world: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin
     """Free configurations before the object that differ from the grasp in few joints, best first. Shape (k, dof)."""
     joints = range(world.robot.dof)
     sets = [np.isin(joints, some) for size in range(1, MAX_JOINTS + 1) for some in combinations(joints, size)]
-    at, back = stages[1].translation, stages[0].translation - stages[1].translation
+
+    at = stages[1].translation
+    back = stages[0].translation - stages[1].translation
     places = np.repeat([at + far * back for far in STANDOFF_FACTORS], len(sets), axis=0)
+
     small = slack(JointPath.of(world.robot, grasp[None]))
     rows = _moved_to_places(world.robot, grasp, np.tile(sets, (len(STANDOFF_FACTORS), 1)), places)
     rows = np.where(np.abs(rows - grasp) <= small, grasp, rows)  # no move for a difference too small to notice
+
     _, first = np.unique(rows, axis=0, return_index=True)
-    rows, places = rows[first], places[first]
+    rows = rows[first]
+    places = places[first]
+
     poses = world.robot.fk_batch(rows)
     aside = np.linalg.norm(poses[:, :3, 3] - places, axis=1)
     cosine = 0.5 * (np.einsum("ij,mij->m", stages[1].rotation, poses[:, :3, :3]) - 1.0)
+
     near = (aside < MAX_OFFSET) & (cosine > np.cos(MAX_TILT))
     near[near] = world.valid_batch(rows[near])
-    rows, moving = rows[near], (rows[near] != grasp).sum(axis=1)
+
+    rows = rows[near]
+    moving = (rows != grasp).sum(axis=1)
     order = np.lexsort((-cosine[near], moving, _touching(world, rows, small)))
     return np.asarray(rows[order])
 

@@ -27,16 +27,19 @@ def closest_pair(world: World, rows: Matrix) -> Contact | None:
         world: Robot and surroundings.
         rows: Configurations that are free, shape (m, dof), m > 0.
     """
-    bound, best = np.full(len(rows), -np.inf), None
+    bound = np.full(len(rows), -np.inf)
+    best = None
     while True:
         row = int(np.argmin(bound))
         if best is not None and bound[row] >= best.clearance - CLEARANCE_ERROR:
             return best
+
         found = world.closest(rows[row], known_free=True)
         if found is None:
             return None
         if best is None or found.clearance < best.clearance:
             best = found
+
         bound = np.maximum(bound, found.clearance - 2.0 * np.abs(rows - rows[row]) @ world.weights)
         bound[row] = np.inf
 
@@ -57,6 +60,7 @@ def proven_clearance(parts: Iterable[tuple[World, Matrix]]) -> float:
 
     if kept(FARTHEST):
         return float("inf")
+
     low = 0
     high = FARTHEST
     while high - low > 1:
@@ -77,7 +81,9 @@ def executions(path: JointPath, slack: Vector, count: int, rng: np.random.Genera
     Returns:
         Shape (count, moves + 1, dof).
     """
-    names, moves = list(path.joint_names), path.moves()
+    names = list(path.joint_names)
+    moves = path.moves()
+
     rows = np.tile(path.start, (count, len(moves) + 1, 1))
     for number, move in enumerate(moves, start=1):
         joint = names.index(move.joint)
@@ -97,6 +103,7 @@ def free_rows(world: World, rows: Matrix) -> NDArray[np.bool_]:
     """Which of some `executions` touch nothing; a joint that stops at its limit is no fault. Shape (count,)."""
     if rows.shape[1] < 2:
         return np.ones(len(rows), dtype=bool)
+
     inside = world.robot.clamp(rows.reshape(-1, rows.shape[-1])).reshape(rows.shape)
     starts, ends = (part.reshape(-1, rows.shape[-1]) for part in (inside[:, :-1], inside[:, 1:]))
     return np.asarray(world.motion_valid_batch(starts, ends).reshape(len(rows), -1).all(axis=1))

@@ -60,7 +60,7 @@ class Follower:
 
     @cached_property
     def moves(self) -> tuple[Move, ...]:
-        """Moves of the path."""
+        """Of single joints, in their order."""
         return self.path.moves()
 
     @cached_property
@@ -92,16 +92,21 @@ class Follower:
         if joint is None:
             lost = self._lost(q, self._corners[-1], None)
             return self, lost or Progress(self.current, 1.0, 0.0, "done")
-        begin, end = self._corners[self.current][joint], self._corners[self.current + 1][joint]
+
+        begin = self._corners[self.current][joint]
+        end = self._corners[self.current + 1][joint]
         lost = self._lost(q, self._corners[self.current], joint)
         if lost is not None:
             return self, lost
+
         remaining = float(end - q[joint])
         if abs(remaining) <= min(MADE, 0.5 * abs(end - begin)):  # a short move has to be made, too
             return replace(self, current=self.current + 1).update(q)
+
         inside = min(begin, end) - self.slack[joint] <= q[joint] <= max(begin, end) + self.slack[joint]
         if not inside:
             return self, self._off(joint, float(q[joint]), float(end))
+
         share = float(np.clip(1.0 - remaining / (end - begin), 0.0, 1.0))
         ending = abs(remaining) <= self.rates[joint] * REACTION_SECONDS
         return self, Progress(self.current, share, remaining, "stop" if ending else "move")
@@ -118,7 +123,9 @@ class Follower:
         joint = self.joint()
         if joint is None:
             raise InputError("all moves are done")
-        name, left = self.path.joint_names[joint], abs(float(self.target[joint] - q[joint]))
+        name = self.path.joint_names[joint]
+        left = abs(float(self.target[joint] - q[joint]))
+
         shown, unit = reading(left, joint_unit(self.path.prismatic[joint]))
         if left > self.slack[joint]:
             raise InputError(f"{name}: {shown:.3g} {unit} are left of the move")
@@ -167,7 +174,8 @@ def path_fault(world: World, path: JointPath) -> str:
 
 def _corners(path: JointPath, moves: tuple[Move, ...]) -> Matrix:
     """Configurations before and after each move. Shape (moves + 1, dof)."""
-    names, rows = list(path.joint_names), [np.array(path.start)]
+    names = list(path.joint_names)
+    rows = [np.array(path.start)]
     for move in moves:
         row = rows[-1].copy()
         row[names.index(move.joint)] = move.end

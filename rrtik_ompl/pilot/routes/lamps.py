@@ -31,7 +31,8 @@ STAGES: tuple[Stage, Stage, Stage] = ("approach", "grasp", "lift")
 GREEN: Final = "green"
 AMBER: Final = "amber"
 RED: Final = "red"
-LIMITS, UNREACHABLE = "joint limits", "out of reach"
+LIMITS = "joint limits"
+UNREACHABLE = "out of reach"
 NUMERIC_SECONDS = 0.01  # for a pose, where the arm has no closed form
 DIAGNOSIS_SECONDS = 0.02  # for the reason why one grasp cannot be made
 
@@ -62,7 +63,9 @@ class Lamp:
 def stage_poses(T_base_object: pin.SE3, grasp: GraspType, level: int) -> tuple[pin.SE3, pin.SE3, pin.SE3]:
     """``T_base_tip`` of approach, grasp and lift."""
     at = T_base_object * grasp.levels[level]
-    before, after = at.copy(), at.copy()
+    before = at.copy()
+    after = at.copy()
+
     before.translation = at.translation - grasp.approach * at.rotation[:, 2]
     after.translation = at.translation + np.array([0.0, 0.0, grasp.lift])
     return before, at, after
@@ -90,22 +93,31 @@ def lamps(
     names = [(grasp, level) for grasp in thing.grasps for level in range(len(grasp.levels))]
     if not names:
         return ()
+
     poses = np.array([[T.homogeneous for T in stage_poses(T_base_object, *name)] for name in names])
     postures, why = _postures(world.robot, poses.reshape(-1, 4, 4), near, seconds)
     shape = (len(names), len(STAGES), *postures.shape[1:])
     postures = postures.reshape(shape)
+
     free = _free(postures, (world, holding, holding))
     nearest = _nearest(world.robot, postures, free, near)
-    found, stuck = [], not (world.valid(near) or holding.valid(near))
+
+    found = []
+    stuck = not (world.valid(near) or holding.valid(near))
     for row, (grasp, level) in enumerate(names):
         reasons = why[row * len(STAGES) : (row + 1) * len(STAGES)]
+
         grasps = postures[row, 1][free[row, 1]]
         clear = free[row].any(axis=1)
         if clear[1] and not clear[0]:
             clear[0] = _approached(world, holding, nearest[row, 1], stage_poses(T_base_object, grasp, level))
+
         color, stage, fault = _color(reasons, clear)
         if stuck and color == GREEN:
-            color, stage, fault = AMBER, STAGES[0], "the arm touches something where it is"
+            color = AMBER
+            stage = STAGES[0]
+            fault = "the arm touches something where it is"
+
         reason = "" if stage is None else f"{stage}: {fault}"
         found.append(Lamp(grasp.name, level, color, stage, reason, nearest[row], grasps))
     return tuple(found)
@@ -131,6 +143,7 @@ def diagnose(
     """
     if lamp.stage is None:
         return ""
+
     stage = STAGES.index(lamp.stage)
     goal = PoseGoal(stage_poses(T_base_object, thing.grasp(lamp.type), lamp.level)[stage])
     found = solve_ik(world.robot, goal, near=near, world=(world, holding, holding)[stage], seconds=DIAGNOSIS_SECONDS)
@@ -164,6 +177,7 @@ def _free(postures: NDArray[np.float64], worlds: tuple[World, ...]) -> NDArray[n
 def _nearest(robot: Robot, postures: NDArray[np.float64], free: NDArray[np.bool_], near: Vector) -> NDArray[np.float64]:
     """Of the free postures of each stage the nearest one, NaN where there is none. Shape (m, stages, dof)."""
     away = np.linalg.norm(joint_difference(robot, postures, near), axis=-1)
+
     best = np.argmin(np.where(free, away, np.inf), axis=2)
     chosen: NDArray[np.float64] = np.take_along_axis(postures, best[..., None, None], axis=2)[:, :, 0]
     some: NDArray[np.bool_] = np.asarray(free.any(axis=2))
@@ -174,6 +188,7 @@ def _color(reasons: list[str], clear: NDArray[np.bool_]) -> tuple[Color, Stage |
     """Color, the first stage that fails and why; reasons why stages are out of reach, and which stages are free."""
     if reasons[1]:
         return RED, STAGES[1], reasons[1]
+
     failing = next((k for k in (1, 0, 2) if not clear[k]), None)
     if failing is None:
         return GREEN, None, ""

@@ -82,20 +82,25 @@ def check_move(world: World, q: Vector, joint: int, target: float) -> MoveCheck:
         raise InputError(f"joint must be a number from 0 to {robot.dof - 1}, got {joint}")
     if not np.isfinite(target):
         raise InputError(f"target of {robot.joint_names[joint]} must be a finite number, got {target}")
-    start, end = robot.configuration(q), robot.configuration(q).copy()
+    start = robot.configuration(q)
+    end = start.copy()
     end[joint] = target
+
     fault = robot.limit_fault(end)
     if fault:
         return MoveCheck(False, fault, (), -np.inf)
+
     end = robot.clamp(end)
     if not world.valid(start):
         return _out_of_contact(world, start, end)
     if not world.motion_valid(start, end):
         return MoveCheck(False, _obstruction(world, start, end, joint), (), -np.inf)
+
     share = np.linspace(0.0, 1.0, CLEARANCE_SAMPLES)[:, None]
     rows = start + share * (end - start)
     nearest = closest_pair(world, rows)
     clearance = np.inf if nearest is None else nearest.distance
+
     warnings = [*_singular(world, end)]
     if nearest is not None and clearance < CLEARANCE_WARNING:
         warnings.append(f"only {1e3 * max(clearance, 0.0):.0f} mm between {nearest.first} and {nearest.second}")
@@ -109,12 +114,14 @@ def free_until(world: World, q: Vector, joint: int, target: float) -> float:
 
     By bisection; the arm must be free at q.
     """
-    robot, start = world.robot, world.robot.configuration(q)
+    robot = world.robot
+    start = robot.configuration(q)
     end = start.copy()
     end[joint] = min(max(target, float(robot.lower[joint])), float(robot.upper[joint]))
     if world.motion_valid(start, end):
         return float(end[joint])
-    low, high = 0.0, 1.0
+    low = 0.0
+    high = 1.0
     for _ in range(12):
         middle = 0.5 * (low + high)
         if world.motion_valid(start, start + middle * (end - start)):
@@ -128,6 +135,7 @@ def move_refusal(world: World, q: Vector, joint: int, target: float, check: Move
     """Why a move is refused, in one line, and how far the joint is free."""
     if not world.valid(q):
         return f"refused: {check.reason}"
+
     value, unit = reading(free_until(world, q, joint, target), joint_unit(world.robot.prismatic[joint]))
     return f"refused: {check.reason}; free until {value:.4g} {unit}"
 
@@ -138,7 +146,8 @@ def way_out(world: World, q: Vector, joint: int, sign: float) -> float:
     Raises:
         InputError: If it does not.
     """
-    small, check = float(slack(JointPath.of(world.robot, q[None]))[joint]), None
+    small = float(slack(JointPath.of(world.robot, q[None]))[joint])
+    check = None
     for far in ESCAPE_STEPS:
         target = float(q[joint]) + sign * far * small
         check = check_move(world, q, joint, target)
@@ -149,7 +158,8 @@ def way_out(world: World, q: Vector, joint: int, sign: float) -> float:
 
 def joint_range(world: World, q: Vector, joint: int) -> JointRange:
     """How far a joint can be driven; nowhere if the arm touches something, a full turn if it is endless and free."""
-    robot, here = world.robot, float(q[joint])
+    robot = world.robot
+    here = float(q[joint])
     if not world.valid(q):
         why = world.explain(q)
         return JointRange(here, here, why, why, ())
@@ -164,8 +174,10 @@ def _reach(world: World, q: Vector, joint: int, limit: float, turn: float) -> tu
     reached = free_until(world, q, joint, end)
     if reached == end:
         return end, name
-    start, last = q.copy(), q.copy()
-    start[joint], last[joint] = reached, end
+    start = q.copy()
+    last = q.copy()
+    start[joint] = reached
+    last[joint] = end
     touching = world.contacts(_first_blocked(world, start, last))
     return reached, f"{touching[0].first} meets {touching[0].second}" if touching else "too close to tell"
 
@@ -203,6 +215,7 @@ def escape_advice(world: World, q: Vector) -> str:
     out = escape_move(world, q)
     if out is None:
         return "drive the arm out of it first"
+
     value, unit = reading(out[1], joint_unit(world.robot.prismatic[out[0]]))
     return f"{world.robot.joint_names[out[0]]} to {value:.4g} {unit} gets it free"
 
@@ -213,8 +226,8 @@ def _out_of_contact(world: World, start: Vector, end: Vector) -> MoveCheck:
     gaps = np.array([world.clearance(row) for row in rows])
     free = int(np.argmax(gaps > 0.0))
     if gaps[-1] <= 0.0 or (np.diff(gaps[: free + 1]) <= 0.0).any() or not world.motion_valid(rows[free], end):
-        return MoveCheck(False, f"the arm touches something, and this does not get it free: {world.explain(start)}", (),
-                       -np.inf)  # fmt: skip
+        why = f"the arm touches something, and this does not get it free: {world.explain(start)}"
+        return MoveCheck(False, why, (), -np.inf)
     return MoveCheck(True, "", ("out of contact",), float(gaps[-1]))
 
 
@@ -242,5 +255,6 @@ def _near_singular(robot: Robot, rows: Matrix) -> dict[str, Mask]:
     """Which configurations are near each singular case, shape (m,); by the Jacobian, "", if the robot names none."""
     if has_closed_form(robot):
         return {case: np.asarray(size < SINGULARITY_THRESHOLD) for case, size in form_of(robot).nearness(rows).items()}
+
     least = np.linalg.svd(robot.jacobian_batch(rows), compute_uv=False)[:, -1]
     return {"": np.asarray(least < SINGULARITY_THRESHOLD)}

@@ -48,7 +48,9 @@ def detours(world: World, start: Vector, goal: Vector, order: Sequence[int], rng
     ends = np.array([start, goal])
     if lattice_size(values_of(ends)) > MAX_CORNERS:
         return []
+
     lower, upper = turning_limits(world.robot, ends)
+
     found: list[Matrix] = []
     for joint in range(world.robot.dof):
         values = values_of(ends)
@@ -102,5 +104,6 @@ def _planner() -> tuple[str, dict[str, Any]]:
 def _routes(world: World, start: Vector, goal: Vector, values: Values, orders: Sequence[Sequence[int]]) -> list[Matrix]:
     lattice = MoveLattice(values, world.motion_valid_batch, np.ones(world.robot.dof))
     found = [lattice.best_route(start, goal, order) for order in orders]
+
     different = {route.tobytes(): route for route in found if route is not None}
     return list(different.values())

@@ -44,9 +44,12 @@ def propose(
         return route_to(world, q, np.array(problem.goal.q), rates, seed)
     if not len(lamp.grasps):
         return NoRoute(lamp.reason)
+
     nearest_first = np.argsort(np.linalg.norm(joint_difference(problem.robot, lamp.grasps, q), axis=1), kind="stable")
     stages = stage_poses(seen.T_base_object, seen.object.grasp(lamp.type), lamp.level)
-    holding, none = surroundings.holding(seen.object.name), NoRoute(lamp.reason)
+
+    holding = surroundings.holding(seen.object.name)
+    none = NoRoute(lamp.reason)
     for number, grasp in enumerate(lamp.grasps[nearest_first]):
         found = route_to_grasp(world, holding, q, stages, grasp, rates, seed)
         if isinstance(found, Route):

@@ -23,8 +23,10 @@ from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, RouteSearch, Tail
 from rrtik_ompl.world.world import World
 
-END_OFFSET, END_TURN = 2e-4, np.deg2rad(0.04)  # [m], [rad] of the tip from its grasp, at the end of a route
-MAX_END_OFFSET, MAX_END_TURN = 5e-4, np.deg2rad(0.1)  # the same of an arm that has followed it
+END_OFFSET = 2e-4  # [m] of the tip from its grasp, at the end of a route
+END_TURN = np.deg2rad(0.04)
+MAX_END_OFFSET = 5e-4  # [m]; the same of an arm that has followed it
+MAX_END_TURN = np.deg2rad(0.1)
 MAX_BEGINNINGS = 6  # configurations in front of the object that are tried
 
 
@@ -60,6 +62,7 @@ class Route:
     def summary(self) -> str:
         """The head of the list in one line, with a warning where a small error may touch something."""
         head = "all joints at once" if self.together else f"{len(self.path.moves())} moves"
+
         line = ", ".join((f"{head}, {self.seconds:.0f} s, {self._clear()}", *map(str, self.contacts)))
         if self.robustness >= MIN_ROBUSTNESS or self.together:
             return line
@@ -115,16 +118,20 @@ def _tails(
     short = approaches(world, holding, grasp, stages, MAX_BEGINNINGS)
     if short:
         return short
+
     before = solve_ik_batch(world.robot, [stages[0].homogeneous], near=grasp, world=world, seed=seed)
     if not before.found[0]:
         return NoRoute(before.details[0] or before.reasons[0] or "not to be reached", "the pose before the object")
+
     last = planned(holding, before.q[0], grasp, seed)
     return NoRoute(str(last), "from before the object to it") if isinstance(last, NoRoute) else [[last]]
 
 
 def _without_tiny_moves(world: World, goal: Vector, q: Vector) -> Vector:
     """A goal whose joints that are there already need not move, as long as the tip ends where it should."""
-    robot, kept = world.robot, goal
+    robot = world.robot
+    kept = goal
+
     wanted = robot.fk(goal)
     for joint in np.argsort(np.abs(goal - q)):
         tried = kept.copy()
@@ -144,12 +151,17 @@ def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates
         return NoRoute(str(error))
     if isinstance(found, NoRoute):
         return found
+
     path = JointPath.of(world.robot, found.rows)
-    moves, names = path.moves(), list(path.joint_names)
+    moves = path.moves()
+    names = list(path.joint_names)
+
     seconds = sum(abs(move.change) / rates[names.index(move.joint)] for move in moves)
     used = tuple(name for name in names if any(move.joint == name for move in moves))
     travel = sum(abs(move.change) for move in moves)
-    robustness, proven = search.robustness(found), search.proven(found)
+
+    robustness = search.robustness(found)
+    proven = search.proven(found)
     clearance = search.clearance(found) if proven else 0.0
     return Route(
         path, found.grasp_from, travel, float(seconds), clearance, used, robustness, proven,

@@ -18,7 +18,8 @@ from rrtik_ompl.world.world import World
 
 EXECUTIONS = 100  # with errors, that measure the robustness of a route
 MIN_ROBUSTNESS = 0.99  # a smaller one is warned of
-TRIALS, FINALISTS = 40, 4  # executions by which all routes are compared; routes that are compared by EXECUTIONS
+TRIALS = 40  # executions by which all routes are compared
+FINALISTS = 4  # the best of them, which are compared by EXECUTIONS
 
 Tail = Sequence[Matrix]  # last parts of routes from one configuration, shape (moves + 1, dof) each, at least one
 
@@ -41,7 +42,10 @@ class RouteSearch:
     """
 
     def __init__(self, world: World, holding: World, q: Vector, seed: int) -> None:
-        self._world, self._holding, self._q, self._seed = world, holding, q, seed
+        self._world = world
+        self._holding = holding
+        self._q = q
+        self._seed = seed
         self._forgiving = forgiving(holding)
         self._path = JointPath.of(world.robot, q[None])
         self._slack = slack(self._path)
@@ -61,9 +65,11 @@ class RouteSearch:
             if best is not None and (self.proven(best) or not self._provable(tails[0])):
                 return best
             unproven = unproven or best
+
         first = planned(self._world, self._q, tails[0][0][0], self._seed)
         if isinstance(first, NoRoute):
             return unproven or first
+
         best = self._best(_joined(first, part) for part in tails[0])
         if best is not None and self.proven(best):
             return best
@@ -72,7 +78,8 @@ class RouteSearch:
     def robustness(self, route: GraspRoute, count: int = EXECUTIONS) -> float:
         """Share of executions that touch nothing but what is grasped although every move ends with a small error."""
         made = executions(self._path.with_waypoints(route.rows), self._slack, count, np.random.default_rng(self._seed))
-        before, after = made[:, : route.grasp_from + 1], made[:, route.grasp_from :]
+        before = made[:, : route.grasp_from + 1]
+        after = made[:, route.grasp_from :]
         return float((free_rows(self._world, before) & free_rows(self._forgiving, after)).mean())
 
     def proven(self, route: GraspRoute) -> bool:
@@ -111,6 +118,7 @@ class RouteSearch:
 
     def _best(self, routes: Iterable[GraspRoute]) -> GraspRoute | None:
         finalists = sorted(routes, key=lambda route: self._rank(route, TRIALS))[:FINALISTS]
+
         ranked = sorted(finalists, key=lambda route: self._rank(route, EXECUTIONS))
         proven = next(filter(self.proven, ranked), None)
         return proven or next((route for route in ranked if not self._fault(route)), None)
@@ -128,7 +136,8 @@ class RouteSearch:
 
     def _parts(self, route: GraspRoute) -> tuple[tuple[World, Matrix], ...]:
         """What may touch nothing and what may touch the object, each with its world."""
-        before, after = route.rows[: route.grasp_from + 1], route.rows[route.grasp_from :]
+        before = route.rows[: route.grasp_from + 1]
+        after = route.rows[route.grasp_from :]
         return (self._world, before), (self._holding, after)
 
 

@@ -26,7 +26,8 @@ from rrtik_ompl.world.world import World
 
 PLANNER_SECONDS = 5.0
 STAGE = "with all joints at once"
-AHEAD_SECONDS, PLACES = 0.5, 51  # within which the arm is looked for on its path, and at how many places
+AHEAD_SECONDS = 0.5  # within which the arm is looked for on its path
+PLACES = 51  # at which it is looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,11 +87,14 @@ class Track:
         """The track with the place that an arm at q has reached, and the arm's progress."""
         places = np.linspace(self.at, min(self.at + AHEAD_SECONDS, self.seconds), PLACES)
         off = np.abs(np.array([self._place(each) for each in places]) - q) / self.slack
+
         nearest = int(off.max(axis=1).argmin())
         if off[nearest].max() > 1.0:
             return self, Progress(0, self.share, 0.0, "lost", self._fault(q, int(off[nearest].argmax())))
+
         if self.done or np.abs(q - self.path.end).max() <= MADE:
             return replace(self, current=1, at=self.seconds), Progress(1, 1.0, 0.0, "done")
+
         moved = replace(self, at=float(places[nearest]))
         return moved, Progress(0, moved.share, moved.seconds - moved.at, "move")
 
@@ -140,15 +144,19 @@ def together(route: Route, world: World, rates: Vector, seed: int) -> Route | No
         seed: Of the random numbers.
     """
     rows = route.path.waypoints
-    before, last = rows[route.grasp_from], rows[route.grasp_from + 1 :]
+    before = rows[route.grasp_from]
+    last = rows[route.grasp_from + 1 :]
     if route.grasp_from == 0:
         return NoRoute("only moves of single joints are left", STAGE)
+
     problem = Problem(world, rows[0], before)
     found = plan(problem, "rrtconnect", seconds=PLANNER_SECONDS, seed=seed)
     if found.path is None:
         return NoRoute(found.reason, STAGE)
+
     path = shorten(found.path, problem, seed=seed)
     whole = path.with_waypoints(np.vstack([path.waypoints, last]))
+
     used = tuple(name for name, way in zip(whole.joint_names, np.ptp(whole.waypoints, axis=0), strict=True) if way > 0)
     return replace(
         route, path=whole, grasp_from=len(path.waypoints) - 1, seconds=Track(whole, rates).seconds, joints=used,

@@ -8,8 +8,10 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-FRAMES, STATES = 2, 8  # unacknowledged messages to a client at a time; states are small, and their age counts
-PILOT, WATCHING = "pilot", "watching"
+FRAMES = 2  # pictures to a client that it has not acknowledged, at a time
+STATES = 8  # the same of states, which are small, and whose age counts
+PILOT = "pilot"
+WATCHING = "watching"
 Message = bytes | str
 
 
@@ -23,7 +25,8 @@ class Lane:
             send: Sends a message.
             width: Number of messages that may be unacknowledged.
         """
-        self._send, self._width = send, width
+        self._send = send
+        self._width = width
         self._waiting: dict[str, Message] = {}
         self.under_way = 0
         self.dropped = 0
@@ -56,8 +59,11 @@ class Client:
             name: Chosen by the page; it keeps it when it connects again.
             send: Sends a message to it.
         """
-        self.number, self.name, self.send = number, name, send
-        self.frames, self.states = Lane(send, FRAMES), Lane(send, STATES)
+        self.number = number
+        self.name = name
+        self.send = send
+        self.frames = Lane(send, FRAMES)
+        self.states = Lane(send, STATES)
         self.heard: float | None = None  # stamp of the last state that it says to have shown
 
     def send_json(self, **words: object) -> None:
@@ -86,6 +92,7 @@ class Clients:
     def join(self, client: Client) -> None:
         """Register a page; restore its role as pilot if it had that before and the role is free."""
         self._all.append(client)
+
         returns = client.name == self._last_pilot and not self._handed_over
         if self.pilot is None and (len(self._all) == 1 or returns):
             self._make_pilot(client)
@@ -112,7 +119,8 @@ class Clients:
     def hand_over(self, client: Client) -> None:
         """The pilot lets another page take over."""
         if client is self.pilot:
-            self.pilot, self._handed_over = None, True
+            self.pilot = None
+            self._handed_over = True
             self._on_left()
             self._send_roles()
 
@@ -131,7 +139,9 @@ class Clients:
             client.frames.offer(kind, frame)
 
     def _make_pilot(self, client: Client) -> None:
-        self.pilot, self._last_pilot, self._handed_over = client, client.name, False
+        self.pilot = client
+        self._last_pilot = client.name
+        self._handed_over = False
 
     def _send_roles(self) -> None:
         for client in self._all:

@@ -81,7 +81,8 @@ class PageHandler(Guarded):
 
     def initialize(self, server: Served, file: tuple[str, str]) -> None:
         """Take the server, and a file and its kind."""
-        self.server, self._file = server, file
+        self.server = server
+        self._file = file
 
     def get(self) -> None:
         """Give out the file."""
@@ -95,7 +96,7 @@ class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
     """The line to a page."""
 
     def initialize(self, server: Served) -> None:
-        """Take the server."""
+        """As tornado calls it in place of a constructor."""
         self.server = server
         self._client: Client | None = None
         self._unsent = 0
@@ -105,6 +106,7 @@ class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
         super().prepare()
         if not self.server.knows_token(self.get_argument("token", "")):
             raise tornado.web.HTTPError(403, reason=NO_TOKEN)
+
         if len(self.server.clients) >= MAX_PAGES:
             raise tornado.web.HTTPError(503, reason=TOO_MANY)
 
@@ -113,7 +115,7 @@ class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
         return self.server.may(self.request)
 
     def open(self, *_: str, **__: str) -> None:
-        """Register the page."""
+        """Register the page; the first one is the pilot."""
         self.set_nodelay(True)
         name = self.get_argument("page", "")[:MAX_NAME_LENGTH]
         self._client = Client(next(self.server.numbers), name, self._send)
@@ -127,7 +129,7 @@ class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
             self.server.receive(self._client, message)
 
     def on_close(self) -> None:
-        """Let the page go."""
+        """Let the page go; if it was the pilot, the arm stops."""
         self.server.open_sockets.discard(self)
         if self._client is not None:
             self.server.clients.leave(self._client)

@@ -46,8 +46,10 @@ MAX_MESSAGE_BYTES = 16 * 1024  # from a page
 MAX_QUEUED_COMMANDS = 200
 MAX_STAMP = 1e12  # [s]
 MIN_TOKEN_LENGTH = 16
-GOING_AWAY, FAREWELL_SECONDS = 1001, 0.1  # code of a WebSocket that is closed, and time for it to arrive
-PING_SECONDS, PONG_SECONDS = 10.0, 10.0  # a page over a line of some seconds sees, although it drives nothing
+GOING_AWAY = 1001  # code of a WebSocket that is closed
+FAREWELL_SECONDS = 0.1  # for it to arrive
+PING_SECONDS = 10.0  # so that a page over a line of some seconds sees, although it drives nothing
+PONG_SECONDS = 10.0
 REPORT_SECONDS = 0.25
 REQUEST_SECONDS = 20.0  # for a whole request, and between two on one connection
 
@@ -83,10 +85,14 @@ class PilotServer:
         Raises:
             InputError: If the port, the address or the certificate cannot be used, or the token is missing or short.
         """
-        self.host, self.token, self.title = host, token, title
+        self.host = host
+        self.token = token
+        self.title = title
+
         self._check_token()
         self._tls = tls_context(certificate, key)
         self.reported = clock.monotonic()
+
         try:
             self._sockets = tornado.netutil.bind_sockets(port, host)
         except (OSError, OverflowError, UnicodeError) as error:
@@ -94,9 +100,11 @@ class PilotServer:
             raise InputError(f"port {port} on {host}: cannot be used: {reason}; choose another, or 0 for any") from None
         self.port = int(self._sockets[0].getsockname()[1])
         self.commands: queue.Queue[tuple[int, dict[str, Any]]] = queue.Queue()
+
         self.clients = Clients(self._pilot_left)
         self.numbers = itertools.count(1)
         self.open_sockets: set[tornado.websocket.WebSocketHandler] = set()
+
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -130,7 +138,8 @@ class PilotServer:
     def may(self, request: HTTPServerRequest) -> bool:
         """Whether a request names this server, and comes from its own page or from none."""
         hosts = {f"{name}:{self.port}" for name in (self._name, *(("localhost",) if self.host == LOOPBACK else ()))}
-        host, origin = request.headers.get("Host"), request.headers.get("Origin")
+        host = request.headers.get("Host")
+        origin = request.headers.get("Origin")
         return host in hosts and (origin is None or origin == f"{self._scheme}://{host}")
 
     def knows_token(self, word: str) -> bool:
@@ -204,6 +213,7 @@ class PilotServer:
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
         logging.getLogger("tornado").addHandler(logging.NullHandler())  # errors are shown on the page
+
         handlers: list[Any] = [(path, PageHandler, {"server": self, "file": file}) for path, file in FILES.items()]
         application = tornado.web.Application(
             [*handlers, ("/ws", SocketHandler, {"server": self})],
@@ -212,6 +222,7 @@ class PilotServer:
             websocket_ping_interval=PING_SECONDS,
             websocket_ping_timeout=PONG_SECONDS,
         )
+
         http = tornado.httpserver.HTTPServer(
             application,
             max_body_size=MAX_MESSAGE_BYTES,
@@ -219,9 +230,11 @@ class PilotServer:
             idle_connection_timeout=REQUEST_SECONDS,
             body_timeout=REQUEST_SECONDS,
         )
+
         http.add_sockets(self._sockets)
         self._report()
         self._loop.run_forever()
+
         http.stop()
         self._loop.run_until_complete(http.close_all_connections())
         self._loop.close()
