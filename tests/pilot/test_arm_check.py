@@ -13,7 +13,8 @@ from rrtik_tests.pilot_session import PROBLEM, ROBOT, session
 
 def plate():
     """A marker on a sheet before the gripper, above the shelf; it faces the camera where the arm begins."""
-    tip, eye = ROBOT.fk(PROBLEM.start), load_vehicle(find_vehicle("titan4_sdu")).T_base_camera.translation
+    tip = ROBOT.fk(PROBLEM.start)
+    eye = load_vehicle(find_vehicle("titan4_sdu")).T_base_camera.translation
     towards = eye - tip.translation
     z = towards / np.linalg.norm(towards)
     x = np.cross([0.0, 0.0, 1.0], z)
@@ -42,7 +43,8 @@ def vehicle_with(folder, offset):
 @pytest.mark.parametrize("offset", [0.0, 1.5])
 def test_an_arm_that_reads_wrong_angles_stands_still(tmp_path, offset):
     opened = open_session(SessionOptions("titan4_sdu", vehicle=vehicle_with(tmp_path, offset)))
-    engine, made = opened.engine, opened.engine.session
+    engine = opened.engine
+    made = opened.engine.session
     for count in range(5):
         engine.update((1.0 + STILL_SECONDS) * count / 4)
     assert any(each.object.role == "arm" for each in engine.perception._sensor._before)
@@ -53,7 +55,8 @@ def test_an_arm_that_reads_wrong_angles_stands_still(tmp_path, offset):
 
 def test_nothing_is_said_of_an_arm_that_moves_and_it_is_taken_back():
     made, _ = session()
-    tip, spread = made.robot.fk(made.q), 1e-8 * np.eye(6)
+    tip = made.robot.fk(made.q)
+    spread = 1e-8 * np.eye(6)
     made.tick(0.0)
     made.see_arm(tip * pose([0.0, 0.0, 0.02]), spread, 0.1)
     assert made.known.arm_off == ""

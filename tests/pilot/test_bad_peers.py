@@ -178,7 +178,8 @@ def test_a_request_that_trickles_in_stops_the_arm_and_frees_the_place():
 
 def test_a_connection_that_cannot_be_taken_does_not_end_the_server(monkeypatch):
     with LineServer(SimulatedArm(ROBOT, START)) as server:
-        accept, failures = socket.socket.accept, iter([OSError(24, "Too many open files")] * 3)
+        accept = socket.socket.accept
+        failures = iter([OSError(24, "Too many open files")] * 3)
 
         def failing(listening):
             raise next(failures, None) or TimeoutError
@@ -210,7 +211,8 @@ def test_whatever_a_request_says_the_arm_stays_where_an_arm_can_be(do, joint, ta
 
 
 def test_a_silent_thread_stops_the_arm_once_and_is_named():
-    arm, told = SimulatedArm(ROBOT, START), []
+    arm = SimulatedArm(ROBOT, START)
+    told = []
     last = {"one": time.monotonic(), "two": np.inf}
     reports = {name: lambda name=name: last[name] for name in last}
     arm.move(0, 0.5)
@@ -240,7 +242,8 @@ def test_a_watchdog_outlives_a_terminal_that_has_gone():
     def tell(_):
         raise BrokenPipeError("no reader")
 
-    arm, last = SimulatedArm(ROBOT, START), {"one": 0.0, "two": np.inf}
+    arm = SimulatedArm(ROBOT, START)
+    last = {"one": 0.0, "two": np.inf}
     reports = {name: lambda name=name: last[name] for name in last}
     with Watchdog(arm, reports, patience=0.1, tell=tell) as watchdog:
         until(lambda: watchdog.fault)
@@ -262,7 +265,9 @@ def test_a_camera_that_breaks_in_any_way_is_lost_and_comes_back():
             raise breaks.pop(0)
         threading.Event().wait(10.0)
 
-    feed, reasons, shown = Feed(pictures), set[str](), []
+    feed = Feed(pictures)
+    reasons = set[str]()
+    shown = []
 
     def all_seen():
         try:

@@ -9,6 +9,7 @@ import pytest
 
 import rrtik_ompl.pilot
 from rrtik_ompl import AttachedObject, Box, Obstacle, Problem, Scene, World, pose
+from rrtik_ompl.pilot.answers import Level
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.session import Session
@@ -16,7 +17,7 @@ from rrtik_ompl.pilot.surroundings import MAX_SHIFT, Surroundings, gripper_links
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_tests.distances import least_distances
-from rrtik_tests.pilot_session import PROBLEM, ROBOT, WORLD, hold, session
+from rrtik_tests.pilot_session import PROBLEM, ROBOT, WORLD, alarmed, arrived, hold, session
 
 DEEPER = 1e-3  # [m]
 Q = np.array(PROBLEM.goal.q)
@@ -40,7 +41,9 @@ def depth(plate, rows):
 
 def plate_below(depth_there):
     """A plate into which the bar reaches so deep at Q."""
-    low, high, at = -0.5, 0.0, ROBOT.fk(Q).act(AHEAD.translation)
+    low = -0.5
+    high = 0.0
+    at = ROBOT.fk(Q).act(AHEAD.translation)
     for _ in range(40):
         middle = 0.5 * (low + high)
         plate = Obstacle("plate", Box([0.3, 0.3, 0.1]), pose(at + np.array([0.0, 0.0, middle])))
@@ -64,7 +67,9 @@ def test_what_the_gripper_takes_gets_a_millimetre_deeper_into_what_it_rests_on_a
     said = made.command("close", 0.1)
     assert "bar is held" in said
     assert ("'plate' may overlap" in said) == (there >= 0.0)
-    around, most, touched = made.surroundings, max(there, 0.0) + DEEPER, 0
+    around = made.surroundings
+    most = max(there, 0.0) + DEEPER
+    touched = 0
     for joint in range(ROBOT.dof):
         made.command("select", 0.2, joint=joint)
         free = made.joint_range()
@@ -82,8 +87,10 @@ def test_what_the_gripper_takes_gets_a_millimetre_deeper_into_what_it_rests_on_a
 def test_what_was_taken_from_a_plate_is_kept_away_from_it_once_the_two_have_parted():
     made, arm, plate = with_bar(1e-3)
     made.command("close", 0.1)
-    assert "away, 'bar' and 'plate' may overlap by 2 mm;" in made.command("lift", 0.1)
-    assert [str(contact) for contact in made.world.scene.contacts] == ["'bar' and 'plate' may overlap by 2 mm"]
+    (contact,) = made.world.scene.contacts
+    assert str(contact) in made.command("lift", 0.1)
+    assert set(contact.names) == {"bar", "plate"}
+    assert contact.distance == pytest.approx(-2e-3, abs=1e-6)
     made.command("accept", 0.1)
     time = 0.1
     for press in range(20):
@@ -91,7 +98,7 @@ def test_what_was_taken_from_a_plate_is_kept_away_from_it_once_the_two_have_part
         time = hold(made, arm, "next", time, lambda now=due: made.follower.current != now, seconds=5.0, press=press)
         if made.mode != "following":
             break
-    assert made.message == "all moves are done"
+    assert arrived(made)
     assert made.world.scene.contacts == ()
     assert depth(plate, made.q[None]) < 0.0
     assert not made.world.valid(Q)
@@ -112,16 +119,18 @@ def test_what_stands_just_inside_the_margin_of_something_may_be_taken():
 def test_who_lets_go_of_something_deep_in_something_else_is_told(there):
     made, _, _ = with_bar(there)
     made.command("close", 0.1)
-    said = made.command("open", 0.2)
-    assert said == ("open: 'bar' would be left 4 mm inside 'plate'; 1 mm at most" if there else "open: bar is put down")
+    made.command("open", 0.2)
+    assert alarmed(made, "'bar'", "4 mm", "'plate'", "1 mm") if there else made.level is Level.NEWS
     assert made.state.holds == ""
     assert made.world.scene.attached == ()
 
 
 def tool_and_rack(q):
     """What a session knows while it holds the tool where it is put into the rack, at q."""
-    around, marker_map = Surroundings(WORLD), TOOL.marker_map
-    tool, rack = marker_map.named("tool"), marker_map.named("rack")
+    around = Surroundings(WORLD)
+    marker_map = TOOL.marker_map
+    tool = marker_map.named("tool")
+    rack = marker_map.named("rack")
     seen = SeenObject(tool, ROBOT.fk(q) * tool.grasp("straight").levels[0].inverse(), 1e-10 * np.eye(6), None)
     around = around.see([seen])
     around = around.hold(seen, ROBOT.fk(q).actInv(seen.T_base_object), q)
@@ -145,7 +154,8 @@ def touching(world, q):
 def test_what_is_put_down_gets_a_millimetre_deeper_into_its_place_than_there_and_no_more():
     around = tool_and_rack(Q)
     holding = around.holding("rack")
-    there, touched = distances(holding, Q)["tool", "rack"], 0
+    there = distances(holding, Q)["tool", "rack"]
+    touched = 0
     for q in near(Q, 300):
         if {"tool", "rack"} not in touching(holding, q):
             away = distances(holding, q)["tool", "rack"]
@@ -155,7 +165,8 @@ def test_what_is_put_down_gets_a_millimetre_deeper_into_its_place_than_there_and
 
 
 def test_the_gripper_gets_no_deeper_into_what_it_is_to_grasp_than_at_a_grasp_and_a_little():
-    around, tool = Surroundings(WORLD), TOOL.marker_map.named("tool")
+    around = Surroundings(WORLD)
+    tool = TOOL.marker_map.named("tool")
     levels = tool.grasp("straight").levels
     around = around.see([SeenObject(tool, ROBOT.fk(Q) * levels[0].inverse(), 1e-10 * np.eye(6), None)])
     world = around.holding("tool")
@@ -175,11 +186,13 @@ def test_the_gripper_gets_no_deeper_into_what_it_is_to_grasp_than_at_a_grasp_and
 
 
 def test_nothing_but_what_is_buried_in_the_gripper_is_ever_left_out_of_the_comparison():
-    around, marker_map = tool_and_rack(Q), TOOL.marker_map
+    around = tool_and_rack(Q)
+    marker_map = TOOL.marker_map
     worlds = [around.world, around.holding("rack"), around.world_at(Q, "rack")]
     around = around.release(ROBOT.fk(Q))
     worlds += [around.world, around.holding("tool"), around.holding("rack"), around.world_at(Q, "tool")]
-    links, solids = set(gripper_links(ROBOT)), {name for each in marker_map.objects for name in each.solid_names}
+    links = set(gripper_links(ROBOT))
+    solids = {name for each in marker_map.objects for name in each.solid_names}
     for world in worlds:
         for first, second in set(world.scene.allowed_collisions) - set(WORLD.scene.allowed_collisions):
             assert first in links
@@ -200,4 +213,6 @@ def test_the_pilot_leaves_pairs_out_in_one_place_and_to_count_errors():
 def test_a_route_to_what_is_buried_in_the_gripper_says_that_it_is_not_compared():
     made, _ = session()
     made.command("grasp", 0.0, type="front", level=0)
-    assert "(the gripper is not compared with valve)" in made.command("plan", 0.0)
+    said = made.command("plan", 0.0)
+    assert "not compared" in said
+    assert "valve" in said

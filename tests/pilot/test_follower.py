@@ -44,7 +44,8 @@ def test_a_follower_is_a_value_that_stays_as_it_is():
 
 def test_a_move_shorter_than_the_tolerance_has_to_be_made_all_the_same():
     rows = np.zeros((3, 6))
-    rows[1:, 0], rows[2:, 1] = np.radians(0.8), 0.5
+    rows[1:, 0] = np.radians(0.8)
+    rows[2:, 1] = 0.5
     following = Follower(JointPath.of(ROBOT, rows), joint_rates(ROBOT))
     assert [each.move for each in progress(following, rows[0], rows[1])] == [0, 1]
 
@@ -59,7 +60,8 @@ def test_the_wrong_joint_or_the_wrong_way_is_lost_and_named():
 
 
 def test_what_remains_is_what_will_be_made_each_joint_alone_from_where_the_others_are():
-    following, off = follower(), np.radians([0.0, 0.6, -0.5, 0.3, 0.0, 0.9])
+    following = follower()
+    off = np.radians([0.0, 0.6, -0.5, 0.3, 0.0, 0.9])
     following, _ = following.update(CORNERS[0] + off)
     here = CORNERS[0] + off
     rest = following.rest(here)

@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rrtik_ompl.pilot.answers import Level
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
-from rrtik_tests.pilot_session import PLACE, VALVE, follow, session
+from rrtik_tests.pilot_session import PLACE, VALVE, arrived, drive_at, follow, refused, session
 
 TOOL = Path(find_vehicle("titan4_sdu")).with_name("titan4_tool.yaml")
 
@@ -18,11 +19,11 @@ class Driver:
 
     def __init__(self, record=None):
         self.opened = open_session(SessionOptions("titan4_sdu", vehicle=TOOL, record=record, seed=1))
-        self.engine, self.time, self.presses = self.opened.engine, 0.0, 0
+        self.engine = self.opened.engine
+        self.time = 0.0
+        self.presses = 0
         self.session = self.engine.session
-        for rates in (self.session.means.rates, self.session.arm._rates):
-            rates.flags.writeable = True
-        self.session.means.rates[:] = self.session.arm._rates[:] = 1.5
+        drive_at(self.session, 1.5)
         self.passes(2)
 
     def passes(self, steps, **command):
@@ -58,7 +59,7 @@ class Driver:
                     break
             self.session.command("release", self.time)
             self.passes(1)
-        assert self.session.message == "all moves are done"
+        assert arrived(self.session)
 
     def place(self, name):
         return self.engine.perception.source.camera.places[name]
@@ -78,7 +79,8 @@ def test_a_tool_is_picked_lifted_carried_and_placed(tmp_path):
     hands.go_to("rack", "put")
     assert "tool is put down" in hands.do("open")
     hands.passes(3)
-    rack, level = load_vehicle(TOOL).places["rack"], 0
+    rack = load_vehicle(TOOL).places["rack"]
+    level = 0
     pick, put = (load_vehicle(TOOL).marker_map.named(name).grasp(kind).levels[level]
                  for name, kind in (("tool", "straight"), ("rack", "put")))  # fmt: skip
     wanted = rack * put * pick.inverse()
@@ -121,14 +123,21 @@ def test_a_gripper_closed_on_what_is_fixed_keeps_the_arm_still_until_it_opens():
     for verb, arguments in (("grasp", {"type": "front", "level": 0}), ("plan", {}), ("accept", {})):
         made.command(verb, 0.1, **arguments)
     time = follow(made, arm, 0.1)
-    assert made.command("close", time) == "closed on valve"
+    assert "valve" in made.command("close", time)
+    assert made.state.gripper.fixed == "valve"
     assert arm.closed
     for verb, arguments in (("jog", {"direction": 1.0, "press": 500}), ("plan", {}), ("move", {"target": 0.0})):
-        assert "is fixed; open it first" in made.command(verb, time, **arguments)
-    assert made.command("open", time) == "open"
-    assert "nothing is held" in made.command("lift", time)
-    assert made.command("open", time) == "the gripper is open already"
-    assert "driving" in made.command("jog", time, direction=-1.0, press=501)
+        made.command(verb, time, **arguments)
+        assert refused(made, "valve", "open it first")
+        assert not made.driving
+    made.command("open", time)
+    assert made.level is Level.NEWS
+    assert not arm.closed
+    for verb in ("lift", "open"):
+        made.command(verb, time)
+        assert refused(made)
+    made.command("jog", time, direction=-1.0, press=501)
+    assert made.driving
 
 
 def test_a_gripper_that_closes_far_from_everything_says_how_far():

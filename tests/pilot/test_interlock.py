@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.pilot.answers import Level
 from rrtik_ompl.pilot.devices.arm import DEFAULT_RATE, SimulatedArm
 from rrtik_ompl.pilot.drive import LEASH_SECONDS, Press
 from rrtik_ompl.pilot.interlock import FOLLOWING, MODES, PROPOSED
 from rrtik_ompl.pilot.routes.follower import Follower
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.state import Gripper, Way
-from rrtik_tests.pilot_session import ALWAYS, MOVING, PRESENT, PROBLEM, session
+from rrtik_tests.pilot_session import ALWAYS, MOVING, PRESENT, PROBLEM, alarmed, refused, session
 
 ARGUMENTS = {
     "jog": {"direction": 1.0, "press": 1},
@@ -45,7 +46,9 @@ def planned():
 def put_into(planned, route, mode, link, picture):
     """A session in a state, at time 100."""
     made, arm = planned
-    arm._q, arm._goal, arm.lost = PROBLEM.start.copy(), None, link
+    arm._q = PROBLEM.start.copy()
+    arm._goal = None
+    arm.lost = link
     made.stand_still()
     q = arm.read()
     made.state = replace(
@@ -67,7 +70,8 @@ def put_into(planned, route, mode, link, picture):
 
 
 def test_no_command_in_no_state_moves_the_arm_where_it_may_not(planned):
-    route, count = planned[0].route, 0
+    route = planned[0].route
+    count = 0
     for mode, link, picture, verb in product(MODES, ("", "the line is cut"), PICTURES, (*PRESENT, *ALWAYS)):
         made, arm = put_into(planned, route, mode, link, picture)
         made.command(verb, 100.0, **ARGUMENTS.get(verb, {}))
@@ -138,7 +142,7 @@ def test_a_stop_outlasts_the_key_that_is_still_held():
 def test_a_key_held_while_the_picture_comes_back_does_nothing_until_it_is_pressed_anew():
     made, arm = session()
     made.command("jog", 60.0, direction=1.0, press=7)
-    assert made.message == "refused: the picture is stale"
+    assert refused(made, "picture", "stale")
     time = held_for(made, arm, 1.0, 60.0)
     assert arm.read() == pytest.approx(PROBLEM.start, abs=0.0)
     held_for(made, arm, 1.0, time, press=8)
@@ -154,7 +158,7 @@ def test_a_picture_that_grows_stale_stops_the_arm_and_takes_the_route_back():
         arm.advance(0.03)
         made.tick(0.13 + 0.03 * k)
     assert made.mode == PROPOSED
-    assert "the picture is stale: stopped" in made.message
+    assert alarmed(made, "picture", "stale", "stopped")
     assert arm.moving is None
     made.see([], 3.0)
     made.tick(3.0)
@@ -223,4 +227,5 @@ def test_the_page_chooses_an_object_by_its_name():
     engine = open_session(SessionOptions("titan4_sdu")).engine
     engine.update(0.0)
     engine.execute({"name": "object", "object": "valve"}, 0.1)
-    assert engine.session.message == "valve chosen; now a grasp"
+    assert engine.session.target == "valve"
+    assert engine.session.level is Level.NEWS

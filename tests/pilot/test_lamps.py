@@ -27,7 +27,8 @@ def test_lamps_agree_with_all_branches_looked_at_one_by_one():
     surroundings = Surroundings(WORLD)
     for T in random_places(25, seed=3):
         surroundings = surroundings.see([seen_at(T)])
-        world, holding = surroundings.world, surroundings.holding("valve")
+        world = surroundings.world
+        holding = surroundings.holding("valve")
         for lamp in lamps(world, VALVE, T, PROBLEM.start, holding=holding):
             stages = stage_poses(T, VALVE.grasp(lamp.type), lamp.level)
             before, at, after = (branches(stage) for stage in stages)
@@ -49,7 +50,9 @@ def branches(stage):
 
 
 def test_red_lamps_do_not_plan_and_green_ones_do():
-    surroundings, colors, rates = Surroundings(WORLD), [], joint_rates(ROBOT)
+    surroundings = Surroundings(WORLD)
+    colors = []
+    rates = joint_rates(ROBOT)
     for T in random_places(6, seed=5):
         surroundings = surroundings.see([seen_at(T)])
         holding = surroundings.holding("valve")

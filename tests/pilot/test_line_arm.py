@@ -13,6 +13,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.line_arm import UNSEEN_SECONDS, LineArm, LineServer
 from rrtik_ompl.pilot.session import Session
+from rrtik_tests.pilot_session import alarmed, refused
 from rrtik_tests.waiting import until
 
 PROBLEM = load_problem("titan4_sdu")
@@ -47,9 +48,10 @@ def test_a_lost_line_is_said_keeps_the_joints_stops_the_arm_and_comes_back():
     until(lambda: arm.lost)
     session.tick(1.0)
     kept = session.q.copy()
-    assert "connection to the arm is lost" in session.message
+    assert alarmed(session, arm.lost)
     for verb, arguments in (("jog", {"direction": 1.0, "press": 2}), ("move", {"target": 0.1}), ("plan", {})):
-        assert "refused: the connection to the arm is lost" in session.command(verb, 1.1, **arguments)
+        session.command(verb, 1.1, **arguments)
+        assert refused(session, arm.lost)
     session.tick(1.2)
     assert session.q == pytest.approx(kept)
     with LineServer(SimulatedArm(ROBOT, START), server.port):
@@ -118,7 +120,9 @@ class Recording:
     """A judge that counts what it is given, and finds what it is told to find."""
 
     def __init__(self):
-        self.fault, self.share, self.readings = "", 1.0, 0
+        self.fault = ""
+        self.share = 1.0
+        self.readings = 0
 
     def read(self, q, time):
         self.readings += 1
@@ -128,7 +132,8 @@ class Recording:
 
 
 def test_an_arm_with_a_judge_is_told_nothing_but_to_stop_while_there_is_a_fault(monkeypatch):
-    asked, execute = [], LineServer._execute
+    asked = []
+    execute = LineServer._execute
 
     def noting(server, request):
         asked.append(request)

@@ -39,7 +39,8 @@ def test_the_same_state_and_event_give_the_same_and_change_neither_state_nor_arm
     made.command("grasp", 0.0, type="front", level=0)
     made.command("plan", 0.0)
     made.command("accept", 0.0)
-    before, q = made.state, arm.read()
+    before = made.state
+    q = arm.read()
     kept = {each.name: getattr(before, each.name) for each in fields(before)}
     for event in (
         given("next", press=1),

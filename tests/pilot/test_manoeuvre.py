@@ -16,8 +16,9 @@ from rrtik_tests.pilot_session import PROBLEM, ROBOT, WORLD, hold
 @pytest.mark.slow
 def test_no_command_of_many_leads_beyond_limits_or_into_anything():
     rng = np.random.default_rng(0)
-    q, accepted = np.array(PROBLEM.start), []
-    for _ in range(400):
+    q = np.array(PROBLEM.start)
+    accepted = []
+    for _ in range(200):
         joint = int(rng.integers(6))
         target = float(q[joint] + rng.normal(0.0, 0.6))
         if check_move(WORLD, q, joint, target).allowed:
@@ -26,9 +27,9 @@ def test_no_command_of_many_leads_beyond_limits_or_into_anything():
             accepted.append((q, end))
             q = end
     starts, ends = (np.array(rows) for rows in zip(*accepted, strict=True))
-    share = np.linspace(0.0, 1.0, 40)[:, None]
+    share = np.linspace(0.0, 1.0, 25)[:, None]
     rows = np.concatenate([a + share * (b - a) for a, b in zip(starts, ends, strict=True)])
-    assert len(accepted) > 60
+    assert len(accepted) > 30
     assert ROBOT.within_limits(rows).all()
     assert WORLD.certify(rows).all()
 

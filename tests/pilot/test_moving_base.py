@@ -36,10 +36,8 @@ def test_drift_and_sway_are_what_is_stated():
 
 
 def test_obstacles_stay_with_the_structure_that_they_are_fixed_to():
-    around, shift = (
-        Surroundings(WORLD, Structure("valve", PLACE)),
-        pose_from_rpy([0.02, -0.03, 0.01], [0.0, 0.02, 0.05]),
-    )
+    around = Surroundings(WORLD, Structure("valve", PLACE))
+    shift = pose_from_rpy([0.02, -0.03, 0.01], [0.0, 0.02, 0.05])
     around = around.see([seen_at(shift * PLACE)])
     for before in WORLD.scene.obstacles:
         after = around.world.scene.obstacle(before.name)
@@ -63,7 +61,8 @@ def test_a_file_says_how_the_vehicle_moves_and_a_wrong_one_is_refused_in_a_line(
 def test_a_route_is_withdrawn_when_the_vehicle_has_drifted_and_the_arm_stands_still(tmp_path):
     file = vehicle_file(tmp_path, "base_motion: {drift: [0.004, -0.003, 0.002]}")
     opened = open_session(SessionOptions("titan4_sdu", vehicle=file))
-    engine, time = opened.engine, 0.0
+    engine = opened.engine
+    time = 0.0
     session = engine.session
 
     def passes(seconds, **command):

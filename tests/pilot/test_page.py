@@ -7,6 +7,7 @@ import pytest
 from rrtik_ompl.pilot.setup import SessionOptions
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError
 from rrtik_tests.browser import HEIGHT, WIDTH, Running
+from rrtik_tests.pilot_session import drive_at
 
 
 def choose(browser, color):
@@ -91,8 +92,7 @@ def type_a_value(browser, running):
 
 def follow(browser, running):
     """Hold N for one move after the other until the arm, which is made fast, has made all of them."""
-    running.opened.engine.session.means.rates.flags.writeable = True
-    running.opened.engine.session.means.rates[:] = running.opened.engine.session.arm._rates[:] = 3.0
+    drive_at(running.opened.engine.session, 3.0)
     for _ in range(40):
         if browser.ask("state.mode") != "following":
             return
@@ -122,7 +122,8 @@ def test_a_second_page_watches_and_a_lost_camera_and_a_lost_server_are_said(brow
         browser.press("t")
         browser.wait("role.role === 'pilot'")
         source = running.opened.engine.perception.source
-        latest, source.latest = source.latest, gone
+        latest = source.latest
+        source.latest = gone
         browser.wait("document.getElementById('camera_banner').textContent.includes('Camera lost: unplugged')")
         browser.wait("document.getElementById('alerts').textContent.includes('Camera lost')")
         browser.wait("document.body.classList.contains('stale')")

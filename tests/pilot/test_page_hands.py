@@ -56,7 +56,8 @@ def settled(running, seconds=0.5):
 @pytest.fixture
 def releases(running, monkeypatch):
     """Where the azimuth was [deg] whenever the server was told that a key is let go."""
-    noted, session = [], running.opened.engine.session
+    noted = []
+    session = running.opened.engine.session
     command = session.command
 
     def noting(verb, *arguments, **named):
@@ -119,20 +120,6 @@ def test_who_watches_may_stop_the_arm_and_the_button_is_large(page):
         assert page.ask(CUT_OFF) == [], (width, height)
 
 
-def keep_pushed(page, button, script, end=None):
-    """Push a button of the gamepad until something is so; `end` is what ends it then, if it is not let go."""
-
-    def let_go():
-        page.ask(f"push({button}, false)")
-        page.wait(f"held === null && !padBefore[{button}]")
-
-    page.keep(
-        lambda: page.ask(f"push({button}, true)"),
-        lambda: page.ask(end) if end and page.ask(script) else let_go(),
-        script,
-    )
-
-
 def keep_stick(page, script, end):
     """Press the shoulder button with the stick at rest, and push the stick until something is so."""
 
@@ -170,52 +157,17 @@ def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is
     assert settled(running, 0.3) == there  # pressed anew, but the stick was not let go
     page.ask("push(4, false); pad.axes[0] = 0; 0")
     page.wait("!padBefore[4]")
-    for button, wanted in ((13, "state.selected === 1"), (12, "state.selected === 0"), (14, "state.speed === 0.5"),
-                           (15, "state.speed === 1")):  # fmt: skip
+    wanted = {
+        13: "state.selected === 1",
+        12: "state.selected === 0",
+        14: "state.speed === 0.5",
+        15: "state.speed === 1",
+        6: "state.choice !== null",
+        7: "state.choice.level === 1",
+    }
+    for button, done in wanted.items():
         page.ask(f"push({button}, true)")
-        page.wait(wanted)
+        page.wait(done)
         page.ask(f"push({button}, false)")
         time.sleep(0.1)
     page.ask("delete navigator.getGamepads; 0")
-
-
-def enable(page):
-    """Press the shoulder button anew if something has disarmed the gamepad."""
-    if not page.ask("padArmed"):
-        page.ask("push(4, false)")
-        page.wait("!padBefore[4]")
-        page.ask("push(4, true)")
-        page.wait("padArmed")
-
-
-@pytest.mark.slow
-def test_a_whole_route_by_a_gamepad_alone(page, running):
-    session = running.opened.engine.session
-    session.means.rates.flags.writeable = True
-    usual = session.means.rates.copy()
-    session.means.rates[:] = session.arm._rates[:] = 3.0
-    page.ask(PAD)
-
-    def tap(button, until):
-        page.ask(f"push({button}, true)")
-        page.wait(until)
-        page.ask(f"push({button}, false)")
-        time.sleep(0.1)
-
-    tap(6, "state.choice !== null")
-    if page.ask("document.querySelector('.lamp[aria-pressed=true]').dataset.color") != "green":
-        tap(7, "state.choice.level === 1")
-    tap(2, "state.mode === 'proposed'")
-    tap(3, "state.mode === 'following'")
-    for _ in range(40):
-        if page.ask("state.mode") != "following":
-            break
-        enable(page)
-        now = page.ask("state.route.moves.findIndex(m => m.status === 'current')")
-        keep_pushed(
-            page, 0, f"state.mode !== 'following' || (state.route.moves[{now}].status === 'done' && !state.driving)"
-        )
-        page.wait("state.mode !== 'following' || state.route.moves.some(m => m.status === 'current')")
-    page.wait("state.message === 'all moves are done'")
-    assert page.ask("state.aim.distance") < 0.002
-    session.means.rates[:] = session.arm._rates[:] = usual

@@ -8,7 +8,8 @@ import pytest
 from rrtik_ompl.base.poses import apart, pose
 from rrtik_ompl.pilot.setup import SessionOptions
 from rrtik_tests.browser import Running
-from rrtik_tests.pilot_hands import ENABLE, HANDS, faster, follow
+from rrtik_tests.pilot_hands import ENABLE, HANDS, follow
+from rrtik_tests.pilot_session import drive_at
 
 TRIGGER = 7
 
@@ -37,11 +38,13 @@ HOLDS = {"keyboard": hold_key, "gamepad": hold_trigger}
 @pytest.mark.parametrize("kind", sorted(HOLDS))
 def test_a_target_that_has_moved_is_reached_by_sight_and_a_lost_one_is_not(browser, kind):
     with Running(SessionOptions("titan4_sdu", seed=1)) as running:
-        session, places = running.opened.engine.session, running.opened.engine.perception.source.camera.places
+        session = running.opened.engine.session
+        places = running.opened.engine.perception.source.camera.places
         browser.open(running.server.url)
         browser.wait("state && state.lamps.length === 6 && role.role === 'pilot'", 90.0)
-        faster(running)
-        hands, hold = HANDS[kind](browser), HOLDS[kind]
+        drive_at(session, 3.0)
+        hands = HANDS[kind](browser)
+        hold = HOLDS[kind]
         browser.ask(CHOOSE_GREEN)
         browser.wait("state.choice !== null")
         if kind == "keyboard":

@@ -7,7 +7,7 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.records.record import Record, read_record
-from rrtik_tests.pilot_session import session
+from rrtik_tests.pilot_session import alarmed, session
 
 
 @contextmanager
@@ -30,7 +30,7 @@ def test_where_the_disk_is_full_the_session_goes_on_and_says_so_once(tmp_path):
             made.command("select", 0.1 * step, joint=step % 6)
         assert "selected" in made.message
         made.tick(3.0)
-        assert "a.jsonl: the record ends here: File too large; what was before is kept" in made.message
+        assert alarmed(made, "a.jsonl", "File too large")
         made.command("select", 3.1, joint=2)
         made.tick(3.2)
         assert "selected" in made.message
@@ -45,7 +45,7 @@ def test_where_the_disk_is_full_the_session_goes_on_and_says_so_once(tmp_path):
 def test_a_record_is_not_written_over(tmp_path):
     file = tmp_path / "a.jsonl"
     file.write_text('{"time": 0, "kind": "begin"}\n')
-    with pytest.raises(InputError, match=r"a\.jsonl: holds something already; choose another name"):
+    with pytest.raises(InputError, match=r"a\.jsonl: .*another name"):
         Record(file)
     assert file.read_text() == '{"time": 0, "kind": "begin"}\n'
     file.write_text("")

@@ -32,7 +32,8 @@ def test_a_lamp_names_the_stage_that_fails_in_a_field_of_its_own():
 def test_a_grasp_out_of_reach_is_no_route_with_a_stage():
     grasp = next(iter(VALVE.grasps))
     stages = stage_poses(pose([9.0, 0.0, 0.0]), grasp, 0)
-    rates, start = joint_rates(PROBLEM.robot), np.array(PROBLEM.start)
+    rates = joint_rates(PROBLEM.robot)
+    start = np.array(PROBLEM.start)
     found = route_to_grasp(PROBLEM.world, PROBLEM.world, start, stages, start, rates, 1)
     assert isinstance(found, NoRoute)
     assert found.stage == "the pose before the object"

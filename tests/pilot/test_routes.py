@@ -37,7 +37,8 @@ def surroundings():
 
 def grasp(kind, level):
     world, holding = surroundings()
-    stages, start = stage_poses(PLACE, VALVE.grasp(kind), level), np.array(PROBLEM.start)
+    stages = stage_poses(PLACE, VALVE.grasp(kind), level)
+    start = np.array(PROBLEM.start)
     lamp = next(
         each for each in lamps(world, VALVE, PLACE, start, holding=holding) if (each.type, each.level) == (kind, level)
     )
@@ -61,7 +62,8 @@ def test_a_route_to_a_grasp_is_short_and_free_and_forgives_small_errors(kind, le
     assert route.proven
     assert world.prove(rows[: route.grasp_from + 1]).proven
     made = executions(route.path, slack(route.path), 300, np.random.default_rng(11))
-    before, after = made[:, : route.grasp_from + 1], made[:, route.grasp_from :]
+    before = made[:, : route.grasp_from + 1]
+    after = made[:, route.grasp_from :]
     assert (free_rows(world, before) & free_rows(forgiving(holding), after)).mean() >= 0.97
 
 
@@ -87,7 +89,8 @@ def test_last_parts_begin_clear_of_the_object_and_in_front_of_it():
 
 
 def test_a_joint_that_goes_on_needs_one_move_and_that_may_touch_the_object():
-    start, end = np.array(PROBLEM.start), np.array(PROBLEM.start)
+    start = np.array(PROBLEM.start)
+    end = np.array(PROBLEM.start)
     middle = start.copy()
     middle[0] += 0.1
     end[0] += 0.2
@@ -112,7 +115,8 @@ def test_where_no_joint_alone_goes_round_a_planner_finds_the_route(name):
 
 def test_a_route_that_is_proven_is_taken_before_others_and_one_that_is_not_says_so():
     robot = load_robot("planar3", radius=0.01)
-    rates, goal = joint_rates(robot), np.array([0.9, 0.0, 0.0])
+    rates = joint_rates(robot)
+    goal = np.array([0.9, 0.0, 0.0])
     needle = Obstacle("needle", Cylinder(2e-4, 1.0), pose([2.9, 0.0, 0.0]))  # within reach of a straight arm alone
     world = World(robot, Scene([needle]), motion_resolution=0.2)
     starts = [np.array([q, 0.3, 0.0]) for q in np.linspace(-0.7, -0.4, 12)]
@@ -145,7 +149,8 @@ def test_an_arm_that_stands_in_something_is_told_so():
 
 
 def test_of_several_ways_one_that_forgives_errors_is_taken():
-    start, goal = np.array(PROBLEM.start), np.array(PROBLEM.goal.q)
+    start = np.array(PROBLEM.start)
+    goal = np.array(PROBLEM.goal.q)
     search = RouteSearch(PROBLEM.world, PROBLEM.world, start, 1)
     ways = list(search._around([goal[None]]))
     shares = [search.robustness(way) for way in ways]

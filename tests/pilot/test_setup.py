@@ -59,7 +59,8 @@ def test_two_cameras_are_sensed_together_and_the_second_is_shown(tmp_path):
         "titan4_sdu", source=photographs, second=photographs, rig=rig_of_one_place(tmp_path), map_file=Path(MAP)
     )
     alone = SessionOptions("titan4_sdu", source=photographs, camera_file=Path(CAMERA), map_file=Path(MAP))
-    places, sigmas = [], []
+    places = []
+    sigmas = []
     for options in (wanted, alone):
         opened = open_session(options)
         engine = opened.engine
@@ -112,7 +113,8 @@ def test_a_camera_that_is_lost_is_said_and_the_last_state_stays_until_it_is_back
     engine = opened.engine
     for count in range(3):
         engine.update(count / 30)
-    before, latest = engine.state(), engine.perception.source.latest
+    before = engine.state()
+    latest = engine.perception.source.latest
 
     def gone():
         raise CameraLostError("camera 0 gives no more pictures")
@@ -156,7 +158,8 @@ def test_a_feed_gives_the_newest_picture_and_opens_a_lost_camera_again(monkeypat
 
 def test_pictures_of_the_past_come_as_far_apart_as_they_were_taken():
     feed = Feed(lambda: iter([Picture(grey().pixels, str(k), 0.2 * k) for k in range(3)]), paced=True)
-    begin, names = time.monotonic(), []
+    begin = time.monotonic()
+    names = []
     while len(names) < 3:
         picture = feed.latest()
         if picture is not None:
@@ -171,7 +174,8 @@ def test_pictures_of_the_past_come_as_far_apart_as_they_were_taken():
 
 def test_a_simulated_picture_follows_the_arm_and_the_objects_and_is_never_without_noise():
     engine = open_session(SessionOptions("titan4_sdu")).engine
-    camera, start = engine.perception.source.camera, np.array(load_problem("titan4_sdu").start)
+    camera = engine.perception.source.camera
+    start = np.array(load_problem("titan4_sdu").start)
     still = camera.picture(start, 0.0).pixels.astype(int)
     assert 1.0 < np.abs(camera.picture(start, 1.0 / 30.0).pixels - still).mean() < 3.0
     moved = start.copy()
@@ -211,7 +215,8 @@ def test_an_arm_stands_still_after_a_picture_that_cannot_be_used(tmp_path, spoil
     spoil(tmp_path / "b.png")
     files = {"camera_file": FOLDER / "camera_640.yaml", "map_file": FOLDER / "titan4_panel_markers.yaml"}
     opened = open_session(SessionOptions("titan4_sdu", source=tmp_path, **files))
-    engine, session = opened.engine, opened.engine.session
+    engine = opened.engine
+    session = opened.engine.session
     engine.update(0.0)
     engine.execute({"name": "jog", "direction": 1.0, "press": 1}, 0.01)
     assert session.driving
@@ -239,7 +244,8 @@ def test_an_object_that_is_out_of_view_is_said_and_costs_no_search_for_other_mar
     monkeypatch.setattr("rrtik_ompl.sensing.sensor.dictionaries_seen", lambda gray: searched.append(gray) or ())
     engine = open_session(SessionOptions("titan4_sdu")).engine
     camera = engine.perception.source.camera
-    there, camera.places = camera.places, {}
+    there = camera.places
+    camera.places = {}
     for k in range(10):
         engine.update(0.1 * k)
     assert "no marker in view" in engine.state()["hint"]
@@ -257,7 +263,8 @@ def test_a_record_of_a_real_camera_is_shown_with_that_cameras_file_and_map(tmp_p
     simulated = open_session(SessionOptions("titan4_sdu")).engine
     simulated.update(0.0)
     cv2.imwrite(str(tmp_path / "a.png"), simulated.perception.picture)
-    record, given = tmp_path / "r.jsonl", {"camera_file": Path(CAMERA), "map_file": Path(MAP)}
+    record = tmp_path / "r.jsonl"
+    given = {"camera_file": Path(CAMERA), "map_file": Path(MAP)}
     opened = open_session(SessionOptions("titan4_sdu", source=tmp_path, record=record, **given))
     opened.engine.update(0.0)
     opened.close()
@@ -296,7 +303,8 @@ def test_a_record_is_played_again_to_the_same_end(tmp_path):
         engine.session.q[engine.session.state.selected]
         != engine.session.means.problem.start[engine.session.state.selected]
     )
-    route, q = engine.session.route, engine.session.q
+    route = engine.session.route
+    q = engine.session.q
     opened.close()
     again = open_session(SessionOptions("titan4_sdu", replay=file)).engine
     again.update(0.15)

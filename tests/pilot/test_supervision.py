@@ -10,7 +10,7 @@ from rrtik_ompl.pilot.interlock import LATE_SECONDS, Sight
 from rrtik_ompl.pilot.machine import READ_SECONDS
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
 from rrtik_tests.hostile_arm import HostileArm, Pilot
-from rrtik_tests.pilot_session import PROBLEM, ROBOT, session
+from rrtik_tests.pilot_session import PROBLEM, ROBOT, refused, session
 
 RATES = np.full(ROBOT.dof, np.radians(10.0))
 STEP = 1.0 / 30.0
@@ -34,11 +34,13 @@ def test_an_arm_with_a_fault_is_stopped_within_a_degree_and_half_a_second_and_na
     made, _ = session()
     arm = made.arm = HostileArm()
     made.command("select", 0.0, joint=joint)
-    time_, told = 0.0, 0
+    time_ = 0.0
+    told = 0
     for k in range(60):
         arm.fault = fault if k >= 20 else ""
         if k == 20:
-            before, began = arm._q.copy(), time_
+            before = arm._q.copy()
+            began = time_
         made.see([], time_)
         made.command("jog", time_, direction=direction, press=1)
         told += made.driving
@@ -99,7 +101,8 @@ def test_after_the_release_an_arm_moves_a_degree_at_most_over_any_line(delay):
         slow = 2.0 * delay > LATE_SECONDS
         assert (pilot.arm._q == begin).all() == slow
         if slow:
-            assert re.fullmatch(r"refused: line too slow for driving: 0\.\d+ s", state["message"])
+            assert state["level"] == "refusal"
+            assert re.search(r"line too slow .* 0\.\d+ s", state["message"])
 
 
 def test_the_rate_falls_as_the_line_gets_slower():
@@ -118,16 +121,16 @@ def test_the_rate_falls_as_the_line_gets_slower():
         assert reached[age] * age <= 1.05
     assert reached[0.05] > 9.0
     assert 4.0 < reached[0.2] < 5.2
-    late = made.command("jog", made.time, Sight(0.31, 0.0), direction=1.0, press=9)
-    assert late == "refused: line too slow for driving: 0.31 s"
+    made.command("jog", made.time, Sight(0.31, 0.0), direction=1.0, press=9)
+    assert refused(made, "line too slow", "0.31 s")
 
 
 def test_a_hold_that_lapses_is_said_and_needs_a_new_press():
     with Pilot() as pilot:
         pilot.hold(0.4)
         state = pilot.look(0.5)
-        assert state["message"] == "no command for 0.25 s: stopped, press again"
         assert state["level"] == "alarm"
+        assert "0.25 s" in state["message"]
         there = pilot.arm._q.copy()
         pilot.go_on(0.3)
         assert (pilot.arm._q == there).all()
@@ -142,7 +145,7 @@ def test_a_page_that_does_not_say_what_it_shows_or_shows_old_pictures_drives_not
             pilot.page.say(name="jog", direction=1.0, press=100 + number, seen=stamp, picture=stamp)
             assert pilot.look(0.1)["level"] == "refusal"
         pilot.page.say(name="jog", direction=1.0, press=110, seen=pilot._seen, picture=None)
-        assert pilot.look(0.2)["message"] == "refused: the page shows no picture yet: press again when it does"
+        assert "no picture yet" in pilot.look(0.2)["message"]
         old = pilot._state["stamp"] - 0.7
         pilot.page.say(name="jog", direction=1.0, press=91, seen=pilot._seen, picture=old)
         assert "the picture on the page is stale: 0.7" in pilot.look(0.2)["message"]
@@ -154,7 +157,8 @@ def test_a_page_that_does_not_say_what_it_shows_or_shows_old_pictures_drives_not
 def test_an_arm_behind_a_line_goes_a_degree_at_most_however_late_a_thread_is(fault, late, monkeypatch):
     with Pilot(line=True) as pilot:
         pilot.hold(0.5)
-        rng, arm = np.random.default_rng(1), pilot.session.arm
+        rng = np.random.default_rng(1)
+        arm = pilot.session.arm
         owner, name = (pilot.session, "tick") if late == "the session" else (arm, "_exchange")
         work = getattr(owner, name)
 
@@ -176,12 +180,14 @@ def test_an_arm_behind_a_line_goes_a_degree_at_most_however_late_a_thread_is(fau
 
 def driven(motion, seconds=2.0):
     """What a supervisor says of an arm told to turn its joint 0; ``motion(time)`` is how far each joint has gone."""
-    watching, q = Supervisor(ROBOT, RATES), PROBLEM.start.copy()
+    watching = Supervisor(ROBOT, RATES)
+    q = PROBLEM.start.copy()
     for k in range(round(seconds / STEP)):
         time_ = k * STEP
         q = PROBLEM.start + motion(time_)
         watching.read(q, time_)
-        aim, ahead = q.copy(), np.zeros(ROBOT.dof)
+        aim = q.copy()
+        ahead = np.zeros(ROBOT.dof)
         ahead[0] = 0.1 * RATES[0]
         aim[0] += ahead[0]
         watching.told(aim, ahead, q, time_)
@@ -211,10 +217,13 @@ def test_a_joint_that_sags_slowly_by_half_a_degree_is_let_be_and_a_fast_one_is_n
 
 @pytest.mark.parametrize("every", [5, 20])
 def test_an_arm_that_goes_the_wrong_way_does_so_for_a_degree_at_most_however_often_the_key_is_let_go(every):
-    watching, gone, k = Supervisor(ROBOT, RATES), 0.0, 0
+    watching = Supervisor(ROBOT, RATES)
+    gone = 0.0
+    k = 0
     while not watching.fault:
         assert gone <= 0.7
-        time_, k = k * STEP, k + 1
+        time_ = k * STEP
+        k = k + 1
         if k % every == 0:
             gone += 0.25
             q = PROBLEM.start + along(-gone)

@@ -2,6 +2,8 @@
 
 import time
 
+from rrtik_tests.pilot_session import drive_at
+
 PAD = """
 window.pad = { connected: true, mapping: "standard", axes: [0, 0, 0, 0],
   buttons: Array.from({ length: 17 }, () => ({ pressed: false, value: 0 })) };
@@ -73,13 +75,6 @@ class Gamepad:
 HANDS = {"keyboard": Keyboard, "gamepad": Gamepad}
 
 
-def faster(running, rate=3.0):
-    """Make the arm's joints faster than any arm's."""
-    session = running.opened.engine.session
-    session.means.rates.flags.writeable = True
-    session.means.rates[:] = session.arm._rates[:] = rate
-
-
 def follow(browser, hands, verb, look):
     """Have a route proposed, "plan" or "lift"; accept it and make its moves."""
     hands.tap(verb, "state.mode === 'proposed'")
@@ -94,14 +89,14 @@ def follow(browser, hands, verb, look):
         browser.wait("!state.driving")
         browser.wait("state.mode !== 'following' || state.route.moves.some(m => m.status === 'current')")
         look()
-    browser.wait("state.message === 'all moves are done'")
+    browser.wait("state.route.advice === 'done' && state.level === 'news'")
 
 
 def pick_and_place(browser, running, kind, look=lambda: None, rate=3.0):
     """Take the tool, lift it, carry it to the rack and put it down; `look` is called whenever something has changed."""
     browser.open(running.server.url)
     browser.wait("state && state.objects.length === 2 && role.role === 'pilot' && window.measured.frames.C > 0", 90.0)
-    faster(running, rate)
+    drive_at(running.opened.engine.session, rate)
     hands = kind(browser)
     if browser.ask("state.target") != "tool":
         hands.tap("object", "state.target === 'tool'")

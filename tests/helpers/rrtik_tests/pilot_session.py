@@ -1,5 +1,7 @@
 """TITAN-4 before the subsea distribution unit with a valve in view: what the tests of the pilot's tool share."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 
@@ -7,7 +9,10 @@ from rrtik_ompl import load_problem
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.pilot.answers import Level
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.interlock import MANOEUVRE
+from rrtik_ompl.pilot.motion.supervisor import Supervisor
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import SeenObject
@@ -45,6 +50,14 @@ def session(record=None):
     return made, arm
 
 
+def drive_at(made, rate):
+    """Let all joints of a session's arm, which stands still, be driven at another rate [rad/s] than before."""
+    rates = np.full(made.robot.dof, rate)
+    made.means = replace(made.means, rates=rates)
+    made.supervisor = Supervisor(made.robot, rates)
+    made.arm._rates = rates
+
+
 def hold(made, arm, verb, time, until, *, seconds=60.0, step=0.03, **arguments):
     """Hold a command, as a pressed key does, with pictures coming; returns when it was released [s]."""
     end = time + seconds
@@ -69,6 +82,21 @@ def follow(made, arm, time, most=60):
             made, arm, "next", time, lambda now=due: made.mode != "following" or not still(made, now), press=press
         )
     raise AssertionError("too many moves")
+
+
+def arrived(made):
+    """Whether all moves of a route are made, and the tip is where it ends."""
+    return made.mode == MANOEUVRE and made.progress.advice == "done" and made.level is Level.NEWS
+
+
+def refused(made, *words):
+    """Whether the last command was refused, in one line that names some things."""
+    return made.level is Level.REFUSAL and "\n" not in made.message and all(word in made.message for word in words)
+
+
+def alarmed(made, *words):
+    """Whether something is said that nobody has commanded, in one line that names some things."""
+    return made.level is Level.ALARM and "\n" not in made.message and all(word in made.message for word in words)
 
 
 def still(made, due):

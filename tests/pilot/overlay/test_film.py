@@ -42,7 +42,8 @@ def arm_in_pictures(waypoints, map_file=SHIPPED / "titan4_panel_markers.yaml", *
 
 def test_the_arm_goes_from_the_first_waypoint_to_the_last_and_then_stands_still():
     problem = load_problem("titan4_sdu")
-    start, goal = problem.start, problem.goal.q
+    start = problem.start
+    goal = problem.goal.q
     arm = arm_in_pictures([start, goal], ghosts=0)
     drawn = [arm.draw(Picture(PHOTOGRAPH, "p", t)) for t in (0.0, 1.0, 2.0, 3.0)]
     assert (drawn[0] != PHOTOGRAPH).any(axis=2).sum() > 5000

@@ -10,7 +10,8 @@ from rrtik_ompl.pilot.overlay.surfaces import ShapeSurfaces, obstacle_surfaces
 
 
 def test_an_obstacle_that_moves_is_made_once_and_drawn_where_it_is(monkeypatch):
-    made, kept = [], ShapeSurfaces()
+    made = []
+    kept = ShapeSurfaces()
     plain = surfaces.surface_of_shape
     monkeypatch.setattr(surfaces, "surface_of_shape", lambda *given: made.append(given[0]) or plain(*given))
     shapes = Box([0.1, 0.2, 0.3]), Cylinder(0.1, 0.4)
