@@ -158,15 +158,20 @@ def _moves(follower: Follower | Track) -> list[dict[str, Any]]:
     for number, (move, text) in enumerate(zip(follower.moves, words, strict=True)):
         start, unit = reading(move.start, move.unit)
         end, _ = reading(move.end, move.unit)
-        status = "done" if number < follower.current else "current" if number == follower.current else "ahead"
         shown = {
             "joint": move.joint,
             "from": start,
             "to": end,
             "unit": unit,
             "text": text,
-            "status": status,
+            "status": _status(number, follower.current),
             "at": float(ends[number] / ends[-1]),
         }
         moves.append(shown)
     return moves
+
+
+def _status(number: int, current: int) -> str:
+    if number == current:
+        return "current"
+    return "done" if number < current else "ahead"

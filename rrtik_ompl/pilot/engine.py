@@ -171,9 +171,10 @@ class Engine:
             self._drawn = ()
             self.outside.preset(view)
         else:
-            self.outside.share = None if given["share"] is None else number(given["share"], "share")
-            if self.session.mode != PROPOSED and given["share"] is not None:
-                self.outside.share = None
+            share = None if given["share"] is None else number(given["share"], "share")
+            proposed = self.session.mode == PROPOSED
+            self.outside.share = share if proposed else None
+            if share is not None and not proposed:
                 raise InputError("there is no route to preview: 'plan' proposes one")
 
 

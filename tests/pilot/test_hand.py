@@ -70,31 +70,37 @@ def test_a_tool_is_picked_lifted_carried_and_placed(tmp_path):
     made = hands.session
     hands.go_to("tool", "straight")
     before = hands.place("tool")
+
     assert "tool is held" in hands.do("close")
     assert [each.name for each in made.world.scene.attached] == ["tool"]
+
     assert "moves" in hands.do("lift")
     hands.follow()
     lifted = hands.place("tool").translation - before.translation
     assert lifted == pytest.approx([0.0, 0.0, 0.05], abs=1e-3)
+
     hands.go_to("rack", "put")
     assert "tool is put down" in hands.do("open")
     hands.passes(3)
-    rack = load_vehicle(TOOL).places["rack"]
-    level = 0
-    pick, put = (load_vehicle(TOOL).marker_map.named(name).grasp(kind).levels[level]
-                 for name, kind in (("tool", "straight"), ("rack", "put")))  # fmt: skip
-    wanted = rack * put * pick.inverse()
+
+    vehicle = load_vehicle(TOOL)
+    pick = vehicle.marker_map.named("tool").grasp("straight").levels[0]
+    put = vehicle.marker_map.named("rack").grasp("put").levels[0]
+    wanted = vehicle.places["rack"] * put * pick.inverse()
     assert np.linalg.norm(hands.place("tool").translation - wanted.translation) < 2e-3
     seen = made.surroundings.named("tool").T_base_object
     assert np.linalg.norm(seen.translation - wanted.translation) < 2e-3
     assert not made.world.scene.attached
+
     there = made.q.copy()
     hands.presses += 1
     hands.do("select", joint=2)
     hands.passes(10, name="jog", direction=-1.0, press=hands.presses)  # the gripper may leave what it has put down
     assert np.abs(made.q - there).max() > 0.05
+
     end = made.arm.read()
     hands.opened.close()
+
     again = open_session(SessionOptions("titan4_sdu", vehicle=TOOL, replay=tmp_path / "record.jsonl"))
     again.engine.update(hands.time + 1.0)
     assert again.engine.session.q == pytest.approx(end)

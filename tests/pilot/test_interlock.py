@@ -50,6 +50,7 @@ def put_into(planned, route, mode, link, picture):
     arm._goal = None
     arm.lost = link
     made.stand_still()
+
     q = arm.read()
     made.state = replace(
         made.state,
@@ -74,6 +75,7 @@ def test_no_command_in_no_state_moves_the_arm_where_it_may_not(planned):
     count = 0
     for mode, link, picture, verb in product(MODES, ("", "the line is cut"), PICTURES, (*PRESENT, *ALWAYS)):
         made, arm = put_into(planned, route, mode, link, picture)
+
         made.command(verb, 100.0, **ARGUMENTS.get(verb, {}))
         after = made.mode
         travel = 0.0
@@ -81,6 +83,7 @@ def test_no_command_in_no_state_moves_the_arm_where_it_may_not(planned):
             arm.advance(0.05)
             made.tick(100.0 + 0.05 * step)
             travel = max(travel, float(np.abs(arm.read() - PROBLEM.start).max()))
+
         known = not link and picture == "fresh"
         may = known and verb in MOVING and (verb == "next") == (mode == FOLLOWING)
         may = may and verb != "servo"  # the grasp is far away

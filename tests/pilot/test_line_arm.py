@@ -47,6 +47,7 @@ def test_a_lost_line_is_said_keeps_the_joints_stops_the_arm_and_comes_back():
     assert server.arm.moving is None
     until(lambda: arm.lost)
     session.tick(1.0)
+
     kept = session.q.copy()
     assert alarmed(session, arm.lost)
     for verb, arguments in (("jog", {"direction": 1.0, "press": 2}), ("move", {"target": 0.1}), ("plan", {})):
@@ -54,6 +55,7 @@ def test_a_lost_line_is_said_keeps_the_joints_stops_the_arm_and_comes_back():
         assert refused(session, arm.lost)
     session.tick(1.2)
     assert session.q == pytest.approx(kept)
+
     with LineServer(SimulatedArm(ROBOT, START), server.port):
         until(lambda: not arm.lost)
         until(lambda: np.allclose(arm.read(), START))

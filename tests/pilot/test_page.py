@@ -29,11 +29,13 @@ def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
         browser.wait(
             "state && state.lamps.length === 6 && window.measured.frames.C > 2 && window.measured.frames.O > 0"
         )
+
         assert "You are the pilot" in browser.text("role")
         colors = browser.ask("[...document.querySelectorAll('.lamp')].map(each => each.dataset.color)")
         assert {"green", "amber", "red"} == set(colors)
         assert browser.ask("document.documentElement.scrollHeight") <= HEIGHT
         assert browser.ask("document.documentElement.scrollWidth") <= WIDTH
+
         choose(browser, "red")
         browser.wait("document.getElementById('reason').textContent.includes('outside its limits')")
         choose(browser, "green")
@@ -41,31 +43,37 @@ def test_from_start_to_grasp_by_keys_alone(browser, tmp_path):
         browser.wait(
             "state.mode === 'proposed' && document.querySelectorAll('#moves li').length === state.route.moves.length"
         )
+
         browser.press("n")
         browser.wait("state.message.includes('accept')")
         browser.wait("state.playing > 0")  # the route plays by itself in the outside view
         browser.press("0")
         browser.wait("state.playing === null")
+
         browser.ask("document.getElementById('scrub').focus()")  # whoever used the mouse still commands by keys
         browser.press("a")
         browser.wait("state.mode === 'following'")
         browser.ask("document.activeElement.blur()")
         browser.wait("document.getElementById('advice').textContent === 'NEXT'")
+
         due = browser.ask("state.route.moves[0].joint")
         assert browser.text("due").startswith(due.replace("_", " "))
         assert browser.ask("state.joints[state.selected].name") == due
         assert browser.ask("document.querySelector('#moves li').ariaLabel").endswith(
             browser.ask("state.route.moves[0].text")
         )
+
         follow(browser, running)
         tip = browser.ask("state.aim.distance")
         assert tip < 0.03
+
         browser.press("ArrowUp")
         browser.key_down("ArrowRight")
         browser.wait("/driving|refused|end of the range/.test(state.message)")
         browser.key_up("ArrowRight")
         browser.wait("!held && !state.driving")  # else the arm goes on to its set point from where it is put next
         type_a_value(browser, running)
+
     kinds = [json.loads(line)["kind"] for line in record.read_text().splitlines()]
     assert kinds[0] == "begin"
     assert {"seen", "command", "answer", "joints"} <= set(kinds)
@@ -113,6 +121,7 @@ def test_a_second_page_watches_and_a_lost_camera_and_a_lost_server_are_said(brow
         browser.ask(f"window.other = {other}; other.onmessage = (e) => {{ window.heard = e.data }}; 0")
         browser.wait("role.pages === 2 && document.getElementById('role').textContent.includes('1 watching')")
         assert browser.ask("document.getElementById('hand_over').hidden") is False
+
         browser.press("h")
         browser.wait("role.role === 'watching' && !document.getElementById('take').hidden")
         browser.wait("document.getElementById('message').textContent.includes('the pilot has left')")

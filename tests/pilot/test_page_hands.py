@@ -138,16 +138,19 @@ def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is
     page.wait("!document.getElementById('pad').hidden")
     page.press("1")
     page.wait("state.selected === 0")
+
     before = azimuth(running)
     page.ask("pad.axes[0] = 1; 0")
     assert settled(running, 0.3) == before  # not without the shoulder button
     page.ask("push(4, true)")
     assert settled(running, 0.3) == before  # nor with the stick pushed before it
     assert "let the stick go" in page.text("message")
+
     keep_stick(page, f"state.joints[0].value > {before} + 3", "window.pad = null; 0")
     page.wait("!state.driving && document.getElementById('pad').hidden")
     there = settled(running, 0.2)
     assert settled(running, 0.3) == there
+
     page.ask(PAD + "push(4, true); pad.axes[0] = 1; 0")  # plugged in again with stick and button as they were
     page.wait("!document.getElementById('pad').hidden")
     assert settled(running, 0.5) == there
@@ -155,8 +158,10 @@ def test_a_gamepad_drives_while_its_shoulder_button_is_held_and_stops_when_it_is
     page.wait("!padBefore[4]")
     page.ask("push(4, true)")
     assert settled(running, 0.3) == there  # pressed anew, but the stick was not let go
+
     page.ask("push(4, false); pad.axes[0] = 0; 0")
     page.wait("!padBefore[4]")
+
     wanted = {
         13: "state.selected === 1",
         12: "state.selected === 0",

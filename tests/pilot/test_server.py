@@ -243,6 +243,7 @@ def test_a_command_makes_the_round_and_what_is_nonsense_ends_nothing():
             ]
         ):
             page.say(seq=count, **words)
+
         rounds = iter(range(40))
         loop.run(lambda: next(rounds, None) is None)
         state = page.hear_until(lambda m: isinstance(m, dict) and m.get("answered") == {"1": 11})

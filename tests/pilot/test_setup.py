@@ -218,12 +218,15 @@ def test_an_arm_stands_still_after_a_picture_that_cannot_be_used(tmp_path, spoil
     engine = opened.engine
     session = opened.engine.session
     engine.update(0.0)
+
     engine.execute({"name": "jog", "direction": 1.0, "press": 1}, 0.01)
     assert session.driving
+
     until(lambda: engine.update(0.02) or said in session.state.pictures.unusable)
     engine.update(0.03)
     assert not session.driving
     assert said in session.message
+
     before = session.arm.read()
     engine.execute({"name": "jog", "direction": 1.0, "press": 2}, 0.04)
     engine.update(0.5)
@@ -287,25 +290,25 @@ def test_a_record_is_played_again_to_the_same_end(tmp_path):
     opened = open_session(SessionOptions("titan4_sdu", record=file, seed=4))
     engine = opened.engine
     engine.update(0.0)
-    for number, command in enumerate(
-        [
-            {"name": "grasp", "type": "aslant", "level": 2},
-            {"name": "plan"},
-            {"name": "accept"},
-            {"name": "next", "press": 1},
-        ]
-    ):
+
+    commands = [
+        {"name": "grasp", "type": "aslant", "level": 2},
+        {"name": "plan"},
+        {"name": "accept"},
+        {"name": "next", "press": 1},
+    ]
+    for number, command in enumerate(commands):
         engine.execute(command, 0.1 + 0.1 * number)
     for number in range(30):
         engine.update(0.5 + number / 30)
         engine.execute({"name": "next", "press": 1}, 0.5 + number / 30)
-    assert (
-        engine.session.q[engine.session.state.selected]
-        != engine.session.means.problem.start[engine.session.state.selected]
-    )
+    joint = engine.session.state.selected
+    assert engine.session.q[joint] != engine.session.means.problem.start[joint]
+
     route = engine.session.route
     q = engine.session.q
     opened.close()
+
     again = open_session(SessionOptions("titan4_sdu", replay=file)).engine
     again.update(0.15)
     assert again.session.route is None

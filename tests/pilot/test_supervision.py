@@ -36,6 +36,7 @@ def test_an_arm_with_a_fault_is_stopped_within_a_degree_and_half_a_second_and_na
     made.command("select", 0.0, joint=joint)
     time_ = 0.0
     told = 0
+
     for k in range(60):
         arm.fault = fault if k >= 20 else ""
         if k == 20:
@@ -49,6 +50,7 @@ def test_an_arm_with_a_fault_is_stopped_within_a_degree_and_half_a_second_and_na
         made.tick(time_)
         if k >= 20 and not made.driving:
             break
+
     assert time_ - began <= 0.5
     assert told > 20
     expected = FAULTS[fault].replace("shoulder_pitch", ROBOT.joint_names[(joint + 1) % 6])

@@ -21,7 +21,7 @@ def test_a_tool_is_taken_and_put_into_its_rack(browser, kind):
         made = running.opened.engine.perception.source.camera.places["tool"]
         assert running.opened.engine.session.state.holds == ""
     vehicle = load_vehicle(TOOL)
-    pick, put = (vehicle.marker_map.named(name).grasp(grasp).levels[0]
-                 for name, grasp in (("tool", "straight"), ("rack", "put")))  # fmt: skip
+    pick = vehicle.marker_map.named("tool").grasp("straight").levels[0]
+    put = vehicle.marker_map.named("rack").grasp("put").levels[0]
     wanted = vehicle.places["rack"] * put * pick.inverse()
     assert np.linalg.norm(made.translation - wanted.translation) < 2e-3

@@ -136,19 +136,23 @@ class LineArm:
         self.lost = ""
         self.reported = time.monotonic()
         self.judge: Judge | None = None
+
         self._request: dict[str, Any] | None = None
         self._set_point: dict[str, Any] | None = None  # what the arm was told last, if it was not a stop
         self._told_at = -np.inf  # when that was
         self._holds = 0.0  # for how long what was sent last does [s]
         self._grip: dict[str, Any] | None = None  # goes first, and no move takes its place
+
         self._lock = threading.Lock()
         self._ended = threading.Event()
         self._wake = threading.Event()
+
         try:
             self._line = self._connect()
             self._q = self._exchange({"do": "read"})
         except (OSError, OverflowError) as error:
             raise InputError(f"arm at {host}:{port}: {error}; is its server running?") from None
+
         self._thread = threading.Thread(target=self._communicate, daemon=True)
         self._thread.start()
 
@@ -297,6 +301,7 @@ class LineArm:
                 why = getattr(error, "strerror", None) or error
                 self.lost = printable(f"the connection to the arm is lost: {why}; the joints are the last known ones")
                 self._ended.wait(RETRY_SECONDS)
+
             self.reported = time.monotonic()
             if self._ended.is_set() and self._request is None and self._grip is None:
                 return

@@ -129,19 +129,23 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
     document = read_yaml(path)
     entry = parse(document, VehicleFile)
     folder = document.path.parent
+
     marker_map = load_marker_map(folder / entry.map)
     places = {}
     for number, each in enumerate(entry.places):
         with document.at(("places", number, "name")):
             places[marker_map.named(each.name).name] = each.pose.build()
+
     with document.at(("arm",)):
         faults = None if entry.arm is None else entry.arm.build()
     with document.at(("base_motion",)):
         motion = None if entry.base_motion is None else entry.base_motion.build()
+
     with document.at(("structure",)):
         structure = None if entry.structure is None else marker_map.named(entry.structure).name
         if structure is not None and structure not in places:
             raise InputError(f"structure '{structure}' has no place; give one under places")
+
     with document.at(("further_cameras",)):
         further = tuple(each.build() for each in entry.further_cameras)
         if len({each.name for each in further}) < len(further):

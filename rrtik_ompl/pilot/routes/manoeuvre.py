@@ -120,6 +120,7 @@ def free_until(world: World, q: Vector, joint: int, target: float) -> float:
     end[joint] = min(max(target, float(robot.lower[joint])), float(robot.upper[joint]))
     if world.motion_valid(start, end):
         return float(end[joint])
+
     low = 0.0
     high = 1.0
     for _ in range(12):
@@ -128,6 +129,7 @@ def free_until(world: World, q: Vector, joint: int, target: float) -> float:
             low = middle
         else:
             high = middle
+
     return float(start[joint] + low * (end[joint] - start[joint]))
 
 
@@ -178,6 +180,7 @@ def _reach(world: World, q: Vector, joint: int, limit: float, turn: float) -> tu
     last = q.copy()
     start[joint] = reached
     last[joint] = end
+
     touching = world.contacts(_first_blocked(world, start, last))
     return reached, f"{touching[0].first} meets {touching[0].second}" if touching else "too close to tell"
 
