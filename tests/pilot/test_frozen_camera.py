@@ -66,7 +66,7 @@ def test_a_single_picture_that_comes_twice_is_no_news(engine):
 
 
 def test_a_simulated_camera_before_a_still_arm_is_not_frozen(engine):
-    run(engine, 3.0, 0.0)
+    run(engine, 2.0 * STALE_SECONDS, 0.0)
     assert engine.session.known.trouble == ""
     assert engine.perception.lost == ""
 
@@ -74,7 +74,7 @@ def test_a_simulated_camera_before_a_still_arm_is_not_frozen(engine):
 def test_a_computed_camera_without_noise_lives_by_the_times_of_its_pictures(engine):
     time = run(engine, 0.3, 0.0)
     freeze(engine, noisy=False)
-    run(engine, 2.0, time)
+    run(engine, 2.0 * STALE_SECONDS, time)
     assert engine.session.known.trouble == ""
 
 
