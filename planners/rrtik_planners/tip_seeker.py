@@ -13,7 +13,7 @@ from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import IkurtTree
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.targets import targets
-from rrtik_ompl.model.goal import Goal, PoseGoal, TipGoal
+from rrtik_ompl.model.goal import Goal, TipGoal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
 from rrtik_ompl.world.world import World
 
@@ -77,7 +77,7 @@ class TipSeeker(SafePlanner):
 def misses(metric: TipMetric, q: Vector, what: str) -> str:
     """A line that says by how much a configuration misses the goal."""
     away, angle = metric.errors(q)
-    turned = f" and {np.degrees(angle):.3g} deg" if any(isinstance(t, PoseGoal) for t in metric.targets) else ""
+    turned = f" and {np.degrees(angle):.3g} deg" if any(t.oriented for t in metric.targets) else ""
     return f"{what} misses it by {away:.4g} m{turned}"
 
 

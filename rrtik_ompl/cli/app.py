@@ -128,9 +128,8 @@ def check(
 
 def _say_ends(problem: Problem, kept: str) -> None:
     """Say how much room start and goal have."""
-    from rrtik_ompl import JointGoal
-
-    ends = {"start": problem.start} | ({"goal": problem.goal.q} if isinstance(problem.goal, JointGoal) else {})
+    goal = problem.goal.q
+    ends = {"start": problem.start} | ({} if goal is None else {"goal": goal})
     for end, q in ends.items():
         say(f"{problem.name}: {end} is free, clearance {_millimetres(problem.world.clearance(q))}{kept}")
 

@@ -159,17 +159,18 @@ def _goal(
     """The goal that the options describe; of a problem whose goal is joint values, the pose of the tip there."""
     import numpy as np
 
-    from rrtik_ompl import JointGoal, MultiGoal, PoseGoal
+    from rrtik_ompl import PoseGoal
     from rrtik_ompl.base.poses import pose, pose_from_rpy
+    from rrtik_ompl.model.goal import TipGoal
 
     if quaternion and rpy_deg:
         raise InputError("give one of --quaternion and --rpy-deg, not both")
     if position is None:
         if quaternion or rpy_deg or given.goal is None:
             raise InputError("where to? give --position X Y Z, --problem NAME with a goal, or --poses FILE")
-        if isinstance(given.goal, JointGoal):
+        if given.goal.q is not None:
             return PoseGoal(given.robot.fk(given.goal.q), **tolerances)
-        if isinstance(given.goal, MultiGoal):
+        if not isinstance(given.goal, TipGoal):
             raise InputError("the goal of --problem is of several tips: rrtik plan finds configurations for them")
         if tolerances:
             raise InputError("the goal of --problem has tolerances of its own: leave out --tolerance-mm and -deg")

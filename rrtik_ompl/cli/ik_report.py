@@ -17,7 +17,7 @@ from rrtik_ompl.cli.terminal import Table
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.analytic.reference_branches import tip_fault
 from rrtik_ompl.ik.method_interface import IkResult, different_rows, mid_range_configuration
-from rrtik_ompl.model.goal import PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.model.goal import Target, joint_difference
 from rrtik_ompl.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -78,12 +78,12 @@ def _targets(robot: Robot, goal: TipGoal) -> NDArray[np.float64] | None:
     """The target of a goal as the robot's closed form takes it; None if there is no such form or it does not fit."""
     if not has_closed_form(robot) or tip_fault(robot, form_of(robot)):
         return None
-    if isinstance(goal, PoseGoal):
-        pose: NDArray[np.float64] = goal.T_world_tip.homogeneous
+    if not isinstance(goal, Target):
+        return None
+    if goal.oriented:
+        pose: NDArray[np.float64] = goal.pose.homogeneous
         return pose[None]
-    if isinstance(goal, PositionGoal) and form_of(robot).kind == "position":
-        return goal.position[None]
-    return None
+    return goal.point[None] if form_of(robot).kind == "position" else None
 
 
 def joint_heads(robot: Robot) -> list[str]:

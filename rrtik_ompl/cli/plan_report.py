@@ -9,7 +9,6 @@ import numpy as np
 
 from rrtik_ompl.base.units import reading, shown_unit
 from rrtik_ompl.cli.terminal import Table
-from rrtik_ompl.model.goal import GoalSet, JointGoal, PositionGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import lower_bound
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
@@ -77,7 +76,7 @@ def fewest_moves(problem: Problem, plan: Plan) -> int | None:
 
     It is c, the number of joints that differ, or what the planner has proven beyond that.
     """
-    if not isinstance(problem.goal, JointGoal):
+    if problem.goal.q is None:
         return None
     return max(lower_bound(problem.start, problem.goal.q), int(plan.statistics.get("lower_bound", 0)))
 
@@ -112,10 +111,10 @@ def summary(
         lines.append(f"{size}, several joints move at once")
     if "position_error" in plan.statistics:
         angle = np.degrees(plan.statistics["orientation_error"])
-        turned = "" if isinstance(problem.goal, PositionGoal) else f" and {angle:.2g} deg"
+        turned = f" and {angle:.2g} deg" if problem.goal.oriented else ""
         lines.append(f"the tip ends {plan.statistics['position_error']:.2g} m{turned} from the goal")
-    if plan.member is not None and isinstance(problem.goal, GoalSet) and len(problem.goal.members) > 1:
-        lines.append(f"it ends at goal {plan.member + 1} of {len(problem.goal.members)}")
+    if plan.member is not None and len(problem.goal.parts) > 1:
+        lines.append(f"it ends at goal {plan.member + 1} of {len(problem.goal.parts)}")
     checked = how_checked(problem.world, path.waypoints, path.proof)
     lines.append(f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; valid: {checked}")
     return lines

@@ -22,7 +22,7 @@ from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
 from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, solve_ik
 from rrtik_ompl.kernels.threads import cores, in_threads
-from rrtik_ompl.model.goal import PoseGoal, joint_difference, tolerances
+from rrtik_ompl.model.goal import PoseGoal, joint_difference
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.check_world import check_world
 from rrtik_ompl.world.world import World
@@ -173,6 +173,6 @@ def _by_search(
 def _checked(robot: Robot, targets: NDArray[np.float64], q: Matrix) -> Matrix:
     """Residuals by forward kinematics, shape (m, 2); rows of q that are not at their targets become NaN, in place."""
     residuals = tip_residuals(robot, q.T[:, None], targets)[:, 0].T
-    residuals[~(residuals <= tolerances(POSE)).all(axis=1)] = np.nan
+    residuals[~(residuals <= POSE.tolerances).all(axis=1)] = np.nan
     q[np.isnan(residuals[:, 0])] = np.nan
     return residuals

@@ -21,18 +21,11 @@ from rrtik_ompl.ik.solve import DRAWS, solve_ik
 from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
 from rrtik_ompl.model.goal import (
     GoalSet,
-    JointGoal,
-    MultiGoal,
-    PoseGoal,
     TipGoal,
-    as_task_region,
     has_continuous,
     joint_difference,
-    parts_of,
-    tip_errors,
 )
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.world.problem import Problem
 
 STARTS = 48  # of inverse kinematics in one round
@@ -92,13 +85,14 @@ class GoalSearch:
         ``seconds_left`` says how long there is time: a later round begins only then, and MB-RRT ends with it.
         """
         self.rows: Matrix = frozen(np.zeros((0, problem.world.robot.dof)))
-        self.exhausted = isinstance(problem.goal, JointGoal)
+        q = problem.goal.q
+        self.exhausted = q is not None
         self._problem, self._rounds, self._found = problem, 0, self.rows
         self._seconds_left = seconds_left
         self._unheld = self.rows  # at the goal, whether or not they keep path constraints
         self._certain = False  # whether nothing random was in the first round
-        if isinstance(problem.goal, JointGoal):
-            self.rows = frozen(_turns(problem, problem.goal.q) if all_turns else problem.goal.q[None])
+        if q is not None:
+            self.rows = frozen(_turns(problem, q) if all_turns else q[None])
         else:
             self._rng = np.random.default_rng(rng)
 
@@ -112,23 +106,23 @@ class GoalSearch:
     def more(self) -> bool:
         """Search for one round more; whether it found any that is new."""
         goal, world, known = self._problem.goal, self._problem.world, len(self.rows)
-        if self.exhausted or isinstance(goal, JointGoal):
+        if self.exhausted:
             return False
-        if self._rounds == 0 and self._problem in _first_rounds and not isinstance(goal, MultiGoal):
+        if self._rounds == 0 and self._problem in _first_rounds and isinstance(goal, TipGoal):
             skip_targets(goal, DRAWS, self._rng)
             self._rng.integers(2**31)  # the seed of that round
             self._rounds = 1
             self.rows, self._found, self.exhausted = _first_rounds[self._problem]
             return len(self.rows) > 0
-        if isinstance(goal, MultiGoal):
-            kept = () if world.constraints is None else world.constraints.regions
-            start, scene = self._problem.start, world.scene
-            found = at_all_tips(world.robot, goal, start, self._rng, scene=scene, kept=kept)
-        else:
+        if isinstance(goal, TipGoal):
             found = self._round(goal)
             if self._problem.constraints:
                 self._unheld = np.vstack([self._unheld, found])
                 found = held_at_goal(self._problem, goal, found, self._rng)
+        else:  # of several tips
+            kept = () if world.constraints is None else world.constraints.regions
+            start, scene = self._problem.start, world.scene
+            found = at_all_tips(world.robot, goal, start, self._rng, scene=scene, kept=kept)
         self._rounds += 1
         free = found[world.checks.free(found)]
         free = free[world.checks.certified(free)]
@@ -143,12 +137,12 @@ class GoalSearch:
     def reason(self) -> str:
         """Why there is no free configuration, in a line; "" if there is one."""
         goal = self._problem.goal
-        if len(self.rows) or isinstance(goal, JointGoal):
+        if len(self.rows):
             return ""
         if len(self._found):
             why = self._problem.world.explain(self._found[0])
             return f"{len(self._found)} configurations reach the goal, all in collision: for instance {why}"
-        if isinstance(goal, MultiGoal):
+        if not isinstance(goal, TipGoal):
             tips = " and ".join(f"'{frame}'" for frame in goal.frames)
             return f"no configuration with {tips} at their goals was found in {self._rounds} rounds; are they in reach?"
         rounds = f"{self._rounds} round{'s' * (self._rounds != 1)}"
@@ -172,7 +166,7 @@ class GoalSearch:
     def _round(self, goal: TipGoal) -> Matrix:
         """Configurations at the goal, in collision or not, by the method whose turn it is, shape (m, dof)."""
         problem, rng, number = self._problem, self._rng, self._rounds
-        robot, parts = problem.world.robot, parts_of(goal)
+        robot, parts = problem.world.robot, goal.parts
         drawn, seed = self._draw(goal)
         free = any(leaves_freedom(part) for part in parts)
         if _fits("closed-form", robot, drawn) and (number == 0 or (free and number % 2 == 0)):
@@ -196,7 +190,7 @@ _first_rounds: WeakKeyDictionary[Problem, tuple[Matrix, Matrix, bool]] = WeakKey
 
 def _miss(problem: Problem, goal: TipGoal) -> str:
     """How near the arm came to a goal within its limits, in a line."""
-    robot, regions = problem.world.robot, [as_task_region(part) for part in parts_of(goal)]
+    robot, regions = problem.world.robot, [part.region() for part in goal.parts]
     starts = np.random.default_rng(0).uniform(*robot.finite_range(), (STARTS, robot.dof))
     if len(regions) > PARTS:  # to walk to each of thousands would take minutes
         places = np.array([(region.T_world_w * region.T_w_tip).translation for region in regions])
@@ -205,7 +199,7 @@ def _miss(problem: Problem, goal: TipGoal) -> str:
         goal = GoalSet(regions)
     starts = starts[: STARTS // len(regions)]
     ends = np.vstack([project(robot, region, starts) for region in regions])
-    distance, angle = tip_errors(goal, robot, ends)
+    distance, angle = goal.errors(robot, ends)
     best = np.argmin(goal.distance(robot, ends))
     if goal.satisfied(robot, ends[best : best + 1])[0]:
         return "walks from other starts do reach it, so that another seed may find one"
@@ -219,20 +213,18 @@ def _fits(method: IkMethod, robot: Robot, drawn: list[Target]) -> bool:
 
 def _walked(robot: Robot, goal: TipGoal, starts: Matrix, number: int, rng: np.random.Generator) -> Matrix:
     """Configurations at the goal to which numeric inverse kinematics leads; of many parts some take turns."""
-    parts = parts_of(goal)
+    parts = goal.parts
     some = [(number * PARTS + k) % len(parts) for k in range(min(len(parts), PARTS))]
     shares = np.array_split(starts, len(some))
-    return np.vstack([_walked_to(robot, goal, part, share, rng) for part, share in zip(some, shares, strict=True)])
+    return np.vstack([_walked_to(robot, goal.alone(k), share, rng) for k, share in zip(some, shares, strict=True)])
 
 
-def _walked_to(robot: Robot, goal: TipGoal, number: int, starts: Matrix, rng: np.random.Generator) -> Matrix:
-    """The same for one of its parts. Walks end on the rim of ranges, so that these are projected onto, spread out."""
-    part = parts_of(goal)[number]
-    if isinstance(goal, GoalSet) and isinstance(goal.members[number], PoseGoal) and not goal.box.any():
-        return numeric_ik(robot, GoalSet([goal.members[number]], goal.free_rotation_axis), starts)
-    if not isinstance(part, TaskRegion):
-        return numeric_ik(robot, part, starts)
-    rows = projected(robot, part, starts, rng)
+def _walked_to(robot: Robot, goal: TipGoal, starts: Matrix, rng: np.random.Generator) -> Matrix:
+    """The same for one part alone. Walks end on the rim of ranges, so that these are projected onto, spread out."""
+    if not goal.has_regions:
+        return numeric_ik(robot, goal, starts)
+    (part,) = goal.parts
+    rows = projected(robot, part.region(), starts, rng)
     return rows[part.satisfied(robot, rows)]
 
 

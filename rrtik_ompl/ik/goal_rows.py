@@ -17,7 +17,7 @@ from rrtik_ompl.kernels.ik.ik_layout import (
     NO_TURN,
     POSITION_TOLERANCE,
 )
-from rrtik_ompl.model.goal import GoalPart, GoalSet, PoseGoal, PositionGoal, TipGoal
+from rrtik_ompl.model.goal import GoalPart, GoalSet, PoseGoal, Target, TipGoal
 
 POSE = PoseGoal(np.eye(4))  # for its tolerances
 
@@ -31,7 +31,7 @@ def goal_rows(goal: TipGoal) -> Matrix:
         InputError: If the goal is a task-space region or has one, whose freedom no row can hold.
     """
     if not isinstance(goal, GoalSet):
-        return _row(goal)[None]
+        return np.array([_row(part) for part in goal.parts])
     rows = np.array([_row(member) for member in goal.members])
     posed = rows[:, FREE_TURN] == NO_TURN
     rows[posed, BOX : BOX + 3] = 0.5 * goal.box
@@ -48,14 +48,13 @@ def pose_rows(poses: NDArray[np.float64]) -> Matrix:
 
 
 def _row(goal: GoalPart) -> NDArray[np.float64]:
-    if not isinstance(goal, PoseGoal | PositionGoal):
+    if not isinstance(goal, Target):
         raise InputError("goal: no row holds a task-space region; use projection, or targets drawn from it")
     row = np.zeros(AIM_FLOATS)
-    if isinstance(goal, PositionGoal):
-        row[[0, 4, 8]], row[9:12] = 1.0, goal.position
-        row[POSITION_TOLERANCE], row[CHORD_TOLERANCE], row[FREE_TURN] = SHARE * goal.tolerance, 1.0, ANY_TURN
-        return row
-    row[:9], row[9:12] = goal.T_world_tip.rotation.ravel(), goal.T_world_tip.translation
-    row[POSITION_TOLERANCE] = SHARE * goal.position_tolerance
-    row[CHORD_TOLERANCE], row[FREE_TURN] = SHARE * goal.orientation_tolerance, NO_TURN
+    near, turned = goal.tolerances
+    row[:9] = goal.pose.rotation.ravel()
+    row[9:12] = goal.point
+    row[POSITION_TOLERANCE] = SHARE * near
+    row[CHORD_TOLERANCE] = SHARE * turned if goal.oriented else 1.0
+    row[FREE_TURN] = NO_TURN if goal.oriented else ANY_TURN
     return row

@@ -9,7 +9,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_region import held_region
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.ik.held_tables import projected_onto
-from rrtik_ompl.model.goal import GoalPart, TipGoal, as_task_region, parts_of
+from rrtik_ompl.model.goal import GoalPart, TipGoal
 from rrtik_ompl.world.problem import Problem
 
 STARTS = 48  # random ones beside what inverse kinematics found
@@ -36,7 +36,7 @@ def held_at_goal(problem: Problem, goal: TipGoal, found: Matrix, rng: np.random.
     starts = np.vstack([found[~held], rng.uniform(*problem.robot.finite_range(), (STARTS, problem.robot.dof))])
     rows = [found[held]]
     if not held.all() or len(found) == 0:
-        parts = parts_of(goal)
+        parts = goal.parts
         chosen = rng.permutation(len(parts))[:PARTS]
         rows += [_moved(problem, constraints, parts[k], starts) for k in chosen]
     joined: Matrix = np.vstack(rows)
@@ -46,7 +46,7 @@ def held_at_goal(problem: Problem, goal: TipGoal, found: Matrix, rng: np.random.
 def _moved(problem: Problem, constraints: HeldRegions, part: GoalPart, starts: Matrix) -> Matrix:
     """Configurations moved into all regions and to one part of the goal; those that get there."""
     try:
-        aim = held_region(problem.robot, problem.world.scene, as_task_region(part), "the goal")
+        aim = held_region(problem.robot, problem.world.scene, part.region(), "the goal")
     except InputError:  # ranges of angles that cannot be held; inverse kinematics alone must do
         return starts[:0]
     return projected_onto(problem.robot, HeldRegions((*constraints.regions, aim)), starts)

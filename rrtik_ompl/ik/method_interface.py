@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +13,11 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.ik.random_stream import RandomStream
-from rrtik_ompl.model.goal import PoseGoal, PositionGoal, TipGoal, has_continuous, joint_difference
+from rrtik_ompl.model.goal import Target as Target
+from rrtik_ompl.model.goal import TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World
 
-Target: TypeAlias = PoseGoal | PositionGoal
 SAME_POSTURE = 1e-3  # [rad] or [m]; solutions of a numeric method this near are one
 
 

@@ -18,7 +18,6 @@ from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric
 from rrtik_ompl.ik.numeric.projection import projection
 from rrtik_ompl.kernels.ik import branch_layout, ik_layout
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.model.goal import PositionGoal, tolerances
 from rrtik_ompl.model.robot import Robot
 
 
@@ -32,7 +31,7 @@ def load_kernels(robot: Robot) -> None:
 def _closed_form_misfit(robot: Robot, target: Target) -> str:
     if not has_closed_form(robot):
         return "the robot brings no closed form"
-    if form_of(robot).kind == "pose" and isinstance(target, PositionGoal):
+    if form_of(robot).kind == "pose" and not target.oriented:
         return "its closed form needs a pose, and a position leaves a whole family of solutions"
     return tip_fault(robot, form_of(robot))
 
@@ -49,7 +48,7 @@ def _closed_form(request: IkRequest) -> IkResponse:
     found = branches_of(robot, *_poses_and_hints(request))
     rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
-    near_enough = residuals <= np.array([tolerances(target) for target in targets])[owner]
+    near_enough = residuals <= np.array([target.tolerances for target in targets])[owner]
     reaching = near_enough.all(axis=1)
     q = rows[robot.within_limits(rows) & reaching]
     if not request.accept(q).any():
@@ -72,18 +71,12 @@ def leaves_a_curve(robot: Robot, targets: Sequence[Target]) -> bool:
 
 
 def _slack(target: Target) -> float:
-    """How far from singular a target may be to be treated as singular: a part of its tolerances [m, rad]."""
-    if isinstance(target, PositionGoal):
-        return 0.0
-    return 0.4 * min(target.position_tolerance, target.orientation_tolerance)
+    """How far from singular a target may be to be treated as singular: a part of its tolerances, 0 of a position."""
+    return 0.4 * min(target.tolerances)
 
 
 def _matrix(target: Target) -> Matrix:
-    if not isinstance(target, PositionGoal):
-        return np.asarray(target.T_world_tip.homogeneous, dtype=np.float64)
-    matrix: Matrix = np.eye(4)
-    matrix[:3, 3] = target.position
-    return matrix
+    return np.asarray(target.pose.homogeneous, dtype=np.float64)
 
 
 def _genetic(request: IkRequest) -> IkResponse:

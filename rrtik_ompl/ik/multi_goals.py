@@ -16,7 +16,7 @@ from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.held_tables import projected_onto
 from rrtik_ompl.ik.method_interface import IkResult, different_rows
-from rrtik_ompl.model.goal import MultiGoal, joint_difference
+from rrtik_ompl.model.goal import Goal, MultiGoal, joint_difference
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.tip_distance import metres_per_radian
@@ -26,7 +26,7 @@ STARTS = 96  # random ones, for each tip
 
 
 def at_all_tips(
-    robot: Robot, goal: MultiGoal, near: Vector, rng: np.random.Generator, *, scene: Scene, kept: Iterable[HeldRegion]
+    robot: Robot, goal: Goal, near: Vector, rng: np.random.Generator, *, scene: Scene, kept: Iterable[HeldRegion]
 ) -> Matrix:
     """Configurations with all tips at their goals that keep path constraints, shape (k, dof).
 
@@ -35,7 +35,7 @@ def at_all_tips(
 
     Args:
         robot: With all the tips.
-        goal: Of each.
+        goal: Of each: a goal of several tips.
         near: One of the starts, shape (dof,).
         rng: Of the others.
         scene: Whose attached objects may have goals too.

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.model.goal import PositionGoal
 from rrtik_ompl.model.robot import Robot
 
 SHARE = 0.01  # of the tolerance: a solution on the rim would not survive rounding
@@ -24,10 +23,9 @@ NEAR_HALF_TURN = 1e-4  # [rad] from pi, where the skew part of a rotation no lon
 
 def well_inside(robot: Robot, goal: Target, Q: Matrix) -> Mask:
     """Which rows of Q, shape (m, dof), are at most a hundredth of the tolerance away."""
-    if isinstance(goal, PositionGoal):
-        return goal.distance(robot, Q) <= SHARE * goal.tolerance
     position, angle = goal.errors(robot, Q)
-    return (position <= SHARE * goal.position_tolerance) & (angle <= SHARE * goal.orientation_tolerance)
+    near, turned = goal.tolerances
+    return (position <= SHARE * near) & (angle <= SHARE * turned)
 
 
 def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
@@ -38,12 +36,11 @@ def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
     model, data, frame, plain = _tip_of(robot, get_ident())
     pin.forwardKinematics(model, data, q if plain else robot.pinocchio_configuration(q)[0])
     tip = pin.updateFramePlacement(model, data, frame)
-    if isinstance(goal, PositionGoal):
-        return math.dist(tip.translation.tolist(), goal.position.tolist()), 0.0
-    target = goal.T_world_tip
-    a, b, c = target.actInv(tip).rotation.tolist()
+    away = math.dist(tip.translation.tolist(), goal.point.tolist())
+    if not goal.oriented:
+        return away, 0.0
+    a, b, c = goal.pose.actInv(tip).rotation.tolist()
     sine = 0.5 * math.hypot(c[1] - b[2], a[2] - c[0], b[0] - a[1])
-    away = math.dist(tip.translation.tolist(), target.translation.tolist())
     return away, math.atan2(sine, 0.5 * (a[0] + b[1] + c[2] - 1.0))
 
 
@@ -83,9 +80,9 @@ def walked(
 
 def twist(goal: Target, tips: NDArray[np.float64]) -> Matrix:
     """Twist from the tips, shape (m, 4, 4), to the goal in world axes: (linear [m]; rotation vector [rad]), (m, 6)."""
-    if isinstance(goal, PositionGoal):
-        return np.hstack([goal.position - tips[:, :3, 3], np.zeros((len(tips), 3))])
-    return twist_between(tips, goal.T_world_tip.rotation, goal.T_world_tip.translation)
+    if not goal.oriented:
+        return np.hstack([goal.point - tips[:, :3, 3], np.zeros((len(tips), 3))])
+    return twist_between(tips, goal.pose.rotation, goal.point)
 
 
 def twist_between(tips: NDArray[np.float64], rotations: NDArray[np.float64], positions: NDArray[np.float64]) -> Matrix:

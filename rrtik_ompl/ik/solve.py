@@ -22,16 +22,12 @@ from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.residual import error_of_one
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.model.goal import (
+    TIP_GOALS,
     MultiGoal,
     PoseGoal,
-    PositionGoal,
     TipGoal,
     has_continuous,
-    has_task_regions,
     joint_difference,
-    parts_of,
-    tip_errors,
-    tolerances,
 )
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
@@ -98,7 +94,7 @@ def solve_ik(
         found = solve_all_tips(robot, goal, posture, accepted, begin + limit, random.rng, scene=scene)
         return found if all else found.nearest()
     goal = _tip_goal(goal)
-    drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, max(DRAWS, len(parts_of(goal))), random.rng))
+    drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, max(DRAWS, len(goal.parts)), random.rng))
     name = chosen_method(robot, drawn, method)
     if method == "auto" and name == "numeric":
         name = _walker(goal)
@@ -113,7 +109,8 @@ def solve_ik(
 def _tip_goal(goal: TipGoal | ArrayLike | pin.SE3) -> TipGoal:
     """The goal itself, or that of a pose."""
     taken: Any = PoseGoal(goal) if isinstance(goal, (pin.SE3, np.ndarray, list, tuple)) else goal
-    require(taken, TipGoal, "goal", "inverse kinematics needs a goal of the tip, such as PoseGoal(T_world_tip)")
+    if not isinstance(taken, TipGoal):
+        require(taken, TIP_GOALS, "goal", "inverse kinematics needs a goal of the tip, such as PoseGoal(T_world_tip)")
     return taken  # type: ignore[no-any-return]
 
 
@@ -235,7 +232,7 @@ def _reaching(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
 
 def _block(goal: TipGoal) -> int:
     """How many rows are compared with a goal at once: thousands of rows with thousands of grasps take minutes."""
-    return max(1, COMPARED // len(parts_of(goal)))
+    return max(1, COMPARED // len(goal.parts))
 
 
 def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
@@ -243,11 +240,11 @@ def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
     if len(q) == 0:
         return q, np.zeros((0, 2))
     if len(q) == 1 and isinstance(goal, Target):
-        (position, angle), (near, turned) = error_of_one(robot, goal, q[0]), tolerances(goal)
+        (position, angle), (near, turned) = error_of_one(robot, goal, q[0]), goal.tolerances
         kept = int(position <= near and angle <= turned)
         return q[:kept], np.array([[position, angle]])[:kept]
-    residuals = np.array(tip_errors(goal, robot, q)).T
-    at = (residuals <= tolerances(goal)).all(axis=1) if isinstance(goal, Target) else goal.satisfied(robot, q)
+    residuals = np.array(goal.errors(robot, q)).T
+    at = (residuals <= goal.tolerances).all(axis=1) if isinstance(goal, Target) else goal.satisfied(robot, q)
     return q[at], residuals[at]
 
 
@@ -281,16 +278,16 @@ def _out_of_reach(robot: Robot, target: Target) -> bool:
 
 def _walker(goal: TipGoal) -> IkMethod:
     """The method for goals with freedom that walks to all of them, not to targets drawn from them."""
-    return "projection" if has_task_regions(goal) else "numeric"
+    return "projection" if goal.has_regions else "numeric"
 
 
 def _draws(name: str, goal: TipGoal) -> bool:
     """Whether the targets that a method takes are not all there is of a goal."""
-    return name not in ("projection", _walker(goal)) and any(map(leaves_freedom, parts_of(goal)))
+    return name not in ("projection", _walker(goal)) and any(map(leaves_freedom, goal.parts))
 
 
 def _away(robot: Robot, goal: TipGoal, q: Vector) -> str:
     """How far a posture is from a goal, in metres and, unless it is a position, degrees."""
-    ((distance,), (angle,)) = tip_errors(goal, robot, q[None])
-    turned = "" if isinstance(goal, PositionGoal) else f" and {round(np.degrees(angle), DIGITS):.4g} deg"
+    ((distance,), (angle,)) = goal.errors(robot, q[None])
+    turned = f" and {round(np.degrees(angle), DIGITS):.4g} deg" if goal.oriented else ""
     return f"{round(distance, DIGITS):.4g} m{turned} away"

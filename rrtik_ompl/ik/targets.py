@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Matrix
-from rrtik_ompl.model.goal import GoalPart, PoseGoal, PositionGoal, TipGoal, parts_of
+from rrtik_ompl.model.goal import GoalPart, PoseGoal, PositionGoal, Target, TipGoal
 from rrtik_ompl.model.task_region import TaskRegion, displacements
 
 
-def targets(goal: TipGoal, most: int, rng: np.random.Generator) -> list[PoseGoal | PositionGoal]:
+def targets(goal: TipGoal, most: int, rng: np.random.Generator) -> list[Target]:
     """Goals without freedom: the goal itself, or up to ``most`` of a region's parts, with draws where they are free."""
     parts, coordinates = _drawn(goal, most, rng)
     places = iter(displacements(coordinates))
-    return [_target(part, next(places)) if isinstance(part, TaskRegion) else part for part in parts]
+    return [part if isinstance(part, Target) else _target(part.region(), next(places)) for part in parts]
 
 
 def skip_targets(goal: TipGoal, most: int, rng: np.random.Generator) -> None:
@@ -23,21 +23,21 @@ def skip_targets(goal: TipGoal, most: int, rng: np.random.Generator) -> None:
 
 def leaves_freedom(part: GoalPart) -> bool:
     """Whether there are further targets to be drawn from it."""
-    return isinstance(part, TaskRegion) and bool(part.free.any())
+    return part.freedom is not None and bool(part.freedom.free.any())
 
 
 def _drawn(goal: TipGoal, most: int, rng: np.random.Generator) -> tuple[list[GoalPart], Matrix]:
     """The parts of which targets are made, and for each region among them a displacement, shape (regions, 6)."""
-    parts = parts_of(goal)
+    parts = goal.parts
     if len(parts) > most:
         parts = tuple(parts[k] for k in rng.permutation(len(parts))[:most])
     count = most if any(leaves_freedom(part) for part in parts) else len(parts)
     drawn = [parts[k % len(parts)] for k in range(count)]
-    bounds = np.array([part.bounds for part in drawn if isinstance(part, TaskRegion)]).reshape(-1, 6, 2)
+    bounds = np.array([part.freedom.bounds for part in drawn if part.freedom is not None]).reshape(-1, 6, 2)
     return drawn, rng.uniform(bounds[..., 0], bounds[..., 1])
 
 
-def _target(part: TaskRegion, displacement: Matrix) -> PoseGoal | PositionGoal:
+def _target(part: TaskRegion, displacement: Matrix) -> Target:
     """The goal without freedom that a displacement of a region is, shape (4, 4)."""
     pose = part.T_world_w.homogeneous @ displacement @ part.T_w_tip.homogeneous
     any_turn = (part.bounds[3:, 1] - part.bounds[3:, 0] >= TAU).all()

@@ -24,7 +24,7 @@ from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric.track import Tracker
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.solve import free_of_collision, solve_ik
-from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference, tip_errors, tolerances
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.check_world import check_world
 from rrtik_ompl.world.world import World
@@ -183,7 +183,7 @@ def _target(row: Matrix, position_tolerance: float, orientation_tolerance: float
 def _freed(targets: tuple[Target, ...], axis: FrameAxis | None) -> tuple[TipGoal, ...]:
     if axis is None:
         return targets
-    if isinstance(targets[0], PositionGoal):
+    if not targets[0].oriented:
         raise InputError("free_rotation_axis: points leave every turn free; give poses, or leave it out")
     return tuple(GoalSet([target], free_rotation_axis=axis) for target in targets)
 
@@ -245,8 +245,8 @@ def _keep_only_checked(task: Task, q: Matrix) -> Matrix:
     """Residuals, shape (k, 2). Rows that are not at their target, inside the limits and free become NaN, in place."""
     residuals = np.full((len(q), 2), np.nan)
     for k in np.flatnonzero(~np.isnan(q[:, 0])):
-        residuals[k] = np.ravel(tip_errors(task.goals[k], task.robot, q[k : k + 1]))
-    good = (residuals <= tolerances(task.targets[0])).all(axis=1) & task.robot.within_limits(q)
+        residuals[k] = np.ravel(task.goals[k].errors(task.robot, q[k : k + 1]))
+    good = (residuals <= task.targets[0].tolerances).all(axis=1) & task.robot.within_limits(q)
     good[good] = task.accept(q[good])
     q[~good], residuals[~good] = np.nan, np.nan
     q[:] = task.robot.clamp(q)

@@ -17,8 +17,12 @@ from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.base.poses import rigid, rotation_angles
 from rrtik_ompl.base.units import wrapped
+from rrtik_ompl.model.goal_kind import Goal as Goal
+from rrtik_ompl.model.goal_kind import GoalPart as GoalPart
+from rrtik_ompl.model.goal_kind import Target as Target
+from rrtik_ompl.model.goal_kind import TipGoal as TipGoal
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import HasTipErrors, TaskRegion, WithinTolerances
+from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.model.tip_distance import metres_per_radian
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
@@ -47,10 +51,10 @@ def has_continuous(robot: Robot) -> bool:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointGoal:
+class JointGoal(Goal):
     """Reach this configuration. ``q``: shape (dof,), rad or m."""
 
-    q: Vector
+    q: Vector = field()  # in place of the property of a Goal
     tolerance: float = JOINT_TOLERANCE
 
     __reduce__ = as_value
@@ -58,6 +62,11 @@ class JointGoal:
     def __init__(self, q: ArrayLike, tolerance: float = JOINT_TOLERANCE) -> None:
         object.__setattr__(self, "q", frozen(finite_array(q, (None,), "goal joints")))
         object.__setattr__(self, "tolerance", positive(tolerance, "goal tolerance"))
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return "joint values"
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Largest joint error of each row of Q, shape (m,) [rad or m]."""
@@ -71,7 +80,7 @@ class JointGoal:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PositionGoal(HasTipErrors):
+class PositionGoal(Target):
     """Bring the tip to a point of the world [m], orientation free. ``tolerance`` [m]."""
 
     position: Vector
@@ -83,21 +92,47 @@ class PositionGoal(HasTipErrors):
         object.__setattr__(self, "position", frozen(finite_array(position, (3,), "goal position")))
         object.__setattr__(self, "tolerance", positive(tolerance, "goal tolerance"))
 
-    def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Distance of the tip from the point for each row of Q, shape (m,) [m]."""
-        return self.errors(robot, Q)[0]
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return "tip position"
 
-    def _errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+    @property
+    def oriented(self) -> bool:
+        """The orientation of the tip does not count."""
+        return False
+
+    @property
+    def tolerances(self) -> tuple[float, float]:
+        """What the distance may be at most [m], and 0 for the angle."""
+        return self.tolerance, 0.0
+
+    @property
+    def pose(self) -> pin.SE3:
+        """The tip at the point, turned like the world (``pinocchio.SE3``)."""
+        return pin.SE3(np.eye(3), np.array(self.position))
+
+    @property
+    def point(self) -> Vector:
+        """The position [m], shape (3,)."""
+        return self.position
+
+    def tightened(self, share: float) -> PositionGoal:
+        """The same point with that share of the tolerance."""
+        return PositionGoal(self.position, share * self.tolerance)
+
+    def region(self) -> TaskRegion:
+        """The point in any orientation."""
+        everywhere = np.outer([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], [-np.pi, np.pi])
+        return TaskRegion(self.pose, everywhere, position_tolerance=self.tolerance)
+
+    def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
         """Distance [m] of poses of the tip, shape (m, 4, 4), and an angle of 0, shapes (m,)."""
         return np.linalg.norm(tips[:, :3, 3] - self.position, axis=1), np.zeros(len(tips))
 
-    def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """Which rows of Q are at the goal, shape (m,)."""
-        return self.distance(robot, Q) <= self.tolerance
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseGoal(WithinTolerances):
+class PoseGoal(Target):
     """Bring the tip frame to T_world_tip, within ``position_tolerance`` [m] and ``orientation_tolerance`` [rad]."""
 
     T_world_tip: Any
@@ -111,17 +146,53 @@ class PoseGoal(WithinTolerances):
         positive(self.position_tolerance, "goal position_tolerance")
         positive(self.orientation_tolerance, "goal orientation_tolerance")
 
-    def _errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return "tip pose"
+
+    @property
+    def tolerances(self) -> tuple[float, float]:
+        """What the errors may be at most: distance [m] and angle [rad]."""
+        return self.position_tolerance, self.orientation_tolerance
+
+    @property
+    def pose(self) -> pin.SE3:
+        """T_world_tip (``pinocchio.SE3``)."""
+        return self.T_world_tip
+
+    @property
+    def point(self) -> Vector:
+        """Where the tip has to be [m], shape (3,)."""
+        point: Vector = self.T_world_tip.translation
+        return point
+
+    def tightened(self, share: float) -> PoseGoal:
+        """The same pose with that share of the tolerances."""
+        return PoseGoal(self.T_world_tip, share * self.position_tolerance, share * self.orientation_tolerance)
+
+    def region(self) -> TaskRegion:
+        """The pose alone."""
+        return self.freed(None, NO_BOX)
+
+    def freed(self, axis: FrameAxis | None, box: Vector) -> TaskRegion:
+        """The pose with a free turn about an axis of its frame, and a box of positions there, side lengths [m]."""
+        bounds = np.zeros((6, 2))
+        bounds[:3] = np.outer(box, [-0.5, 0.5])
+        if axis is not None:
+            bounds[3 + "xyz".index(axis)] = -np.pi, np.pi
+        return TaskRegion(self.T_world_tip, bounds, pin.SE3.Identity(), *self.tolerances)
+
+    def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
         """Position error [m] and rotation angle [rad] of poses of the tip, shape (m, 4, 4), shapes (m,)."""
         return pose_errors(tips, self.T_world_tip)
 
 
-GoalPart: TypeAlias = PoseGoal | PositionGoal | TaskRegion
 AnyPart: TypeAlias = GoalPart | pin.SE3 | NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GoalSet:
+class GoalSet(TipGoal):
     """Any of several goals: a grasp set. Poses may be given freedom: a turn about an axis, a box of positions.
 
     Attributes:
@@ -142,7 +213,7 @@ class GoalSet:
         self, members: Iterable[AnyPart], free_rotation_axis: FrameAxis | None = None, box: ArrayLike = NO_BOX
     ) -> None:
         goals = tuple(map(_with_poses, listed(members, "goal set", MOST))) if isinstance(members, Iterable) else ()
-        if not goals or not all(isinstance(goal, PoseGoal | PositionGoal | TaskRegion) for goal in goals):
+        if not goals or not all(isinstance(goal, GoalPart) for goal in goals):
             kinds = "a list of at least one pose or position or region of the tip"
             raise InputError(f"goal: a set is {kinds}; of configurations plan to each, or take PoseGoal(robot.fk(q))")
         if free_rotation_axis is not None and str(free_rotation_axis) not in ("x", "y", "z"):
@@ -151,11 +222,35 @@ class GoalSet:
         if (sides < 0.0).any():
             raise InputError(f"goal box must not have negative sides, got {sides.tolist()}")
         freed = free_rotation_axis is not None or bool(sides.any())
-        parts = (_freed(g, free_rotation_axis, sides) if freed and isinstance(g, PoseGoal) else g for g in goals)
+        parts = (goal.freed(free_rotation_axis, sides) for goal in goals) if freed else goals
         object.__setattr__(self, "members", goals)
         object.__setattr__(self, "free_rotation_axis", free_rotation_axis)
         object.__setattr__(self, "box", frozen(sides))
         object.__setattr__(self, "parts", tuple(parts))
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return "one of several" if len(self.members) > 1 else "tip region"
+
+    @property
+    def has_regions(self) -> bool:
+        """Whether a member is a region; poses may be freed as rows of `rrtik_ompl.ik.goal_rows` say it."""
+        return any(member.freedom is not None for member in self.members)
+
+    def alone(self, number: int) -> TipGoal:
+        """One of its parts as a goal of its own: of a pose that may be turned, but not shifted, a set of one."""
+        member, part = self.members[number], self.parts[number]
+        if part is member or self.box.any():
+            return part
+        return GoalSet([member], self.free_rotation_axis)
+
+    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
+        """Distance [m] and angle [rad] of the tip from the nearest part, for each row of Q, shapes (m,)."""
+        each = self.member_errors(robot, Q)
+        best = np.argmin(each[..., 0] + metres_per_radian(robot) * each[..., 1], axis=0)
+        position, angle = each[best, np.arange(each.shape[1])].T
+        return position, angle
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Distance to the nearest part, shape (m,) [m]: the way of the tip, and its turn at half the arm's reach.
@@ -167,14 +262,14 @@ class GoalSet:
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """Which rows of Q are at one of the parts, shape (m,)."""
-        most = np.array([tolerances(part) for part in self.parts])[:, None]
+        most = np.array([part.tolerances for part in self.parts])[:, None]
         return np.asarray((self.member_errors(robot, Q) <= most).all(axis=2).any(axis=0))
 
     def member_at(self, robot: Robot, q: ArrayLike) -> int | None:
         """Number of the member that a configuration, shape (dof,), reaches, from 0, the nearest of several; or None."""
         require(robot, Robot, "robot of a goal")
         each = self.member_errors(robot, robot.configuration(q)[None])[:, 0]
-        reached = [bool((errors <= tolerances(part)).all()) for errors, part in zip(each, self.parts, strict=True)]
+        reached = [bool((errors <= part.tolerances).all()) for errors, part in zip(each, self.parts, strict=True)]
         away = np.where(reached, each[:, 0] + metres_per_radian(robot) * each[:, 1], np.inf)
         return int(away.argmin()) if any(reached) else None
 
@@ -189,7 +284,7 @@ class GoalSet:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MultiGoal:
+class MultiGoal(Goal):
     """Goals of several tips, all of them at once: an arm with two hands.
 
     Attributes:
@@ -203,8 +298,8 @@ class MultiGoal:
         True
     """
 
-    frames: tuple[str, ...]
-    parts: tuple[GoalPart, ...]
+    frames: tuple[str, ...] = field()
+    parts: tuple[GoalPart, ...] = field()
 
     def __init__(self, goals: Mapping[str, AnyPart]) -> None:
         if not isinstance(goals, Mapping) or not goals:
@@ -212,12 +307,22 @@ class MultiGoal:
         parts = {name: _with_poses(part) for name, part in goals.items()}
         for name, part in parts.items():
             require(name, str, "tip of a MultiGoal", "name a link")
-            require(part, GoalPart, f"goal of '{name}'", "use a PoseGoal, a PositionGoal or a TaskRegion")
+            if not isinstance(part, GoalPart):
+                require(part, PARTS, f"goal of '{name}'", "use a PoseGoal, a PositionGoal or a TaskRegion")
         object.__setattr__(self, "frames", tuple(parts))
         object.__setattr__(self, "parts", tuple(parts.values()))
 
     def __reduce__(self) -> tuple[type[MultiGoal], tuple[dict[str, GoalPart]]]:
         return MultiGoal, (dict(zip(self.frames, self.parts, strict=True)),)
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return f"{len(self.frames)} tips"
+
+    def arms(self, robot: Robot) -> list[Robot]:
+        """The robot with each of the tips."""
+        return [arm for arm, _ in self.each(robot)]
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """Distances of all tips together for each row of Q, shape (m,) [m]; see :meth:`GoalSet.distance`."""
@@ -234,55 +339,14 @@ class MultiGoal:
         return [(_with_tip(robot, frame), part) for frame, part in zip(self.frames, self.parts, strict=True)]
 
 
+PARTS = PoseGoal | PositionGoal | TaskRegion  # the kinds that messages name
+TIP_GOALS = PARTS | GoalSet
+
+
 @lru_cache(maxsize=64)
 def _with_tip(robot: Robot, frame: str) -> Robot:
     """The same robot, another of its links being the one that goals refer to."""
     return replace(robot, tip=frame, closed_form=None)
-
-
-TipGoal: TypeAlias = PoseGoal | PositionGoal | TaskRegion | GoalSet
-Goal: TypeAlias = JointGoal | TipGoal | MultiGoal
-
-
-def parts_of(goal: TipGoal | MultiGoal) -> tuple[GoalPart, ...]:
-    """The goals of which one is enough: those of a region, or the goal alone. Of several tips all of them."""
-    return goal.parts if isinstance(goal, GoalSet | MultiGoal) else (goal,)
-
-
-def tolerances(part: GoalPart) -> tuple[float, float]:
-    """What the errors of a goal may be at most: distance [m] and angle [rad] (0 for a position)."""
-    if isinstance(part, PositionGoal):
-        return part.tolerance, 0.0
-    return part.position_tolerance, part.orientation_tolerance
-
-
-def has_task_regions(goal: TipGoal) -> bool:
-    """Whether a goal is a task-space region or has one among its members."""
-    if isinstance(goal, PoseGoal | PositionGoal):
-        return False
-    members = goal.members if isinstance(goal, GoalSet) else (goal,)
-    return any(isinstance(member, TaskRegion) for member in members)
-
-
-def as_task_region(part: GoalPart) -> TaskRegion:
-    """A pose as a region without freedom, a position as one of any orientation; a region as it is."""
-    if isinstance(part, TaskRegion):
-        return part
-    if isinstance(part, PoseGoal):
-        return _freed(part, None, NO_BOX)
-    everywhere = np.outer([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], [-np.pi, np.pi])
-    place = pin.SE3(np.eye(3), np.array(part.position))
-    return TaskRegion(place, everywhere, position_tolerance=part.tolerance)
-
-
-def tip_errors(goal: TipGoal, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
-    """Distance [m] and angle [rad] of the tip from the nearest part of a goal, for each row of Q, shapes (m,)."""
-    if not isinstance(goal, GoalSet):
-        return goal.errors(robot, Q)
-    each = goal.member_errors(robot, Q)
-    best = np.argmin(each[..., 0] + metres_per_radian(robot) * each[..., 1], axis=0)
-    position, angle = each[best, np.arange(each.shape[1])].T
-    return position, angle
 
 
 def pose_errors(tips: NDArray[np.float64], target: pin.SE3) -> tuple[Vector, Vector]:
@@ -290,11 +354,3 @@ def pose_errors(tips: NDArray[np.float64], target: pin.SE3) -> tuple[Vector, Vec
     away = tips[:, :3, 3] - target.translation
     position: Vector = np.hypot.reduce(away, axis=1)
     return position, rotation_angles(target.rotation.T @ tips[:, :3, :3])
-
-
-def _freed(goal: PoseGoal, free_rotation_axis: FrameAxis | None, box: Vector) -> TaskRegion:
-    bounds = np.zeros((6, 2))
-    bounds[:3] = np.outer(box, [-0.5, 0.5])
-    if free_rotation_axis is not None:
-        bounds[3 + "xyz".index(free_rotation_axis)] = -np.pi, np.pi
-    return TaskRegion(goal.T_world_tip, bounds, pin.SE3.Identity(), *tolerances(goal))

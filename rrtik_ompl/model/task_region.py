@@ -7,7 +7,6 @@ radians.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,55 +29,14 @@ from rrtik_ompl.base.arrays import (
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, name_of, require
 from rrtik_ompl.base.poses import PoseLike, rigid, rotation_angles, rpy_matrices, turned_z, unit_vector
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.tip_distance import metres_per_radian
+from rrtik_ompl.model.goal_kind import GoalPart
 
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 SWEEPS = 3  # over roll, pitch and yaw; one is exact where a single one of them is free
 
 
-class HasTipErrors(ABC):
-    """What the tip has a distance and an angle from."""
-
-    __slots__ = ()
-
-    @abstractmethod
-    def _errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
-        """As :meth:`errors_at`, of poses that are known to be such."""
-
-    def errors_at(self, tips: ArrayLike) -> tuple[Vector, Vector]:
-        """Distance [m] and angle [rad] of poses of the tip, shape (m, 4, 4), from the goal, shapes (m,)."""
-        return self._errors_at(finite_array(tips, (None, 4, 4), "poses of the tip"))
-
-    def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
-        """Distance [m] and angle [rad] of the tip from the goal, for each row of Q, shapes (m,)."""
-        require(robot, Robot, "robot of a goal")
-        return self._errors_at(robot.fk_batch(Q))
-
-
-class WithinTolerances(HasTipErrors):
-    """What has an error in position and one in orientation, and a tolerance for each."""
-
-    __slots__ = ()
-    position_tolerance: float
-    orientation_tolerance: float
-
-    def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """How far the tip is from the goal, shape (m,) [m]: its way, and its turn at the lever of half the arm's reach.
-
-        Small enough means at the goal only where the tolerances say so: ask :meth:`satisfied`.
-        """
-        position, angle = self.errors(robot, Q)
-        return position + metres_per_radian(robot) * angle
-
-    def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """Which rows of Q are at the goal, shape (m,)."""
-        position, angle = self.errors(robot, Q)
-        return (position <= self.position_tolerance) & (angle <= self.orientation_tolerance)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class TaskRegion(WithinTolerances):
+class TaskRegion(GoalPart):
     """Bring the tip to any pose ``T_world_w @ D @ T_w_tip`` whose displacement D lies within bounds.
 
     Attributes:
@@ -166,6 +124,20 @@ class TaskRegion(WithinTolerances):
         return cls(T_world_w, bounds, T_world_w.actInv(tip), position_tolerance, orientation_tolerance)
 
     @property
+    def title(self) -> str:
+        """What it is."""
+        return "tip region"
+
+    @property
+    def tolerances(self) -> tuple[float, float]:
+        """What the errors may be at most: distance [m] and angle [rad]."""
+        return self.position_tolerance, self.orientation_tolerance
+
+    def region(self) -> TaskRegion:
+        """It is one."""
+        return self
+
+    @property
     def free(self) -> Mask:
         """Which of the six coordinates have a range, shape (6,)."""
         ranges: Mask = self.bounds[:, 0] < self.bounds[:, 1]
@@ -202,7 +174,7 @@ class TaskRegion(WithinTolerances):
         place = (tips[:, :3, 3] - self.T_world_w.translation) @ R_w - rpy_matrices(angles) @ self.T_w_tip.translation
         return np.hstack([np.clip(place, self.bounds[:3, 0], self.bounds[:3, 1]), angles])
 
-    def _errors_at(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+    def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
         """Distance [m] and angle [rad] of poses of the tip, shape (m, 4, 4), from the nearest pose, shapes (m,)."""
         poses = self.poses(self.nearest(tips))
         position: Vector = np.linalg.norm(tips[:, :3, 3] - poses[:, :3, 3], axis=1)

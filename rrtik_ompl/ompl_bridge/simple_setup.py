@@ -14,7 +14,6 @@ from ompl import geometric as og
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError, require
-from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.ownership import foreign_code
@@ -153,8 +152,8 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
         return _information(world_or_problem, *world_or_problem.robot.finite_range(), so2)
     if not isinstance(world_or_problem, Problem):
         raise InputError(f"space_information: expected a World or a Problem, got {type(world_or_problem).__name__}")
-    goal = world_or_problem.goal
-    ends = goal.q[None] if isinstance(goal, JointGoal) else world_or_problem.start[None]
+    q = world_or_problem.goal.q
+    ends = world_or_problem.start[None] if q is None else q[None]
     bounds = planning_bounds(world_or_problem, ends)
     if not world_or_problem.constraints:
         return _information(world_or_problem.world, *bounds, so2)
@@ -190,7 +189,7 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
     states.write(state, problem.start)
     setup.addStartState(state)
     goal: ob.Goal
-    if isinstance(problem.goal, JointGoal):
+    if problem.goal.q is not None:
         goal = ob.GoalState(si)
         states.write(state, problem.goal.q)
         goal.setState(state)

@@ -11,7 +11,7 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.choices import ProofMode
 from rrtik_ompl.ik.goal_configurations import MAX_ROUNDS, GoalSearch
-from rrtik_ompl.model.goal import JointGoal, TipGoal, has_continuous
+from rrtik_ompl.model.goal import TipGoal, has_continuous
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, EFFORT_MOTIONS, Attempt, attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
@@ -66,7 +66,7 @@ class Search:
         self._problem, self._factory, self._clearance = problem, factory, clearance
         self._deadline, self._seeds = deadline, seeds
         self._goals = GoalSearch(problem, seeds[0], seconds_left=self._left)
-        self._traits, joints = traits_of(factory), isinstance(problem.goal, JointGoal)
+        self._traits, joints = traits_of(factory), problem.goal.q is not None
         self._iterations = iterations if self._traits.supports_iteration_limit else None
         wanted = {"clearance": clearance} if self._traits.leaves_room and clearance is not None else {}
         self._parameters = {**wanted, **parameters}
@@ -140,7 +140,7 @@ class Search:
     def _roomy_goals(self) -> Matrix:
         """All that is known to be at a goal of the tip: those that keep the clearance asked for, if there are any."""
         rows, wanted = self._goals.first(), self._clearance
-        if wanted is None or isinstance(self._problem.goal, JointGoal):
+        if wanted is None or self._problem.goal.q is not None:
             return rows
         for _ in range(MAX_ROUNDS):
             kept = self._problem.world.prover.proven(rows, rows, clearance=wanted)

@@ -93,7 +93,7 @@ def _goals(given: Ends, robot: Robot) -> list[Goal]:
         return [JointGoal(row) for row in finite_array(rows, (None, robot.dof), "goals")]
     goals = [goal for goal in given if isinstance(goal, Goal)]
     for number, goal in enumerate(goals):
-        if isinstance(goal, JointGoal):
+        if goal.q is not None:
             robot.configuration(goal.q, f"goals[{number}]")
     return goals
 

@@ -8,7 +8,6 @@ from types import MappingProxyType
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.kernels.warming import load_together
-from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.ompl_bridge.attempt import attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import check_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, planners_with, traits_of
@@ -62,7 +61,7 @@ def run_planner(problem: Problem, name: str, factory: PlannerFactory, request: R
 
 def load_kernels_for(problem: Problem, factory: PlannerFactory) -> None:
     """Load what the search will use: compiling it for the first time is no part of planning."""
-    if not isinstance(problem.goal, JointGoal):
+    if problem.goal.q is None:
         load_kernels(problem.robot)
     if problem.world.fast is not None or problem.constraints:
         load_together((*traits_of(factory).kernels, PROOF_KERNELS))
@@ -80,6 +79,6 @@ def _refuse_if_it_breaks_constraints(name: str, factory: PlannerFactory) -> None
 
 def _nothing_to_do(problem: Problem) -> bool:
     """Whether the start is the goal, to the bit if that is a configuration; a `Problem` has checked its start."""
-    if isinstance(problem.goal, JointGoal):
+    if problem.goal.q is not None:
         return bool((problem.start == problem.goal.q).all())
     return problem.reached(problem.start)

@@ -12,7 +12,6 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.choices import PathObjective
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.joint_weights import weights_of
-from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.transitions import route_length
@@ -61,10 +60,10 @@ COSTS: Mapping[PathObjective, PathCost] = MappingProxyType(
 
 def least_cost(problem: Problem, objective: PathObjective) -> float:
     """What no path costs less than: that of the straight motion to a goal in joint values; 0 for any other goal."""
-    goal = problem.goal
-    if not isinstance(goal, JointGoal):
+    q = problem.goal.q
+    if q is None:
         return 0.0
-    span = goal.q - problem.start
+    span = q - problem.start
     if objective == "time":
         return float(_seconds(span[None], problem.robot)[0])
     return float(np.linalg.norm(span * _weights(problem)))

@@ -12,7 +12,6 @@ import numpy as np
 from rrtik_ompl.base.arrays import not_negative, positive, whole_number
 from rrtik_ompl.base.choices import Accuracy, ImproveStrategy, PathObjective, ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, require
-from rrtik_ompl.model.goal import GoalSet
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
@@ -123,7 +122,7 @@ def plan(
     )
     found = _search_of(problem, planner)(request)
     found = _improved(problem, planner, found, request, how) if found.found and how.seconds > 0.0 else found
-    if found.path is None or not isinstance(problem.goal, GoalSet):
+    if found.path is None:
         return found
     return replace(found, member=problem.goal.member_at(problem.robot, found.path.end))
 

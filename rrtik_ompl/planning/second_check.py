@@ -6,7 +6,6 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.choices import ProofMode
-from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.ompl_bridge.attempt import Attempt
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
@@ -174,14 +173,14 @@ class SecondCheck:
 
 def fixed_ends(problem: Problem) -> dict[str, Vector]:
     """The configurations that every path of a problem passes, by what they are."""
-    goal = problem.goal
-    return {"start": problem.start} | ({"goal": goal.q} if isinstance(goal, JointGoal) else {})
+    q = problem.goal.q
+    return {"start": problem.start} | ({} if q is None else {"goal": q})
 
 
 def _at_goal(problem: Problem, q: Vector) -> bool:
     """Whether a configuration, shape (dof,), is at the goal; most are its joint values to the bit."""
-    goal = problem.goal
-    return bool(isinstance(goal, JointGoal) and (q == goal.q).all()) or problem.reached(q)
+    wanted = problem.goal.q
+    return bool(wanted is not None and (q == wanted).all()) or problem.reached(q)
 
 
 def _rank(path: JointPath) -> tuple[int, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import singledispatch
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -239,40 +240,58 @@ def build_goal(section: GoalSection, robot: Robot) -> Goal:
     return section.build()
 
 
+@singledispatch
 def goal_data(goal: Goal) -> dict[str, Any]:
-    """What the ``goal:`` section of a file says about a goal.
+    """What the ``goal:`` section of a file says about a goal; each kind has its own below.
 
     Raises:
         InputError: If the format has no words for it.
     """
-    if isinstance(goal, JointGoal):
-        if goal.tolerance != JOINT_TOLERANCE:
-            raise InputError(f"goal: a problem file cannot say the tolerance {goal.tolerance:g} of a joint goal")
-        return {"joints": goal.q.tolist()}
-    if isinstance(goal, MultiGoal):
-        return {"tips": {frame: _part_data(part) for frame, part in zip(goal.frames, goal.parts, strict=True)}}
-    if not isinstance(goal, GoalSet):
-        return _part_data(goal)
-    freed = goal.free_rotation_axis is not None or bool(goal.box.any())
-    if not freed or len(goal.members) > 1 or not isinstance(goal.members[0], PoseGoal):
-        return {"any_of": [_part_data(part) for part in goal.parts]}
-    axis = {} if goal.free_rotation_axis is None else {"free_rotation_axis": goal.free_rotation_axis}
-    return {"region": {**_part_data(goal.members[0]), **axis, "box": goal.box.tolist()}}
+    raise InputError(f"goal: a problem file has no words for a {type(goal).__name__}")
 
 
-def _part_data(goal: GoalPart) -> dict[str, Any]:
-    if isinstance(goal, PositionGoal):
-        return {"position": goal.position.tolist(), "tolerance": float(goal.tolerance)}
-    tolerances = {
-        "position_tolerance": float(goal.position_tolerance),
-        "orientation_tolerance": float(goal.orientation_tolerance),
-    }
-    if isinstance(goal, PoseGoal):
-        return {"pose": pose_data(goal.T_world_tip), **tolerances}
+@goal_data.register
+def _joints(goal: JointGoal) -> dict[str, Any]:
+    if goal.tolerance != JOINT_TOLERANCE:
+        raise InputError(f"goal: a problem file cannot say the tolerance {goal.tolerance:g} of a joint goal")
+    return {"joints": goal.q.tolist()}
+
+
+@goal_data.register
+def _position(goal: PositionGoal) -> dict[str, Any]:
+    return {"position": goal.position.tolist(), "tolerance": float(goal.tolerance)}
+
+
+@goal_data.register
+def _pose(goal: PoseGoal) -> dict[str, Any]:
+    return {"pose": pose_data(goal.T_world_tip), **_tolerances(goal)}
+
+
+@goal_data.register
+def _task_region(goal: TaskRegion) -> dict[str, Any]:
     places = {"frame": pose_data(goal.T_world_w), "tip": pose_data(goal.T_w_tip)}
     ranges = {
         name: bounds.tolist()
         for name, bounds, free in zip(COORDINATES, goal.bounds, goal.free, strict=True)
         if free or bounds.any()
     }
-    return {"task_region": {**places, **ranges, **tolerances}}
+    return {"task_region": {**places, **ranges, **_tolerances(goal)}}
+
+
+@goal_data.register
+def _any_of(goal: GoalSet) -> dict[str, Any]:
+    """A single pose that was given freedom is a region; of several, each is written as a task_region of its own."""
+    if len(goal.members) > 1 or goal.parts[0] is goal.members[0]:
+        return {"any_of": [goal_data(part) for part in goal.parts]}
+    axis = {} if goal.free_rotation_axis is None else {"free_rotation_axis": goal.free_rotation_axis}
+    return {"region": {**goal_data(goal.members[0]), **axis, "box": goal.box.tolist()}}
+
+
+@goal_data.register
+def _tips(goal: MultiGoal) -> dict[str, Any]:
+    return {"tips": {frame: goal_data(part) for frame, part in zip(goal.frames, goal.parts, strict=True)}}
+
+
+def _tolerances(goal: GoalPart) -> dict[str, float]:
+    near, turned = goal.tolerances
+    return {"position_tolerance": float(near), "orientation_tolerance": float(turned)}

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.goal_configurations import goal_configurations
-from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.moving_world import MovingWorld
@@ -52,7 +51,7 @@ def every_goal(problem: Problem, alone: World, rng: np.random.Generator) -> Matr
     Raises:
         InputError: If there is none.
     """
-    if isinstance(problem.goal, JointGoal):
+    if problem.goal.q is not None:
         return problem.goal.q[None]
     found = goal_configurations(Problem(alone, problem.start, problem.goal), rng)
     if len(found.rows) == 0:

@@ -12,7 +12,6 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.goal_configurations import GoalSearch
-from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Touching
@@ -193,7 +192,7 @@ class Expander:
         problem = Problem(setting.world, branch.q, stage.goal, constraints=stage.constraints)
         search = GoalSearch(problem, self.rng, all_turns=False)  # the plan to it may go either way round
         search.first()
-        return Choices(branch, search, setting is not branch.after, not isinstance(problem.goal, JointGoal))
+        return Choices(branch, search, setting is not branch.after, problem.goal.q is None)
 
     def _drawn(self, choices: Choices) -> Iterator[Branch]:
         branch, rows = choices.branch, choices.search.rows

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.model.goal import PoseGoal
+from rrtik_ompl.model.goal import Target
 from rrtik_ompl.planning.tip_motion import DEVIATION, TURN_DEVIATION
 from rrtik_ompl.tasks.contact_life import DEEPER, Nearness, joined_with, left_inside, signed_distance
 from rrtik_ompl.tasks.program import Step
@@ -65,8 +65,8 @@ def never_set_down(steps: Sequence[Step], world: World, q: Vector) -> str:
 def _reached(stage: MoveTo, world: World) -> Tip | None:
     """Where the tip is after a motion; None if several places are possible."""
     goal = stage.goal
-    if isinstance(goal, PoseGoal):
-        return Tip(goal.T_world_tip, goal.position_tolerance, goal.orientation_tolerance)
+    if isinstance(goal, Target) and goal.oriented:
+        return Tip(goal.pose, *goal.tolerances)
     if isinstance(goal, str):
         return Tip(world.robot.fk(world.robot.posture(goal)))
     return Tip(world.robot.fk(goal)) if isinstance(goal, np.ndarray) else None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.model.goal import Goal, MultiGoal
+from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.robot import Robot
 
 OWN_JOINTS = 3  # of a branch that can be dragged; fewer are fingers
@@ -29,7 +29,7 @@ def dragged_tips(robot: Robot, goal: Goal | None) -> list[str]:
         robot: The arm.
         goal: Of the problem.
     """
-    named = goal.frames if isinstance(goal, MultiGoal) else ()
+    named = () if goal is None else goal.frames
     tips = list(dict.fromkeys([robot.tip, *named]))
     carried = {row for tip in tips for row in _rows(robot, tip_entry(robot, tip)["joint"] - 1)}
     for row in sorted(set(range(len(robot.chain.parent))) - set(robot.chain.parent.tolist())):

@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.model.goal import Goal, JointGoal, MultiGoal, as_task_region, parts_of
+from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.viewer.drawing.constraint_picture import draw_constraints
 from rrtik_ompl.viewer.drawing.framing import Frame, frame_around
@@ -48,7 +48,7 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
             doubtful = () if subject.verdict is None else subject.verdict.unproven
             beads = subject.run is None and subject.times is None
             goal = subject.goal
-            arms = [arm for arm, _ in goal.each(robot)] if isinstance(goal, MultiGoal) else [robot]
+            arms = [robot] if goal is None else goal.arms(robot)
             draw_trail(vis, arms, subject.waypoints, 0.0035 * frame.arm, beads=beads, unproven=doubtful)
         if subject.before is not None:
             draw_before(vis, robot, subject.before, 0.0035 * frame.arm)
@@ -108,7 +108,5 @@ def _flatten(vis: Node, frame: Frame) -> None:
 
 def _goal_points(goal: Goal | None) -> list[Matrix]:
     """Positions of the tip that show a goal of it, shape (m, 3) each."""
-    if goal is None or isinstance(goal, JointGoal):
-        return []
-    regions = [as_task_region(part) for part in parts_of(goal)]
-    return [goal_frames(region)[:, :3, 3] for region in regions]
+    parts = () if goal is None else goal.parts
+    return [goal_frames(part.region())[:, :3, 3] for part in parts]

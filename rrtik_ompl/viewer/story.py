@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.units import shown_unit
-from rrtik_ompl.model.goal import Goal, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
 from rrtik_ompl.model.judgement import FARTHEST, ClearanceCurve, PathContact, Verdict
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
@@ -43,7 +42,7 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "obstacles": _obstacles(subject.scene),
         "moving": subject.run is not None or any(o.motion is not None for o in subject.scene.obstacles),
         "attached": [item.name for item in subject.scene.attached],
-        "goal": _goal_text(subject.goal),
+        "goal": "" if subject.goal is None else subject.goal.title,
         "start_ghost": _numbers(subject.start),
         "goal_ghost": _numbers(subject.end),
         "ghosts": _ghosts(subject.ghosts),
@@ -217,18 +216,6 @@ def _obstacles(scene: Scene) -> list[dict[str, Any]]:
         }
         for o in scene.obstacles
     ]
-
-
-def _goal_text(goal: Goal | None) -> str:
-    if goal is None:
-        return ""
-    if isinstance(goal, GoalSet):
-        return "one of several" if len(goal.members) > 1 else "tip region"
-    if isinstance(goal, JointGoal):
-        return "joint values"
-    if isinstance(goal, MultiGoal):
-        return f"{len(goal.frames)} tips"
-    return {PoseGoal: "tip pose", PositionGoal: "tip position"}.get(type(goal), "tip region")
 
 
 def _colors() -> dict[str, str]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.constraints.held_region import HeldRegion
-from rrtik_ompl.model.goal import Goal, JointGoal, MultiGoal
+from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.judgement import ClearanceCurve, PathContact, Verdict
 from rrtik_ompl.model.path import JointPath, fitted
 from rrtik_ompl.model.robot import Robot, require_joints
@@ -85,7 +85,8 @@ class Subject:
         """Links whose ways are drawn: those of a goal for several, or the robot's tip."""
         if self.robot is None:
             return ()
-        return tuple(self.goal.frames) if isinstance(self.goal, MultiGoal) else (self.robot.tip,)
+        named = () if self.goal is None else self.goal.frames
+        return named or (self.robot.tip,)
 
     @property
     def end(self) -> Vector | None:
@@ -93,11 +94,11 @@ class Subject:
 
         Ghosts take its place, but where the goal is one of them: that one can be dragged.
         """
+        q = None if self.goal is None else self.goal.q
         if self.ghosts is not None:
-            q = self.goal.q if isinstance(self.goal, JointGoal) else None
             return q if q is not None and (self.ghosts == q).all(axis=1).any() else None
         if not self.is_path or (self.run is not None and not self.run.arrived):
-            return self.goal.q if isinstance(self.goal, JointGoal) else None
+            return q
         end: Vector = self.waypoints[-1]
         return end
 

@@ -18,7 +18,7 @@ from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.constraints.contradiction import contradiction
 from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
-from rrtik_ompl.model.goal import Goal, JointGoal, MultiGoal, PoseGoal, parts_of
+from rrtik_ompl.model.goal import Goal, JointGoal, PoseGoal
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.shapes import PointCloud
 from rrtik_ompl.model.task_region import TaskRegion
@@ -85,7 +85,7 @@ class Problem:
         start = world.robot.posture(start) if isinstance(start, str) else start
         goal = world.robot.posture(goal) if isinstance(goal, str) else goal
         wanted = _goal_of(goal)
-        joints = {"goal": wanted.q} if isinstance(wanted, JointGoal) else {}
+        joints = {} if wanted.q is None else {"goal": wanted.q}
         ends = usable_configurations(world, {"start": start, **joints})
         first = frozen(ends["start"])
 
@@ -100,11 +100,11 @@ class Problem:
         if isinstance(wanted, JointGoal):
             _keep(world.robot, held, ends["goal"], "goal")
             wanted = changed(wanted, q=frozen(_nearest_turn(world, first, ends["goal"])))
-        elif any(_of_a_path(part) for part in parts_of(wanted) if isinstance(part, TaskRegion)):
+        elif any(_of_a_path(part.freedom) for part in wanted.parts if part.freedom is not None):
             raise InputError(
                 "goal region: frame, from_start and allowances are for path constraints; a goal is of the tip"
             )
-        if isinstance(wanted, MultiGoal):
+        if wanted.frames:
             goal_regions(world.robot, world.scene, wanted)  # refuses links that do not exist
 
         values = {"settings": world.settings, "start": first, "goal": wanted, "name": name, "planner": planner}

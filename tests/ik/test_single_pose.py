@@ -18,7 +18,6 @@ from rrtik_ompl.ik.serial_chain import seeded_limb_of
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.model.goal import tip_errors
 
 ARMS = ("ur5", "panda", "titan4")
 ROUNDING = 1e-12  # [m] and [rad]
@@ -125,7 +124,7 @@ def test_the_error_of_one_configuration_is_that_of_many(name):
     goals = [rrtik.PoseGoal(near), rrtik.PoseGoal(half_turn), rrtik.PositionGoal(near.translation)]
     for goal in goals:
         one = [error_of_one(robot, goal, q) for q in Q]
-        np.testing.assert_allclose(one, np.transpose(tip_errors(goal, robot, Q)), rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(one, np.transpose(goal.errors(robot, Q)), rtol=0, atol=ROUNDING)
 
 
 def test_an_answer_that_misses_the_goal_is_not_returned(monkeypatch):

@@ -12,7 +12,7 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.numeric.projection import project
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.ik.targets import targets
-from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, as_task_region, has_task_regions, tip_errors
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.model.task_region import TaskRegion, nearest_angles
 from rrtik_ompl.model.tip_distance import metres_per_radian
 
@@ -101,7 +101,7 @@ def test_positions_poses_and_regions_are_measured_in_the_same_metres():
         _, distance, errors = min((parts[name] for name in names), key=lambda part: part[1])
         goal = GoalSet([parts[name][0] for name in names])
         assert goal.distance(robot, q) == pytest.approx([distance])
-        assert np.ravel(tip_errors(goal, robot, q)) == pytest.approx(errors, abs=1e-7)
+        assert np.ravel(goal.errors(robot, q)) == pytest.approx(errors, abs=1e-7)
 
 
 def test_a_grasp_of_a_bar_turns_about_the_bar_and_slides_along_it():
@@ -119,7 +119,7 @@ def test_poses_and_positions_are_regions_too():
     robot = load_robot("ur5")
     Q = np.random.default_rng(0).uniform(-3, 3, (20, 6))
     for goal in (PoseGoal(robot.fk(Q[0]), 0.02, 0.3), PositionGoal(robot.fk(Q[1]).translation, 0.05)):
-        asked = as_task_region(goal)
+        asked = goal.region()
         np.testing.assert_array_equal(asked.satisfied(robot, Q), goal.satisfied(robot, Q))
         np.testing.assert_allclose(asked.errors(robot, Q)[0], goal.errors(robot, Q)[0], atol=1e-12)
 
@@ -153,12 +153,12 @@ def test_solve_ik_takes_grasp_sets_by_whatever_method_fits(name):
     q = robot.clamp(np.full(robot.dof, -0.4))
     handle = TaskRegion.about_axis(robot.fk(q), [0, 0, 1], slide=[-0.05, 0.05])
     goal = GoalSet([PoseGoal(pose([9, 0, 0])), handle])
-    assert has_task_regions(goal)
+    assert goal.has_regions
     found = solve_ik(robot, goal, seconds=20.0)
     assert found.found, found.detail
     assert found.method == {"titan4": "closed-form", "panda": "projection"}[name]
     assert goal.satisfied(robot, found.solutions).all()
-    distance, angle = tip_errors(goal, robot, found.solutions)
+    distance, angle = goal.errors(robot, found.solutions)
     assert distance.max() < 1e-3
     assert angle.max() < 1e-2
 

@@ -13,7 +13,6 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.baselines.joint_axes import Joint, Swing, joints_to_tip, room
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import walked
-from rrtik_ompl.model.goal import PositionGoal
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.tip_distance import reach_of
 
@@ -44,12 +43,11 @@ def _sweep(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...], len
     """Every joint once; the frames before a joint stay where they were, so that one forward kinematics is enough."""
     frames = robot.joint_frames(Q)
     tips = robot.fk_batch(Q)
-    pose_wanted = not isinstance(goal, PositionGoal)
-    wanted = np.zeros((1, 4 if pose_wanted else 1, 3))
-    wanted[0, 0] = goal.position if isinstance(goal, PositionGoal) else goal.T_world_tip.translation
+    wanted = np.zeros((1, 4 if goal.oriented else 1, 3))
+    wanted[0, 0] = goal.point
     points = tips[:, None, :3, 3]
-    if not isinstance(goal, PositionGoal):
-        wanted[0, 1:] = wanted[0, 0] + length * goal.T_world_tip.rotation.T
+    if goal.oriented:
+        wanted[0, 1:] = wanted[0, 0] + length * goal.pose.rotation.T
         points = np.concatenate([points, points + length * tips[:, :3, :3].transpose(0, 2, 1)], axis=1)
     for joint in joints:
         axis = frames[:, joint.row + 1, :3, :3] @ robot.chain.axis[joint.row]

@@ -13,7 +13,6 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import shortened, twist, walked
-from rrtik_ompl.model.goal import PositionGoal
 from rrtik_ompl.model.robot import Robot
 
 ITERATIONS = 200
@@ -37,7 +36,7 @@ def damped_least_squares(
     Returns:
         Where each start has led to, shape (m, dof), and the steps taken.
     """
-    rows = slice(0, 3) if isinstance(goal, PositionGoal) else slice(0, 6)
+    rows = slice(0, 6 if goal.oriented else 3)
 
     def step(Q: Matrix) -> Matrix:
         e = twist(goal, robot.fk_batch(Q))[:, rows, None]
@@ -69,10 +68,10 @@ def _one_start(robot: Robot, goal: Target, q: Vector) -> tuple[Vector, int]:
         J = np.reshape(pin.computeFrameJacobian(model, data, full, frame, pin.ReferenceFrame.LOCAL), (6, -1))
         J = J @ robot.chain.gain
         here = data.oMf[frame]
-        if isinstance(goal, PositionGoal):
-            error, J = here.actInv(goal.position), J[:3]
+        if not goal.oriented:
+            error, J = here.actInv(goal.point), J[:3]
         else:
-            away = here.actInv(goal.T_world_tip)
+            away = here.actInv(goal.pose)
             error, J = pin.log6(away).vector, pin.Jlog6(away.inverse()) @ J
         if np.linalg.norm(error) < CLOSE:
             break

@@ -14,7 +14,6 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.baselines.joint_axes import Joint, Swing, coupled_fault, joints_to_tip, room
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import walked
-from rrtik_ompl.model.goal import PositionGoal
 from rrtik_ompl.model.robot import Robot
 
 ITERATIONS = 200
@@ -23,7 +22,7 @@ TIP_WEIGHT = 3.0  # in space, beside the other points; the next point alone neve
 
 def fabrik_misfit(robot: Robot, target: Target) -> str:
     """Why it does not fit: poses, sliding or coupled joints."""
-    if not isinstance(target, PositionGoal):
+    if target.oriented:
         return "it moves points and knows no orientation; give a position"
     if robot.prismatic.any():
         return "it keeps distances between joints, and this robot has sliding joints"
@@ -80,7 +79,7 @@ def _weights(robot: Robot, points: int) -> Vector:
 def _pulled(points: NDArray[np.float64], goal: Target) -> NDArray[np.float64]:
     """The points, shape (m, k, 3), pulled after the last one, which is put on the goal; the distances are kept."""
     pulled = points.copy()
-    pulled[:, -1] = goal.position if isinstance(goal, PositionGoal) else goal.T_world_tip.translation
+    pulled[:, -1] = goal.point
     for k in range(points.shape[1] - 2, 0, -1):
         away = points[:, k] - pulled[:, k + 1]
         distance = np.linalg.norm(away, axis=1, keepdims=True)

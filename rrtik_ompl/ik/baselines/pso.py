@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.model.goal import PositionGoal, pose_errors
 from rrtik_ompl.model.robot import Robot
 
 PARTICLES = 32  # of a swarm
@@ -82,7 +81,5 @@ def _drawn(rng: np.random.Generator, place: Swarms, before: Swarms, own: Swarms,
 
 
 def _cost(robot: Robot, goal: Target, Q: Matrix) -> NDArray[np.float64]:
-    if isinstance(goal, PositionGoal):
-        return goal.distance(robot, Q)
-    distance, angle = pose_errors(robot.fk_batch(Q), goal.T_world_tip)
+    distance, angle = goal.errors(robot, Q)
     return distance + ORIENTATION_WEIGHT * angle

@@ -10,7 +10,7 @@ import numpy as np
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.model.goal import PositionGoal, joint_difference, pose_errors
+from rrtik_ompl.model.goal import joint_difference
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.tip_distance import reach_of
 
@@ -46,17 +46,16 @@ def score(
         accept: Which configurations will do; the others cost as much as the arm's reach more.
     """
     tips = robot.fk_batch(Q)
-    if isinstance(target, PositionGoal):
-        distance = np.sqrt(((tips[:, :3, 3] - target.position) ** 2).sum(axis=1))
-        angle, reached, cost = np.zeros(len(Q)), distance < target.tolerance, distance.copy()
-    else:
-        distance, angle = pose_errors(tips, target.T_world_tip)
-        reached = (distance < target.position_tolerance) & (angle < target.orientation_tolerance)
-        cost = distance + options.orientation_weight * angle
+    near, turned = target.tolerances
+    distance, angle = target.tip_errors(tips)
+    reached = distance < near
+    if target.oriented:
+        reached &= angle < turned
+    cost = distance + options.orientation_weight * angle
     if options.motion_weight and last is not None:
         cost += options.motion_weight * np.linalg.norm(joint_difference(robot, Q, last), axis=1)
     if options.singularity_weight:
-        cost -= options.singularity_weight * manipulability(robot, Q, isinstance(target, PositionGoal))
+        cost -= options.singularity_weight * manipulability(robot, Q, not target.oriented)
     good = accept(Q)
     if not good.all():
         reached &= good

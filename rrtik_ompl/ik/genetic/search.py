@@ -19,7 +19,7 @@ from rrtik_ompl.ik.genetic.objective import Score, score
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.numeric.descent import descend
-from rrtik_ompl.model.goal import PositionGoal, joint_difference
+from rrtik_ompl.model.goal import joint_difference
 from rrtik_ompl.model.robot import Robot
 
 IMPROVEMENT = 0.99  # of the best cost: less counts as standing still
@@ -93,7 +93,7 @@ class GaRun:
     ) -> None:
         self.robot, self.targets, self.options, self.rng = robot, targets, options, rng
         self.accept, self.near = accept, near
-        dimensions = 3 if isinstance(targets[0], PositionGoal) else 6
+        dimensions = 6 if targets[0].oriented else 3
         self.gain = options.gain if options.gain is not None else float(robot.dof <= dimensions)
         self.generation, self.fresh, self.attempts = 0, 0, 0
         self.distances: list[float] = []

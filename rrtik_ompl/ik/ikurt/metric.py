@@ -15,7 +15,6 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import twist
 from rrtik_ompl.ik.tip_columns import tip_columns
-from rrtik_ompl.model.goal import PoseGoal, PositionGoal, pose_errors
 from rrtik_ompl.model.robot import Robot
 
 REACH_PER_TURN = 1.0  # a full turn of the tip counts as far as so many times the reach, unless given
@@ -69,11 +68,11 @@ class TipMetric:
 
         If ``mu`` is None, the first distance counts as much as the largest angle.
         """
-        if all(isinstance(target, PositionGoal) for target in targets):
+        if not any(target.oriented for target in targets):
             return cls(robot, targets, metres_per_radian=0.0)
         if mu is None:
             tip = robot.fk_batch(start[None])
-            away = min(float(_errors(target, tip)[0][0]) for target in targets)
+            away = min(float(target.tip_errors(tip)[0][0]) for target in targets)
             mu = 0.5 * np.pi / max(away, NEAREST_START * reach(robot))
         return cls(robot, targets, metres_per_radian=0.5 / mu, unit=mu)
 
@@ -98,10 +97,10 @@ class TipMetric:
         """Distance [m] and angle [rad] of the tip at q, shape (n,), from the nearest target; shape (2,)."""
         tip = self.robot.fk_batch(q[None])
         nearest = self.targets[int(self._each(tip)[:, 0].argmin())]
-        return np.array(_errors(nearest, tip))[:, 0]
+        return np.array(nearest.tip_errors(tip))[:, 0]
 
     def _each(self, tips: NDArray[np.float64]) -> Matrix:
-        pairs = (_errors(target, tips) for target in self.targets)
+        pairs = (target.tip_errors(tips) for target in self.targets)
         return self.unit * np.array([np.hypot(away, self.metres_per_radian * angle) for away, angle in pairs])
 
 
@@ -128,15 +127,7 @@ def reach(robot: Robot) -> float:
     return float(np.linalg.norm(tip_columns(robot).fixed[1:, :3, 3], axis=1).sum()) or 1.0
 
 
-def _errors(target: Target, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
-    """Distance [m] and rotation angle [rad] (0 for a position) of poses of the tip, shape (m,) each."""
-    if isinstance(target, PoseGoal):
-        return pose_errors(tips, target.T_world_tip)
-    return np.linalg.norm(tips[:, :3, 3] - target.position, axis=1), np.zeros(len(tips))
-
-
 def _radius(target: Target, metres_per_radian: float) -> float:
     """Distance within which a target counts as reached [m]."""
-    if isinstance(target, PoseGoal):
-        return min(target.position_tolerance, metres_per_radian * target.orientation_tolerance)
-    return target.tolerance
+    near, turned = target.tolerances
+    return min(near, metres_per_radian * turned) if target.oriented else near

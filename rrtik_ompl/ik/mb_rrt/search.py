@@ -18,13 +18,14 @@ from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of, misfit
 from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.numeric.descent import descend
-from rrtik_ompl.model.goal import PoseGoal, PositionGoal
+from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World
 
 WIDTH = 16  # passes at a time
 MAX_ROUNDS = 64  # after which it gives up
 FIRST_STEPS = 12  # of the polish, after which most branches that get to the goal at all are there
+POLISHED = 0.1  # of the tolerances, within which few steps have brought a branch to the goal
 POSTURE_ONLY_ROUNDS = 2  # that check whole postures alone; where free ones are common, that is faster
 
 
@@ -39,7 +40,7 @@ class Found:
 
 def search(
     robot: Robot,
-    target: PoseGoal | PositionGoal,
+    target: Target,
     *,
     near: Vector,
     accept: Callable[[Matrix], Mask],
@@ -68,7 +69,7 @@ def search(
     found = np.zeros((0, robot.dof))
     if out_of_reach(robot, target):
         return Found(found, 0)
-    axes = axes_of(robot, isinstance(target, PoseGoal))
+    axes = axes_of(robot, target.oriented)
     tree = WorkspaceTree(axes, axes.nearest_in_reach(aimed_point(axes, target)), near, rng)
     for number in range(rounds):
         if number == POSTURE_ONLY_ROUNDS and world is not None and world.pairs:
@@ -82,24 +83,23 @@ def search(
     return Found(found, tree.passes)
 
 
-def out_of_reach(robot: Robot, target: PoseGoal | PositionGoal) -> bool:
+def out_of_reach(robot: Robot, target: Target) -> bool:
     """Whether the lengths of an arm do not allow a target, for certain; nothing is known of arms with a `misfit`."""
     if misfit(robot):
         return False
-    axes = axes_of(robot, isinstance(target, PoseGoal))
-    tolerance = target.tolerance if isinstance(target, PositionGoal) else target.position_tolerance
-    return axes.shortfall(aimed_point(axes, target)) > tolerance
+    axes = axes_of(robot, target.oriented)
+    return axes.shortfall(aimed_point(axes, target)) > target.tolerances[0]
 
 
-def aimed_point(axes: Axes, target: PoseGoal | PositionGoal) -> Vector:
+def aimed_point(axes: Axes, target: Target) -> Vector:
     """The point in the world that the tree aims at, shape (3,)."""
-    if isinstance(target, PositionGoal):
-        return target.position
-    point: Vector = target.T_world_tip.rotation @ axes.aim + target.T_world_tip.translation
+    if not target.oriented:
+        return target.point
+    point: Vector = target.pose.rotation @ axes.aim + target.point
     return point
 
 
-def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Matrix, *, all: bool = True) -> Matrix:
+def polished(robot: Robot, axes: Axes, target: Target, ends: Matrix, *, all: bool = True) -> Matrix:
     """Those of the tree's ends that are at the goal or get there, shape (k, dof).
 
     Args:
@@ -111,32 +111,25 @@ def polished(robot: Robot, axes: Axes, target: PoseGoal | PositionGoal, ends: Ma
     """
     if len(ends) == 0:
         return ends
-    if isinstance(target, PoseGoal):
+    if target.oriented:
         ends = _last_turned(robot, axes, target, ends)
     if axes.exact:
         return ends[target.satisfied(robot, ends) & robot.within_limits(ends)]
     if not all:
         ends, _ = descend(robot, target, ends, iterations=FIRST_STEPS)
-        there = _tightened(target).satisfied(robot, ends)
+        there = target.tightened(POLISHED).satisfied(robot, ends)
         if there.any():
             return ends[there]
     ends, _ = descend(robot, target, ends)
     return ends[target.satisfied(robot, ends)]
 
 
-def _tightened(target: PoseGoal | PositionGoal) -> PoseGoal | PositionGoal:
-    """The same goal with a tenth of the tolerances."""
-    if isinstance(target, PositionGoal):
-        return PositionGoal(target.position, 0.1 * target.tolerance)
-    return PoseGoal(target.T_world_tip, 0.1 * target.position_tolerance, 0.1 * target.orientation_tolerance)
-
-
-def _last_turned(robot: Robot, axes: Axes, target: PoseGoal, ends: Matrix) -> Matrix:
+def _last_turned(robot: Robot, axes: Axes, target: Target, ends: Matrix) -> Matrix:
     """The last joint, which leaves the aimed point where it is, turned as near to the orientation as it gets."""
     joint, angles = int(axes.joints[-1]), np.array(ends)
     angles[:, joint] = -axes.offset[-1]
     frames = robot.fk_batch(angles)[:, :3, :3] @ axes.fixed[-1][:3, :3].T
-    wanted = target.T_world_tip.rotation @ axes.fixed[-1][:3, :3].T
+    wanted = target.pose.rotation @ axes.fixed[-1][:3, :3].T
     off = np.swapaxes(frames, 1, 2) @ wanted  # the turn about z nearest to it
     turn = np.arctan2(off[:, 1, 0] - off[:, 0, 1], off[:, 0, 0] + off[:, 1, 1])
     full = TAU

@@ -17,7 +17,6 @@ from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.base.poses import rpy_matrices
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.residual import SHARE, shortened, twist_between
-from rrtik_ompl.model.goal import as_task_region, parts_of
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
@@ -81,7 +80,7 @@ def projected(robot: Robot, region: TaskRegion, starts: Matrix, rng: np.random.G
 def projection(request: IkRequest) -> IkResponse:
     """The method of `solve_ik`: from random postures onto one part of the goal after the other."""
     robot, rng = request.robot, request.rng
-    regions = [as_task_region(part) for part in parts_of(request.goal)]
+    regions = [part.region() for part in request.goal.parts]
     found, nearest, least = np.zeros((0, robot.dof)), request.near, np.inf
     timed_out = False
     for number in range(max(MAX_ROUNDS, len(regions))):

@@ -14,7 +14,6 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target
 from rrtik_ompl.ik.numeric.descent import Search, walk
-from rrtik_ompl.model.goal import has_task_regions, tip_errors
 from rrtik_ompl.model.robot import Robot
 
 STARTS = 32  # in one round
@@ -69,13 +68,13 @@ def nearest_posture(request: IkRequest, *, searched: bool = False) -> Vector:
             return first
     starts = request.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
     anywhere, _, _ = walk(_turning_freely(robot), aims[np.arange(STARTS) % len(aims)], starts)
-    nearest: Vector = anywhere[int(np.argmin(np.add(*tip_errors(request.goal, robot, anywhere))))]
+    nearest: Vector = anywhere[int(np.argmin(np.add(*request.goal.errors(robot, anywhere))))]
     return nearest
 
 
 def aims_of(request: IkRequest) -> Matrix:
     """Rows of the goal, see `rrtik_ompl.ik.goal_rows`; of targets drawn from it if it has task-space regions."""
-    if has_task_regions(request.goal):
+    if request.goal.has_regions:
         return np.vstack([goal_rows(target) for target in request.targets])
     return goal_rows(request.goal)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.model.goal import JointGoal, joint_difference
+from rrtik_ompl.model.goal import joint_difference
 from rrtik_ompl.pilot.routes.lamps import Lamp, stage_poses
 from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route, route_to, route_to_grasp
@@ -39,7 +39,7 @@ def propose(
     world = surroundings.world_at(q, target)
     seen = None if target is None else surroundings.named(target)
     if seen is None or lamp is None:
-        if not isinstance(problem.goal, JointGoal):
+        if problem.goal.q is None:
             return NoRoute("choose an object and a grasp first")
         return route_to(world, q, np.array(problem.goal.q), rates, seed)
     if not len(lamp.grasps):

@@ -9,7 +9,6 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, positive
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, single_joint, transitions
 from rrtik_ompl.planning.moves.clearance_levels import Level, clearance_levels
@@ -205,7 +204,7 @@ def grid_route(problem: Problem, step: float) -> Matrix | None:
 
 def _ends(problem: Problem, what: str) -> Matrix:
     """Start and goal of a problem, shape (2, n)."""
-    if not isinstance(problem.goal, JointGoal):
+    if problem.goal.q is None:
         raise InputError(f"{what}: expected a goal in joint values, got a {type(problem.goal).__name__}")
     return np.array([problem.start, problem.goal.q])
 

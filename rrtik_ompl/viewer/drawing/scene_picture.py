@@ -7,7 +7,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import TAU, Matrix
-from rrtik_ompl.model.goal import Goal, JointGoal, PoseGoal, parts_of
+from rrtik_ompl.model.goal import Goal, Target
 from rrtik_ompl.model.scene import ConstantVelocity, Motion, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.model.task_region import TaskRegion
@@ -70,18 +70,18 @@ def _draw_motion(node: Node, obstacle: Obstacle, motion: Motion, frame: Frame) -
 
 def draw_goal(vis: Node, goal: Goal | None, frame: Frame) -> None:
     """Draw under ``goal`` the frame of a pose, the point of a position, or all parts of a region."""
-    if goal is None or isinstance(goal, JointGoal):
+    if goal is None:
         return
-    for k, part in enumerate(parts_of(goal)[:MAX_GOALS_DRAWN]):
+    for k, part in enumerate(goal.parts[:MAX_GOALS_DRAWN]):
         node = vis["goal"][f"{k}"]
-        if isinstance(part, PoseGoal):
-            draw_triad(node["frame"], part.T_world_tip, 0.12 * frame.arm)
-        elif isinstance(part, TaskRegion):
-            _draw_region(node, part, frame)
+        if not isinstance(part, Target):
+            _draw_region(node, part.region(), frame)
+        elif part.oriented:
+            draw_triad(node["frame"], part.pose, 0.12 * frame.arm)
         else:
-            look = look_of_shape(Sphere(max(part.tolerance, 0.012 * frame.arm)))
+            look = look_of_shape(Sphere(max(part.tolerances[0], 0.012 * frame.arm)))
             node["point"].set_object(look.geometry, look_material(palette.GOAL))
-            node["point"].set_transform(pin.SE3(np.eye(3), np.array(part.position)).homogeneous)
+            node["point"].set_transform(part.pose.homogeneous)
 
 
 def _draw_region(node: Node, region: TaskRegion, frame: Frame) -> None:
