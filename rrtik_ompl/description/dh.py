@@ -16,7 +16,7 @@ from rrtik_ompl.base.choices import DhConvention
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most
 from rrtik_ompl.base.poses import PoseLike, rigid, turned_z
 from rrtik_ompl.description.robot_build import JointLimits, build_robot
-from rrtik_ompl.description.tree import MOST_JOINTS, Joint, Link, Solid, Tree
+from rrtik_ompl.description.tree import JOINT_KINDS, MOST_JOINTS, Joint, Link, Solid, Tree
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.shapes import Capsule
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 CONVENTIONS: tuple[DhConvention, ...] = get_args(DhConvention)
-ROW_KINDS = ("revolute", "continuous", "prismatic")
+ROW_KINDS = tuple(name for name, kind in JOINT_KINDS.items() if kind.moves)
 SMALLEST_RADIUS = 1e-4  # [m], stands for a radius of 0
 
 
@@ -158,7 +158,7 @@ def _radii(name: str, radius: float | Sequence[float], count: int) -> list[float
 
 
 def _bounds(row: DhRow) -> dict[str, float]:
-    lower, upper = (-np.inf, np.inf) if row.kind == "continuous" else row.limits
+    lower, upper = (-np.inf, np.inf) if JOINT_KINDS[row.kind].endless else row.limits
     return {"lower": lower, "upper": upper}
 
 

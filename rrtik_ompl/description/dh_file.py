@@ -12,6 +12,7 @@ from rrtik_ompl.base.choices import DhConvention
 from rrtik_ompl.base.poses import IDENTITY_QUATERNION, pose
 from rrtik_ompl.base.units import DEGREE
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
+from rrtik_ompl.description.tree import JOINT_KINDS
 from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
@@ -90,7 +91,7 @@ def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_p
     document = read_yaml(path)
     entry = parse(document, DhFile)
     rows = [_row(document, k, row) for k, row in enumerate(entry.dh.rows)]
-    sliding = np.array([row.type == "prismatic" for row in entry.dh.rows])
+    sliding = np.array([JOINT_KINDS[row.type].slides for row in entry.dh.rows])
     tool = entry.dh.tool
     postures = {}
     for key, values in entry.postures_deg.items():
@@ -113,16 +114,17 @@ def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_p
 
 def _row(document: YamlDocument, number: int, row: RowEntry) -> DhRow:
     place = ("dh", "rows", number)
-    given, wrong = ("limits", "limits_deg") if row.type == "prismatic" else ("limits_deg", "limits")
+    slides = JOINT_KINDS[row.type].slides
+    given, wrong = ("limits", "limits_deg") if slides else ("limits_deg", "limits")
     if getattr(row, wrong) is not None:
         raise document.error((*place, wrong), f"a {row.type} joint takes {given}; rename the key")
     limits = getattr(row, given)
-    if row.type == "prismatic" and limits is None:
-        raise document.error(place, "a prismatic joint needs limits: [lower, upper] in metres; add them")
+    if slides and limits is None:
+        raise document.error(place, f"a {row.type} joint needs limits: [lower, upper] in metres; add them")
     lower, upper = (-180.0, 180.0) if limits is None else limits
     if lower >= upper:
         raise document.error((*place, given), f"lower limit {lower:g} is not below upper limit {upper:g}; swap them")
-    scale = 1.0 if row.type == "prismatic" else DEGREE
+    scale = 1.0 if slides else DEGREE
     return DhRow(
         a=row.a,
         alpha=np.radians(row.alpha_deg),

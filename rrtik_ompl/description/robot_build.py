@@ -101,11 +101,11 @@ def build_robot(
         InputError: If a joint, frame or limit does not make sense; the message names it.
     """
     ties = {m.joint: m for m in mimics}
-    movable = {joint.name: joint for joint in tree.walk() if joint.kind != "fixed"}
+    movable = {joint.name: joint for joint in tree.walk() if joint.moves}
     actuated = tuple(joints) if joints is not None else tuple(n for n in movable if n not in ties)
     _check_joints(name, tuple(movable), actuated, ties, locked or {})
     for tie in ties.values():
-        if movable[tie.joint].kind == "prismatic" and movable[tie.source].kind == "continuous":
+        if movable[tie.joint].slides and movable[tie.source].endless:
             raise InputError(
                 f"robot '{name}': prismatic joint '{tie.joint}' mimics '{tie.source}', which turns without end; "
                 "give that one limits"
@@ -227,7 +227,7 @@ def _limits(name: str, joints: Iterable[Joint], found: Mapping[str, Mapping[str,
                 f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; "
                 "lower must be below upper: correct the limits, or leave the joint out of joints=[...]"
             )
-        if joint.kind == "prismatic" and not max(abs(low), abs(high)) <= LARGEST:
+        if joint.slides and not max(abs(low), abs(high)) <= LARGEST:
             raise InputError(
                 f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres, up to {LARGEST:g}; "
                 "give them in the file or by joint_limits=FILE, or leave the joint out of joints=[...]"
@@ -238,8 +238,8 @@ def _limits(name: str, joints: Iterable[Joint], found: Mapping[str, Mapping[str,
                 raise InputError(
                     f"robot '{name}': joint '{joint.name}' has {what} limit {rate:g}; it must be greater than 0"
                 )
-        endless = joint.kind == "continuous" and bool(np.isinf(low) and np.isinf(high))
-        rows.append((low, high, *rates, endless, joint.kind == "prismatic"))
+        endless = joint.endless and bool(np.isinf(low) and np.isinf(high))
+        rows.append((low, high, *rates, endless, joint.slides))
     columns = list(zip(*rows, strict=True))
     keys = ("lower", "upper", *RATES)
     bounds: dict[str, Any] = {key: frozen(column) for key, column in zip(keys, columns, strict=False)}
@@ -276,10 +276,9 @@ def _followed(
 
 def _own_limits(joint: Joint, given: JointLimits | None) -> dict[str, float]:
     """All limits of a joint by their names, infinite where there is none."""
-    endless = joint.kind == "continuous"
     limits = {
-        "lower": -np.inf if endless else joint.lower,
-        "upper": np.inf if endless else joint.upper,
+        "lower": -np.inf if joint.endless else joint.lower,
+        "upper": np.inf if joint.endless else joint.upper,
         "velocity": joint.velocity,
         "acceleration": np.inf,
         "jerk": np.inf,
@@ -312,7 +311,7 @@ def _periods(
     for joint, turns_alike in zip(joints, whole, strict=True):
         own = limits[joint.name]
         limited = np.isfinite(own["lower"]) or np.isfinite(own["upper"])
-        if turns_alike or limited or joint.kind == "prismatic":
+        if turns_alike or limited or joint.slides:
             continue
         following = {tie.joint: tie.multiplier for tie in ties.values() if tie.source == joint.name}
         turns = _turns_of(following.values())
@@ -356,7 +355,7 @@ def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
 
     def rank(leaf: str) -> tuple[int, int]:
         above = tree.chain(leaf)
-        return sum(joint.name in actuated for joint in above), sum(joint.kind != "fixed" for joint in above)
+        return sum(joint.name in actuated for joint in above), sum(joint.moves for joint in above)
 
     leaves = [link.name for link in tree.links if link.name not in parents]
     found = max(reversed(leaves), key=rank)

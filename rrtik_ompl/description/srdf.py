@@ -161,7 +161,7 @@ class Srdf:
             InputError: If the group does not exist, or names a joint or link that the robot does not have.
         """
         wanted = self._members(group, tree, ()) - self.passive
-        return tuple(joint.name for joint in tree.walk() if joint.name in wanted and joint.kind != "fixed")
+        return tuple(joint.name for joint in tree.walk() if joint.name in wanted and joint.moves)
 
     def allowed_pairs(self, tree: Tree) -> frozenset[frozenset[str]]:
         """Pairs of links of a robot that are never checked against each other."""

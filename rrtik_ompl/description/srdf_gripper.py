@@ -74,7 +74,7 @@ def _apart(tree: Tree, mimics: tuple[Mimic, ...], values: Mapping[str, float]) -
             above[joint.child] = above.get(joint.parent, joint.name)
     links = [link if link.name in above else replace(link, collision=()) for link in tree.links]
     bare = Tree(tree.where, links, tree.joints)
-    still = {joint.name: held.get(joint.name, 0.0) for joint in tree.joints if joint.kind != "fixed"}
+    still = {joint.name: held.get(joint.name, 0.0) for joint in tree.joints if joint.moves}
     model, solids, _ = build_models(bare.hold(still))
     fingers: dict[str, list[Any]] = {}
     for solid in solids.geometryObjects:

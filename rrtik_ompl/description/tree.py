@@ -22,7 +22,29 @@ from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.model.shapes import Shape
 
 MOST_JOINTS = 1001  # those of an arm, and the one that fixes its tip
-KINDS = ("revolute", "continuous", "prismatic", "fixed")
+
+
+@dataclass(frozen=True, slots=True)
+class JointKind:
+    """What the type of a joint says of it. How it moves stands in ``tree_model``.
+
+    Attributes:
+        moves: Whether it has a value.
+        slides: Whether that is a way along its axis [m]; else it is a turn about it [rad].
+        endless: Whether it has no limits of position.
+    """
+
+    moves: bool = True
+    slides: bool = False
+    endless: bool = False
+
+
+JOINT_KINDS = {
+    "revolute": JointKind(),
+    "continuous": JointKind(endless=True),
+    "prismatic": JointKind(slides=True),
+    "fixed": JointKind(moves=False),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +85,7 @@ class Joint:
     """What lets ``child`` move against ``parent``.
 
     Attributes:
-        kind: One of ``KINDS``.
+        kind: One of ``JOINT_KINDS``.
         T_parent_joint: Joint frame (and child frame, at zero) in the parent link, ``pinocchio.SE3``.
         axis: Unit axis in the joint frame, shape (3,).
         lower, upper: Position limits [rad or m]; without meaning for continuous and fixed joints.
@@ -96,6 +118,8 @@ class Joint:
         velocity: float = np.inf,
         effort: float = np.inf,
     ) -> None:
+        if kind not in JOINT_KINDS:
+            raise UnknownNameError("joint type", kind, JOINT_KINDS, where=f"joint '{name}'")
         direction = bounded_array(axis, (3,), f"joint '{name}': axis")
         length = float(np.linalg.norm(direction))
         if length < 1e-9:
@@ -106,6 +130,21 @@ class Joint:
         values |= {"axis": frozen(direction / length), "velocity": velocity, "effort": effort}
         for key, value in values.items():
             object.__setattr__(self, key, value)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has a value."""
+        return JOINT_KINDS[self.kind].moves
+
+    @property
+    def slides(self) -> bool:
+        """Whether its value is a way [m]; else it is an angle [rad]."""
+        return JOINT_KINDS[self.kind].slides
+
+    @property
+    def endless(self) -> bool:
+        """Whether it has no limits of position."""
+        return JOINT_KINDS[self.kind].endless
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,8 +214,7 @@ class Tree:
 
 def _held(joint: Joint, value: float) -> Joint:
     axis = np.array(joint.axis)
-    slides = joint.kind == "prismatic"
-    motion = pin.SE3(np.eye(3), value * axis) if slides else pin.SE3(pin.exp3(value * axis), np.zeros(3))
+    motion = pin.SE3(np.eye(3), value * axis) if joint.slides else pin.SE3(pin.exp3(value * axis), np.zeros(3))
     return Joint(joint.name, "fixed", joint.parent, joint.child, joint.T_parent_joint * motion, axis)
 
 

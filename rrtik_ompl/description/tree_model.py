@@ -54,7 +54,7 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
     for joint in tree.walk():
         place = places[joint.child] = _add_joint(model, joint, places[joint.parent])
         if joint.name in framed:
-            kind = pin.FrameType.FIXED_JOINT if joint.kind == "fixed" else pin.FrameType.JOINT
+            kind = pin.FrameType.JOINT if joint.moves else pin.FrameType.FIXED_JOINT
             frame = pin.Frame(joint.name, place.joint, place.frame, place.T_joint_link, kind)
             place.frame = model.addFrame(frame, False)
         _add_link(model, links[joint.child], places)
@@ -76,12 +76,12 @@ class _Place:
 
 def _add_joint(model: pin.Model, joint: Joint, parent: _Place) -> _Place:
     placement = parent.T_joint_link * joint.T_parent_joint
-    if joint.kind == "fixed":
+    if not joint.moves:
         return _Place(parent.joint, placement, parent.frame)
-    kind, rotation = _joint_model(joint)
+    kind, rotation = JOINT_MODELS[joint.kind](joint)
     turn = pin.SE3(rotation, np.zeros(3))
     size = kind.nq
-    lower, upper = (joint.lower, joint.upper) if joint.kind != "continuous" else (-1.01, 1.01)
+    lower, upper = (-1.01, 1.01) if joint.endless else (joint.lower, joint.upper)
     number = model.addJoint(
         parent.joint,
         kind,
@@ -95,19 +95,33 @@ def _add_joint(model: pin.Model, joint: Joint, parent: _Place) -> _Place:
     return _Place(number, turn.inverse(), parent.frame)
 
 
-def _joint_model(joint: Joint) -> tuple[Any, Any]:
-    """Pinocchio's joint, and the rotation of its frame (identity but for continuous joints about a slanted axis)."""
-    identity = np.eye(3)
-    letter = next((name for name, unit in zip("XYZ", identity, strict=True) if np.array_equal(unit, joint.axis)), "")
-    if joint.kind == "continuous":
-        # Pinocchio offers no way to give its unaligned unbounded joint an axis from Python.
-        if letter:
-            return getattr(pin, f"JointModelRUB{letter}")(), identity
-        return pin.JointModelRUBX(), pin.Quaternion.FromTwoVectors(identity[0], np.array(joint.axis)).matrix()
-    short, long = ("R", "Revolute") if joint.kind == "revolute" else ("P", "Prismatic")
+def _letter(joint: Joint) -> str:
+    """The axis of its frame that a joint turns about or slides along; "" if it is none of them."""
+    return next((name for name, unit in zip("XYZ", np.eye(3), strict=True) if np.array_equal(unit, joint.axis)), "")
+
+
+def _along_axis(short: str, long: str, joint: Joint) -> tuple[Any, Any]:
+    letter = _letter(joint)
     if letter:
-        return getattr(pin, f"JointModel{short}{letter}")(), identity
-    return getattr(pin, f"JointModel{long}Unaligned")(np.array(joint.axis)), identity
+        return getattr(pin, f"JointModel{short}{letter}")(), np.eye(3)
+    return getattr(pin, f"JointModel{long}Unaligned")(np.array(joint.axis)), np.eye(3)
+
+
+def _unbounded(joint: Joint) -> tuple[Any, Any]:
+    letter = _letter(joint)
+    if letter:
+        return getattr(pin, f"JointModelRUB{letter}")(), np.eye(3)
+    # Pinocchio offers no way to give its unaligned unbounded joint an axis from Python.
+    x_axis = np.eye(3)[0]
+    return pin.JointModelRUBX(), pin.Quaternion.FromTwoVectors(x_axis, np.array(joint.axis)).matrix()
+
+
+# Of each kind that moves Pinocchio's joint, and the rotation of its frame.
+JOINT_MODELS: dict[str, Callable[[Joint], tuple[Any, Any]]] = {
+    "revolute": partial(_along_axis, "R", "Revolute"),
+    "continuous": _unbounded,
+    "prismatic": partial(_along_axis, "P", "Prismatic"),
+}
 
 
 def _add_link(model: pin.Model, link: Link, places: dict[str, _Place]) -> None:

@@ -170,7 +170,7 @@ def _hand_outside(gripper: GripperJoints | None, tree: Tree, semantics: Srdf) ->
     """A line for each joint of a gripper that its states bring outside its limits."""
     if gripper is None:
         return
-    ranges = {joint.name: (joint.lower, joint.upper) for joint in tree.joints if joint.kind != "continuous"}
+    ranges = {joint.name: (joint.lower, joint.upper) for joint in tree.joints if not joint.endless}
     for name, *values in zip(gripper.joints, gripper.opened, gripper.closed, strict=True):
         low, high = ranges.get(name, (-np.inf, np.inf))
         for value in values:
@@ -191,7 +191,7 @@ def _actuated(
 ) -> tuple[str, ...]:
     tree = description.tree
     followers = {tie.joint for tie in description.mimics}
-    movable = tuple(j.name for j in tree.walk() if j.kind != "fixed" and j.name not in followers)
+    movable = tuple(j.name for j in tree.walk() if j.moves and j.name not in followers)
     if joints is not None:
         chosen = tuple(joints)
         for joint in chosen:

@@ -18,7 +18,7 @@ from rrtik_ompl.base.errors import InputError, MeshWarning, MissingFileError, Rr
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.description.package_path import resolve_mesh
 from rrtik_ompl.description.robot_build import Mimic
-from rrtik_ompl.description.tree import KINDS, Joint, Link, MeshFile, Solid, Tree
+from rrtik_ompl.description.tree import JOINT_KINDS, Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.description.urdf_unread import unread_of_urdf
 from rrtik_ompl.model.shapes import SHAPES, Cylinder, Measure, Shape
 
@@ -213,15 +213,15 @@ class _Reader:
         name = attribute(element, "joint", "name", self.where)
         where = f"{self.where}: joint '{name}'"
         kind = attribute(element, "joint", "type", where)
-        if kind not in KINDS:
-            raise UnknownNameError("usable joint type", kind, KINDS, where=where)
+        if kind not in JOINT_KINDS:
+            raise UnknownNameError("usable joint type", kind, JOINT_KINDS, where=where)
         parent = attribute(element.find("parent"), "parent", "link", where)
         child = attribute(element.find("child"), "child", "link", where)
         axis_element = element.find("axis")
         axis = [1.0, 0.0, 0.0] if axis_element is None else numbers(axis_element, "xyz", 3, (1.0, 0.0, 0.0), where)
         bounds = _limits(element.find("limit"), kind, where)
         with located(self.where):
-            axis = [1.0, 0.0, 0.0] if kind == "fixed" else axis
+            axis = axis if JOINT_KINDS[kind].moves else [1.0, 0.0, 0.0]
             origin = _origin(element, where)
             return Joint(name, kind, parent, child, origin, axis, **bounds)
 
@@ -242,14 +242,15 @@ def _measured(element: Element, measure: Measure, where: str) -> float | list[fl
 
 def _limits(limit: Element | None, kind: str, where: str) -> dict[str, float]:
     """Limits of position, velocity and effort; infinite where the kind of joint has none, or the file says none."""
-    bounded = kind in ("revolute", "prismatic")
+    moves, endless = JOINT_KINDS[kind].moves, JOINT_KINDS[kind].endless
+    bounded = moves and not endless
     bounds = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}
     if limit is None and bounded:
         raise InputError(
             f'{where}: a {kind} joint needs <limit lower=".." upper=".." velocity=".." effort=".."/>; add it'
-            + (', or make the type "continuous"' if kind == "revolute" else "")
+            + (', or make the type "continuous"' if not JOINT_KINDS[kind].slides else "")
         )
-    if limit is None or kind == "fixed":
+    if limit is None or not moves:
         return bounds
     velocity = numbers(limit, "velocity", 1, (0.0,), where)[0]
     if velocity < 0.0:
@@ -289,7 +290,7 @@ def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
 def flattened(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> tuple[Mimic, ...]:
     """Make every follower follow a joint that follows nothing."""
     ties = {tie.joint: tie for tie in mimics}
-    movable = [joint.name for joint in joints if joint.kind != "fixed"]
+    movable = [joint.name for joint in joints if joint.moves]
     flat = []
     for tie in mimics:
         source, multiplier, offset, seen = tie.source, tie.multiplier, tie.offset, {tie.joint}

@@ -99,7 +99,7 @@ def _actuated(found: Mjcf, joints: Iterable[str] | None, tip: str | None) -> tup
         return tuple(joints)
     followers = {tie.joint for tie in found.mimics}
     over = found.tree.walk() if tip is None else found.tree.chain(tip)
-    return tuple(joint.name for joint in over if joint.kind != "fixed" and joint.name not in followers)
+    return tuple(joint.name for joint in over if joint.moves and joint.name not in followers)
 
 
 def _other_trees(found: Mjcf, actuated: Sequence[str], locked: Mapping[str, float]) -> list[str]:
@@ -116,6 +116,6 @@ def _other_trees(found: Mjcf, actuated: Sequence[str], locked: Mapping[str, floa
     held = [
         f"'{joint.name}'"
         for joint in found.tree.walk()
-        if joint.kind != "fixed" and roots[joint.name] not in moving and joint.name not in {*locked, *followers}
+        if joint.moves and roots[joint.name] not in moving and joint.name not in {*locked, *followers}
     ]
     return [f"joints beside the robot, held: {few(held)}"] if held else []
