@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -82,25 +83,74 @@ class OctreeEntry(Section):
     scale: Positive = Field(1.0, description="metres per unit of the file")
 
 
-_FILES: dict[type[Shape], tuple[type[Section], Callable[[Path, Any], Shape]]] = {
-    PointCloud: (CloudEntry, lambda path, e: load_cloud(path, e.radius, scale=e.scale, invalid=e.invalid)),
-    HeightField: (
-        HeightsEntry,
-        lambda path, e: load_height_field(path, e.cell, e.floor, scale=e.scale, invalid=e.invalid, nodata=e.nodata),
+@dataclass(frozen=True, slots=True)
+class _FileRow:
+    """How a kind of shape is given whose numbers come from a file of its own.
+
+    Attributes:
+        noun: What messages call it.
+        remedy: How one that was made in memory gets a file.
+        read: Reads the file, with what the entry says of it.
+        details: What an entry says of a shape beside the name of the file and its scale.
+        entry: Its keys; None if the name of the file is the value of its own key, and the scale stands beside it.
+    """
+
+    noun: str
+    remedy: str
+    read: Callable[[Path, Any], Shape]
+    details: Callable[[Any], dict[str, Any]] = lambda shape: {}
+    entry: type[Section] | None = None
+
+
+def _cloud_details(cloud: PointCloud) -> dict[str, Any]:
+    return {"radius": cloud.radius} | ({"invalid": "drop"} if cloud.dropped else {})
+
+
+def _heights_details(field: HeightField) -> dict[str, Any]:
+    data: dict[str, Any] = {"cell": field.cell, "floor": field.floor}
+    data |= {"invalid": "drop"} if np.isnan(field.heights).any() else {}
+    return data | ({} if field.nodata is None else {"nodata": field.nodata})
+
+
+_FILES: dict[type[Shape], _FileRow] = {
+    Mesh: _FileRow(
+        "mesh",
+        "save it as STL and use load_mesh",
+        lambda path, e: load_mesh(path, 1.0 if e.scale is None else e.scale),
     ),
-    Octree: (OctreeEntry, lambda path, e: load_octree(path, scale=e.scale)),
-}  # kinds whose numbers come from a file, and what reads it
+    PointCloud: _FileRow(
+        "cloud",
+        "use the one that save_cloud returns",
+        lambda path, e: load_cloud(path, e.radius, scale=e.scale, invalid=e.invalid),
+        _cloud_details,
+        CloudEntry,
+    ),
+    HeightField: _FileRow(
+        "height field",
+        "load it from a file",
+        lambda path, e: load_height_field(path, e.cell, e.floor, scale=e.scale, invalid=e.invalid, nodata=e.nodata),
+        _heights_details,
+        HeightsEntry,
+    ),
+    Octree: _FileRow(
+        "octree",
+        "load it from a file",
+        lambda path, e: load_octree(path, scale=e.scale),
+        entry=OctreeEntry,
+    ),
+}
 
 
 def _keys(kind: type[Shape]) -> dict[str, Any]:
     """The keys of one kind of shape, all of them optional, with their types and descriptions."""
-    if kind is Mesh:
+    row = _FILES.get(kind)
+    if row is not None and row.entry is not None:
+        return {kind.key: _optional(row.entry, None)}
+    if row is not None:
         return {
             kind.key: _optional(Name, "STL, OBJ or DAE file, relative to the folder of this file"),
             "scale": _optional(Positive, "of a mesh: metres per unit of its file; 1 if absent"),
         }
-    if kind in _FILES:
-        return {kind.key: _optional(_FILES[kind][0], None)}
     if kind.grouped:
         parts: dict[str, Any] = {m.name: _required(m) for m in kind.measures}
         entry = create_model(f"{kind.__name__}Entry", __base__=Section, __doc__=kind.__doc__, **parts)
@@ -148,10 +198,11 @@ class ShapeEntry(_ShapeKeys):
         """The shape; meshes and clouds are looked for relative to ``folder``."""
         kind = next(kind for key, kind in SHAPES.items() if getattr(self, key) is not None)
         value: Any = getattr(self, kind.key)
-        if kind is Mesh:
-            return load_mesh(folder / str(value), 1.0 if self.scale is None else self.scale)
-        if kind in _FILES:
-            return _FILES[kind][1](folder / value.file, value)
+        row = _FILES.get(kind)
+        if row is not None and row.entry is not None:
+            return row.read(folder / value.file, value)
+        if row is not None:
+            return row.read(folder / str(value), self)
         return kind(**dict(self._values(kind, value)))
 
     def _values(self, kind: type[Shape], value: object) -> Iterator[tuple[str, Any]]:
@@ -169,36 +220,24 @@ def shape_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
     Raises:
         InputError: If it is a mesh or a cloud that does not come from a file.
     """
-    if isinstance(shape, Mesh):
-        return _mesh_data(name, shape, folder)
-    if isinstance(shape, (PointCloud, HeightField, Octree)):
-        return {shape.key: _file_data(name, shape, folder)}
+    if type(shape) in _FILES:
+        return _file_data(name, shape, folder)
     values = {m.name: np.asarray(getattr(shape, m.name), dtype=np.float64).tolist() for m in shape.measures}
     if shape.grouped:
         return {shape.key: values}
     return {shape.key: values.pop(shape.measures[0].name), **values}
 
 
-def _mesh_data(name: str, mesh: Mesh, folder: Path) -> dict[str, Any]:
-    if not mesh.source:
-        raise InputError(f"'{name}': a mesh made in memory cannot be written; save it as STL and use load_mesh")
-    return {"mesh": _relative(mesh.source, folder)} | ({} if mesh.scale == 1.0 else {"scale": mesh.scale})
-
-
-def _file_data(name: str, shape: PointCloud | HeightField | Octree, folder: Path) -> dict[str, Any]:
-    if not shape.source:
-        remedy = "use the one that save_cloud returns" if isinstance(shape, PointCloud) else "load it from a file"
-        kind = type(shape).__name__.replace("PointCloud", "cloud").replace("HeightField", "height field").lower()
-        raise InputError(f"'{name}': a {kind} made in memory cannot be written; {remedy}")
-    data: dict[str, Any] = {"file": _relative(shape.source, folder)}
-    data |= {} if shape.scale == 1.0 else {"scale": shape.scale}
-    if isinstance(shape, PointCloud):
-        data |= {"radius": shape.radius} | ({"invalid": "drop"} if shape.dropped else {})
-    if isinstance(shape, HeightField):
-        data |= {"cell": shape.cell, "floor": shape.floor}
-        data |= {"invalid": "drop"} if np.isnan(shape.heights).any() else {}
-        data |= {} if shape.nodata is None else {"nodata": shape.nodata}
-    return data
+def _file_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
+    row = _FILES[type(shape)]
+    of_file: Any = shape  # all kinds of the table have a source and a scale
+    if not of_file.source:
+        raise InputError(f"'{name}': a {row.noun} made in memory cannot be written; {row.remedy}")
+    file = _relative(of_file.source, folder)
+    beside = ({} if of_file.scale == 1.0 else {"scale": of_file.scale}) | row.details(shape)
+    if row.entry is None:
+        return {shape.key: file, **beside}
+    return {shape.key: {"file": file, **beside}}
 
 
 def _relative(source: str, folder: Path) -> str:

@@ -218,7 +218,7 @@ def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
         raise InputError(f"scene: expected the obstacles {', '.join(sorted(known))}, got {scene}")
     for obstacle in scene.obstacles:
         before = known[obstacle.name].shape
-        clouds = isinstance(before, PointCloud) and isinstance(obstacle.shape, PointCloud)
+        clouds = before.sensed and type(before) is type(obstacle.shape)
         if not clouds and not same_shape(obstacle.shape, before):
             raise InputError(f"scene: '{obstacle.name}' has another shape than before; make a new world")
 

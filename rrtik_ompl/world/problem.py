@@ -20,7 +20,6 @@ from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.model.goal import Goal, JointGoal, PoseGoal
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.shapes import PointCloud
 from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.world.route_check import verification_resolution
@@ -215,7 +214,7 @@ def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
         lower = "lower the margin" + (" or the padding" if thick else "")
         remedy = f"move it or {lower}" + (", or allow the pair" if world.self_margin or thick else "")
         return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
-    clouds = {each.name for each in world.scene.obstacles if isinstance(each.shape, PointCloud)}
+    clouds = {each.name for each in world.scene.obstacles if each.shape.sensed}
     own = ", take the arm's own points out by without_robot()," if any(clouds & set(pair) for pair in pairs) else ""
     return ProblemError(f"{what} is in collision: {world.explain(q)}; move it{own} or allow the pair", pairs, part=what)
 

@@ -45,6 +45,7 @@ class Mesh(Shape):
     """
 
     key = "mesh"
+    fine = True
 
     vertices: Matrix
     triangles: NDArray[np.int64]

@@ -85,6 +85,7 @@ class PointCloud(_Kept, Shape):
     key = "cloud"
     movable = False
     smooth = True
+    sensed = True
 
     points: Points
     radius: float

@@ -44,6 +44,9 @@ class Shape(ABC):
         bounded: Whether it has an end in all directions.
         movable: Whether a link can hold it.
         smooth: Whether its surface has no edges.
+        fine: Whether its surface may have more triangles than a picture needs.
+        sensed: Whether a sensor measured it: the next scene may have other points of it, and the arm's own may be
+            among them.
     """
 
     __slots__ = ()
@@ -56,6 +59,8 @@ class Shape(ABC):
     bounded: ClassVar[bool] = True
     movable: ClassVar[bool] = True
     smooth: ClassVar[bool] = False
+    fine: ClassVar[bool] = False
+    sensed: ClassVar[bool] = False
 
     @property
     @abstractmethod

@@ -14,7 +14,7 @@ from rrtik_ompl.geometry.collision.shape_table import shape_of
 from rrtik_ompl.geometry.collision.solids import is_mesh
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle
-from rrtik_ompl.model.shapes import Mesh, Shape
+from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.model.shapes.surfaces import Faces
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out
@@ -121,7 +121,7 @@ def _link_surface(body: object, limit: int) -> Surface | None:
 
 def _triangles(shape: Shape, limit: int) -> tuple[Matrix, Faces]:
     surface = shape.surface()
-    if isinstance(shape, Mesh):
+    if shape.fine:
         return thin_out(*surface, limit)
     return _welded(*surface) if shape.smooth else surface
 

@@ -14,7 +14,7 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.shape_table import shape_of
 from rrtik_ompl.geometry.collision.solids import is_mesh, once_per_geometry
-from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, Mesh, PointCloud, Shape, Sphere
+from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, PointCloud, Shape, Sphere
 from rrtik_ompl.model.shapes.surfaces import Faces
 from rrtik_ompl.viewer.drawing.objects import (
     BoxGeometry,
@@ -59,7 +59,7 @@ def look_of_shape(shape: Shape, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look:
     surface = shape.surface()
     if shape.smooth:
         return look_of_triangles(*surface)
-    return look_of_triangles(*split_creases(*(thin_out(*surface, limit) if isinstance(shape, Mesh) else surface)))
+    return look_of_triangles(*split_creases(*(thin_out(*surface, limit) if shape.fine else surface)))
 
 
 def look_of_margin(shape: Shape, margin: float) -> Look | None:
