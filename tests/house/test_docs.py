@@ -95,7 +95,7 @@ def test_the_examples_of_own_ompl_code_run_in_their_order(tmp_path, monkeypatch,
     assert "mine" in (tmp_path / "results" / "summary.md").read_text()
 
 
-HEADINGS = ["A robot", "A planner", "A shape", "A joint type", "A kernel", "An inverse kinematics method"]
+HEADINGS = ["A robot", "A planner", "A goal", "A shape", "A joint type", "A kernel", "An inverse kinematics method"]
 HEADINGS += ["A shortening method"]
 
 
