@@ -17,7 +17,14 @@ from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.shape_table import has_core
-from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays, once_per_geometry
+from rrtik_ompl.geometry.collision.solids import (
+    inside_mesh,
+    is_closed,
+    is_mesh,
+    mesh_arrays,
+    once_per_geometry,
+    vertices_of,
+)
 
 ROUNDING = 1e-9  # [m]
 END_POINTS = np.concatenate([np.eye(3), -np.eye(3)])  # of a body about its origin, in half extents
@@ -162,11 +169,9 @@ def _end_points(geometries: Sequence[Any], halves: Matrix) -> NDArray[np.float64
 @once_per_geometry
 def _extremes(geometry: coal.CollisionGeometry) -> Matrix:
     """The vertices of a mesh or a convex solid that are farthest along the axes, shape (6, 3); 0 of other kinds."""
-    if is_mesh(geometry):
-        vertices, triangles = mesh_arrays(geometry)
-        points = vertices[distinct(triangles)]
-    elif isinstance(geometry, coal.ConvexBase):
-        points = np.array(geometry.points()).reshape(-1, 3)
-    else:
+    points = vertices_of(geometry)
+    if points is None:
         return np.zeros((6, 3))
+    if is_mesh(geometry):  # not all vertices need be of a triangle
+        points = points[distinct(mesh_arrays(geometry)[1])]
     return frozen(points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])

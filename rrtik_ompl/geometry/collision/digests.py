@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
-from rrtik_ompl.geometry.collision.shape_table import sizes_of
-from rrtik_ompl.geometry.collision.solids import is_mesh, mesh_arrays
+from rrtik_ompl.geometry.collision.shape_table import numbers_of
 from rrtik_ompl.model.robot import Robot
 
 DIGITS = 16  # of a digest, in hexadecimal
@@ -59,17 +58,13 @@ def _bodies(bodies: Iterable[Body]) -> Iterable[bytes]:
 
 def _shape(geometry: coal.CollisionGeometry) -> Iterable[ArrayLike]:
     """The numbers that give a coal geometry, as arrays."""
-    sizes = sizes_of(geometry)
-    if sizes is not None:
-        return (sizes,)
+    numbers = numbers_of(geometry)
+    if numbers is not None:
+        return numbers
     if isinstance(geometry, CloudSolid):
         return (geometry.cloud.points, geometry.cloud.radius)
-    if is_mesh(geometry):
-        return mesh_arrays(geometry)
     if isinstance(geometry, coal.Halfspace):
         return (np.array(geometry.n), geometry.d)
-    if isinstance(geometry, coal.ConvexBase):
-        return (np.array(geometry.points(), dtype=np.float64),)
     return (np.array(geometry.aabb_center), geometry.aabb_radius)  # a kind of which nothing is ever proven
 
 

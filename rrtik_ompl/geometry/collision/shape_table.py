@@ -15,6 +15,7 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid, cloud_solid
@@ -27,6 +28,7 @@ from rrtik_ompl.geometry.collision.solids import (
     measured,
     mesh_arrays,
     once_per_geometry,
+    vertices_of,
 )
 from rrtik_ompl.model.shapes import (
     Box,
@@ -257,6 +259,20 @@ def sizes_of(geometry: coal.CollisionGeometry) -> Vector | None:
     """The numbers that give a coal geometry; None if its kind is in no row."""
     row = _BY_GEOMETRY.get(type(geometry))
     return None if row is None else row.sizes(geometry)
+
+
+def numbers_of(geometry: coal.CollisionGeometry) -> tuple[NDArray[Any], ...] | None:
+    """All numbers that give a coal geometry: its sizes, the arrays of a mesh, the vertices of a convex solid.
+
+    None if its kind has none of them: a half-space, a cloud, a kind that is in no row.
+    """
+    sizes = sizes_of(geometry)
+    if sizes is not None:
+        return (sizes,)
+    if is_mesh(geometry):
+        return mesh_arrays(geometry)
+    vertices = vertices_of(geometry)
+    return None if vertices is None else (vertices,)
 
 
 def resized(geometry: coal.CollisionGeometry, factor: float) -> coal.CollisionGeometry | None:

@@ -132,6 +132,15 @@ def is_mesh(geometry: coal.CollisionGeometry) -> bool:
     return isinstance(geometry, coal.BVHModelBase)
 
 
+def vertices_of(geometry: coal.CollisionGeometry) -> Matrix | None:
+    """The vertices of a mesh or of a convex solid, shape (n, 3) [m]; None of other kinds."""
+    if is_mesh(geometry):
+        return mesh_arrays(geometry)[0]
+    if isinstance(geometry, coal.ConvexBase):
+        return np.array(geometry.points(), dtype=np.float64).reshape(-1, 3)
+    return None
+
+
 def of_each(geometries: Iterable[Any], find: Callable[[Any], Found]) -> list[Found]:
     """What is found of each of some coal geometries; looked for once where several are one object."""
     known: dict[int, Found] = {}

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import coal
 import numpy as np
@@ -19,8 +18,8 @@ from rrtik_ompl.files.cache import cache_folder, nobody_else_s, write_whole
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.notice import COVERING, tell_once
-from rrtik_ompl.geometry.collision.shape_table import sizes_of
-from rrtik_ompl.geometry.collision.solids import around, fills_its_hull, is_mesh, mesh_arrays
+from rrtik_ompl.geometry.collision.shape_table import numbers_of
+from rrtik_ompl.geometry.collision.solids import around, fills_its_hull, is_mesh
 from rrtik_ompl.geometry.covers.shipped import shipped_cover
 
 LAYOUT = 1
@@ -71,15 +70,8 @@ def cached_convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], ...]:
 
 def geometry_bytes(geometry: coal.CollisionGeometry) -> bytes | None:
     """All that a cover depends on, or None for a kind that is not cached."""
-    numbers: list[Any]
-    sizes = sizes_of(geometry)
-    if sizes is not None:
-        numbers = [sizes]
-    elif isinstance(geometry, coal.ConvexBase):
-        numbers = [np.array(geometry.points(), dtype=np.float64)]
-    elif is_mesh(geometry):
-        numbers = [*mesh_arrays(geometry)]
-    else:
+    numbers = numbers_of(geometry)
+    if numbers is None:
         return None
     swept = geometry.getSweptSphereRadius() if hasattr(geometry, "getSweptSphereRadius") else 0.0
     parts = [f"{type(geometry).__name__} {swept!r}".encode()]

@@ -16,7 +16,7 @@ from scipy.spatial import QhullError, cKDTree
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.shape_table import Core, box_corners, core_of
-from rrtik_ompl.geometry.collision.solids import is_closed, is_mesh, mesh_arrays
+from rrtik_ompl.geometry.collision.solids import is_closed, is_mesh, mesh_arrays, vertices_of
 from rrtik_ompl.geometry.covers.cells import elements
 from rrtik_ompl.geometry.covers.inner import inscribed
 from rrtik_ompl.geometry.covers.regular import ROD_PROTRUSION, balls_on_axis, regular_cover, rod_cover, row_on_z, spread
@@ -136,13 +136,8 @@ def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
         return cylinder_solid(*sizes) if min(sizes) > 0.0 and np.isfinite(sizes).all() else None
     if is_mesh(geometry):
         return _mesh(geometry)
-    if core is not None:
-        points = core.corners
-    elif isinstance(geometry, coal.ConvexBase):
-        points = np.array(geometry.points(), dtype=np.float64).reshape(-1, 3)
-    else:
-        return None
-    if len(points) < 4 or not np.isfinite(points).all():
+    points = vertices_of(geometry) if core is None else core.corners
+    if points is None or len(points) < 4 or not np.isfinite(points).all():
         return None
     try:
         return convex_solid(points)
@@ -203,9 +198,8 @@ def _bounding_ball(geometry: coal.CollisionGeometry, swept: float) -> Matrix:
 
 def _finite(geometry: coal.CollisionGeometry) -> bool:
     """Whether all vertices are finite numbers; coal's box leaves out those that are not."""
-    if is_mesh(geometry):
-        return bool(np.isfinite(mesh_arrays(geometry)[0]).all())
-    return not isinstance(geometry, coal.ConvexBase) or bool(np.isfinite(np.array(geometry.points())).all())
+    vertices = vertices_of(geometry)
+    return vertices is None or bool(np.isfinite(vertices).all())
 
 
 def _better(geometry: coal.CollisionGeometry, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
