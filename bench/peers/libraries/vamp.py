@@ -29,7 +29,7 @@ def search(problem: Problem) -> Callable[[], tuple[bool, float]]:
             scene.add_sphere(vamp.Sphere(place, shape.radius))
         else:
             raise TypeError(f"VAMP has no {type(shape).__name__}")
-    start, goal = problem.start, problem.goal.q  # type: ignore[union-attr]
+    start, goal = problem.start, problem.goal.q
 
     def solve() -> tuple[bool, float]:
         result = plan(start, goal, scene, settings, module.halton())

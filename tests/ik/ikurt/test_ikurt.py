@@ -18,7 +18,7 @@ from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.ik.ikurt.tree import FIRST_ROOM, IkurtTree
-from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, Target
 from rrtik_ompl.model.shapes import Sphere
 from rrtik_ompl.ompl_bridge.contract.problems import small_problem
 from rrtik_planners import IKURT, IKURTPublished
@@ -185,9 +185,9 @@ def test_every_published_example_is_solved_and_the_error_of_the_tip_reported(nam
     assert np.array_equal(plan.path.start, problem.start)
     assert plan.path.violations(problem.world) == ()
     assert problem.reached(plan.path.end)
+    assert isinstance(problem.goal, Target)
     tip = problem.robot.fk(plan.path.end)
-    wanted = problem.goal.position if isinstance(problem.goal, PositionGoal) else problem.goal.T_world_tip.translation
-    away = np.linalg.norm(tip.translation - wanted)
+    away = np.linalg.norm(tip.translation - problem.goal.point)
     assert plan.statistics["position_error"] == pytest.approx(away, abs=1e-12)
     assert away < 1e-6
     (line,) = (line for line in summary(problem, plan, plan.path, 0.0) if "the tip ends" in line)
@@ -196,6 +196,7 @@ def test_every_published_example_is_solved_and_the_error_of_the_tip_reported(nam
 
 def test_the_tree_alone_reaches_the_tolerance_without_the_jacobian() -> None:
     problem = rrtik.load_problem("planar6_c")
+    assert isinstance(problem.goal, rrtik.PositionGoal)
     plan = rrtik.plan(problem, IKURT, seconds=10.0, seed=1, parameters={"jacobian": False})
     assert plan.found, plan.reason
     assert 1e-9 < plan.statistics["position_error"] <= problem.goal.tolerance
