@@ -17,9 +17,10 @@ from rrtik_ompl.kernels.ik.ik_layout import (
     NO_TURN,
     POSITION_TOLERANCE,
 )
-from rrtik_ompl.model.goal import GoalPart, GoalSet, PoseGoal, Target, TipGoal
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, Target, TipGoal
 
 POSE = PoseGoal(np.eye(4))  # for its tolerances
+UPRIGHT = np.eye(3).ravel()  # where the orientation does not count
 
 
 def goal_rows(goal: TipGoal) -> Matrix:
@@ -31,7 +32,7 @@ def goal_rows(goal: TipGoal) -> Matrix:
         InputError: If the goal is a task-space region or has one, whose freedom no row can hold.
     """
     if not isinstance(goal, GoalSet):
-        return np.array([_row(part) for part in goal.parts])
+        return _row(goal)[None]
     rows = np.array([_row(member) for member in goal.members])
     posed = rows[:, FREE_TURN] == NO_TURN
     rows[posed, BOX : BOX + 3] = 0.5 * goal.box
@@ -47,14 +48,13 @@ def pose_rows(poses: NDArray[np.float64]) -> Matrix:
     return rows
 
 
-def _row(goal: GoalPart) -> NDArray[np.float64]:
+def _row(goal: TipGoal) -> NDArray[np.float64]:
     if not isinstance(goal, Target):
         raise InputError("goal: no row holds a task-space region; use projection, or targets drawn from it")
     row = np.zeros(AIM_FLOATS)
     near, turned = goal.tolerances
-    row[:9] = goal.pose.rotation.ravel()
+    row[:9] = goal.pose.rotation.ravel() if goal.oriented else UPRIGHT
     row[9:12] = goal.point
     row[POSITION_TOLERANCE] = SHARE * near
-    row[CHORD_TOLERANCE] = SHARE * turned if goal.oriented else 1.0
-    row[FREE_TURN] = NO_TURN if goal.oriented else ANY_TURN
+    row[CHORD_TOLERANCE], row[FREE_TURN] = (SHARE * turned, NO_TURN) if goal.oriented else (1.0, ANY_TURN)
     return row

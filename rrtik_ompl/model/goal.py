@@ -83,6 +83,8 @@ class JointGoal(Goal):
 class PositionGoal(Target):
     """Bring the tip to a point of the world [m], orientation free. ``tolerance`` [m]."""
 
+    oriented = False
+
     position: Vector
     tolerance: float = 1e-3
 
@@ -96,11 +98,6 @@ class PositionGoal(Target):
     def title(self) -> str:
         """What it is."""
         return "tip position"
-
-    @property
-    def oriented(self) -> bool:
-        """The orientation of the tip does not count."""
-        return False
 
     @property
     def tolerances(self) -> tuple[float, float]:

@@ -6,8 +6,8 @@ example. Files have their own words for each kind, in ``rrtik_ompl.problem_files
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
+from abc import abstractmethod
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -23,23 +23,35 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.task_region import TaskRegion
 
 
-class Goal(ABC):
-    """What a plan has to reach. Frozen."""
+class Goal:
+    """What a plan has to reach. Frozen.
+
+    It has not the metaclass ABCMeta, by which ``isinstance`` would take several times as long: `solve_ik` of one pose
+    takes 20 microseconds, and asks it often. mypy finds all the same what a kind does not answer.
+
+    Attributes:
+        oriented: Whether the orientation of the tip counts.
+    """
 
     __slots__ = ()
+
+    oriented: ClassVar[bool] = True
 
     @property
     @abstractmethod
     def title(self) -> str:
         """What it is, in two or three words."""
+        raise NotImplementedError
 
     @abstractmethod
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
         """How far each row of Q is from the goal, shape (m,) [m, of a configuration rad or m]."""
+        raise NotImplementedError
 
     @abstractmethod
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
         """Which rows of Q are at the goal, shape (m,)."""
+        raise NotImplementedError
 
     @property
     def q(self) -> Vector | None:
@@ -55,11 +67,6 @@ class Goal(ABC):
     def frames(self) -> tuple[str, ...]:
         """Names of the links that are tips, one for each part; none unless it is a goal of several tips."""
         return ()
-
-    @property
-    def oriented(self) -> bool:
-        """Whether the orientation of the tip counts."""
-        return True
 
     def arms(self, robot: Robot) -> list[Robot]:
         """The robot with each of the tips that have a goal."""
@@ -79,11 +86,13 @@ class TipGoal(Goal):
     @abstractmethod
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
         """Distance [m] and angle [rad] of the tip from the nearest part, for each row of Q, shapes (m,)."""
+        raise NotImplementedError
 
     @property
+    @abstractmethod
     def has_regions(self) -> bool:
         """Whether it is or has a goal with freedom that no row of `rrtik_ompl.ik.goal_rows` holds."""
-        return any(part.freedom is not None for part in self.parts)
+        raise NotImplementedError
 
     def alone(self, number: int) -> TipGoal:
         """One of its parts as a goal of its own."""
@@ -99,19 +108,27 @@ class GoalPart(TipGoal):
     @abstractmethod
     def tolerances(self) -> tuple[float, float]:
         """What the errors may be at most: distance [m] and angle [rad] (0 for a position)."""
+        raise NotImplementedError
 
     @abstractmethod
     def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
         """As :meth:`errors_at`, of poses that are known to be such, shape (m, 4, 4)."""
+        raise NotImplementedError
 
     @abstractmethod
     def region(self) -> TaskRegion:
-        """It as a task-space region, with the freedom that it leaves."""
+        """It, or where no region is all of it a part of it: what targets are drawn from, and what pictures show."""
+        raise NotImplementedError
 
     @property
     def freedom(self) -> TaskRegion | None:
         """The region that targets are drawn from; None if it is a :class:`Target` itself."""
         return self.region()
+
+    @property
+    def has_regions(self) -> bool:
+        """Whether it leaves freedom."""
+        return self.freedom is not None
 
     def freed(self, axis: FrameAxis | None, box: Vector) -> GoalPart:
         """It with a free turn about an axis of its frame and a box of positions, if it is a pose."""
@@ -156,17 +173,25 @@ class Target(GoalPart):
     @abstractmethod
     def pose(self) -> pin.SE3:
         """T_world_tip (``pinocchio.SE3``), turned like the world if the orientation does not count."""
+        raise NotImplementedError
 
     @property
     @abstractmethod
     def point(self) -> Vector:
         """Where the tip has to be [m], shape (3,)."""
+        raise NotImplementedError
 
     @abstractmethod
     def tightened(self, share: float) -> Target:
         """The same goal with that share of its tolerances."""
+        raise NotImplementedError
 
     @property
     def freedom(self) -> None:
         """It leaves none."""
         return None
+
+    @property
+    def has_regions(self) -> bool:
+        """It has none."""
+        return False
