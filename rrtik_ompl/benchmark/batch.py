@@ -85,7 +85,8 @@ def plan_batch(
         memory_mb=positive(memory_mb, "memory_mb"),
         seed=whole_number(seed, "seed"),
     )
-    left, count = all_jobs(suite), whole_number(jobs, "jobs", 1)
+    left = all_jobs(suite)
+    count = whole_number(jobs, "jobs", 1)
     finished = spread.local(left, count, _beside) if scheduler is None else spread.cluster(left, scheduler)
     records = {int(record["problem"]): record for record in finished}
     return [{**records[k], "problem": source.name} for k, source in enumerate(named)]

@@ -132,12 +132,14 @@ def _held(file: Path, suite: Suite, about: Mapping[str, Any], resume: bool) -> s
     """Which runs are done already."""
     if not os.path.isfile(file) or file.stat().st_size == 0:
         return set()
-    head, done = records.read_head(file), {records.key_of(record) for record in records.read_records(file)}
+    head = records.read_head(file)
+    done = {records.key_of(record) for record in records.read_records(file)}
     if not done:  # it never began, as where a scheduler did not answer
         return done
     if not resume:
         raise InputError(f"{file}: holds {len(done)} runs already; continue with --resume, or choose another --out")
-    before, now = head["suite"], records.json_like(suite.plain())
+    before = head["suite"]
+    now = records.json_like(suite.plain())
     changed = [key for key in now if before.get(key) != now[key] and key not in ("runs", "title")]
     if changed:
         raise InputError(f"{file}: was begun with another suite ({', '.join(changed)} differ); choose another --out")

@@ -108,7 +108,9 @@ def write_database(logs: Sequence[Path], file: Path, runs: int) -> None:
 
 def log_text(results: Sequence[Result], head: Mapping[str, Any]) -> str:
     """One experiment: all planners on the same problems."""
-    suite, machine, first = head["suite"], head["machine"], results[0]
+    suite = head["suite"]
+    machine = head["machine"]
+    first = results[0]
     scaled = [f"{first.axis} REAL = {first.value:g}"] if first.axis else []
     seconds = sum(measured(run, "total_seconds") or 0.0 for result in results for run in result.runs)
     lines = [
@@ -160,7 +162,8 @@ def _planner(result: Result, entrant: Mapping[str, Any]) -> list[str]:
 def _flags(run: Mapping[str, Any]) -> list[str]:
     """Values of ``FLAGS``; a run without a path has those of a solution empty, as OMPL does not write them then."""
     status = {SOLVED: EXACT, INVALID: EXACT, NOT_FOUND: TIMEOUT}.get(run["status"], CRASH)
-    found, valid = run["status"] in (SOLVED, INVALID), run["status"] == SOLVED
+    found = run["status"] in (SOLVED, INVALID)
+    valid = run["status"] == SOLVED
     strict = (run.get("initial_strict", False), valid and run.get("strict", False))
     outcome = (int(found), status, STATUSES.index(run["status"]))
     solution = (0, 0, 1, int(strict[0]), int(valid), int(strict[1])) if found else ("",) * 6

@@ -44,7 +44,8 @@ def read_head(file: Path) -> Record:
         InputError: If the file cannot be read or is something else.
     """
     for _, data in _lines(file):
-        suite, machine = data.get("suite"), data.get("machine")
+        suite = data.get("suite")
+        machine = data.get("machine")
         known = data.get("version") == 1 and data["version"] is not True
         if not known or not isinstance(suite, dict) or not isinstance(machine, dict):
             raise InputError(f"{file}:1: not the head of a campaign; choose another --out, or delete the file")

@@ -25,7 +25,8 @@ def write_report(file: Path, *, views: int = VIEWS) -> tuple[list[Result], list[
     Raises:
         InputError: If the records cannot be read, or there are none, or a file cannot be written.
     """
-    folder, (head, found) = file.parent, read_campaign(file)
+    folder = file.parent
+    head, found = read_campaign(file)
     total = sum(result.total for result in found)
     ompl_log.write_database(ompl_log.write_logs(found, head, folder / "logs"), folder / ompl_log.DATABASE, total)
     write_text(folder / "summary.md", tables.markdown(found, head))
@@ -43,7 +44,8 @@ def read_campaign(file: Path) -> tuple[records.Record, list[Result]]:
     Raises:
         InputError: If the records cannot be read, or there are none.
     """
-    head, found = records.read_head(file), results(records.read_records(file))
+    head = records.read_head(file)
+    found = results(records.read_records(file))
     if not found:
         raise InputError(f"{file}: holds no runs yet")
     return head, _in_order(file, found, head)

@@ -112,8 +112,12 @@ def smoothness(path: JointPath) -> float:
     """OMPL's measure, 0 for a straight line: the squares of the turns, each over the mean length of its two edges."""
     rows = path.waypoints
     sides = np.linalg.norm(np.diff(rows, axis=0), axis=1)
-    before, after, across = sides[:-1], sides[1:], np.linalg.norm(rows[2:] - rows[:-2], axis=1)
+    before = sides[:-1]
+    after = sides[1:]
+    across = np.linalg.norm(rows[2:] - rows[:-2], axis=1)
     some = (before > 0.0) & (after > 0.0)
-    before, after, across = before[some], after[some], across[some]
+    before = before[some]
+    after = after[some]
+    across = across[some]
     cosines = np.clip((before**2 + after**2 - across**2) / (2.0 * before * after), -1.0, 1.0)
     return float((((np.pi - np.arccos(cosines)) * 2.0 / (before + after)) ** 2).sum())

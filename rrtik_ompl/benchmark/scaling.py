@@ -128,10 +128,8 @@ def _bent(joints: int, angle: float) -> Vector:
 def _postures(alone: World, rng: np.random.Generator) -> Matrix:
     lower, upper = alone.robot.finite_range()
     turning = ~alone.robot.prismatic
-    lower, upper = (
-        np.where(turning, np.maximum(lower, -np.pi), lower),
-        np.where(turning, np.minimum(upper, np.pi), upper),
-    )
+    lower = np.where(turning, np.maximum(lower, -np.pi), lower)
+    upper = np.where(turning, np.minimum(upper, np.pi), upper)
     rows = rng.uniform(lower, upper, (POSTURES, alone.robot.dof))
     free: Matrix = rows[alone.valid_batch(rows)]
     return free

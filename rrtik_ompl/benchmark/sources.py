@@ -95,7 +95,8 @@ def folder_sources(folder: Path, robot: str | None) -> list[Source]:
     found = [file for file in found if file.parent not in pairs or file.name.startswith("scene")]
     if not found:
         raise InputError(f"{folder}: holds no problem files (.yaml) and no pairs sceneN.yaml, requestN.yaml")
-    sources, whole = [], folder.resolve()
+    sources = []
+    whole = folder.resolve()
     for file in map(Path.resolve, found):
         group = (Path(whole.name) / file.parent.relative_to(whole)).as_posix()
         sources.append(Source("file", f"{group}/{file.stem}", group, (str(file), robot)))

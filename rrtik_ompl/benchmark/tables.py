@@ -69,7 +69,8 @@ def markdown(results: Sequence[Result], head: Mapping[str, Any]) -> str:
 
 def conditions(results: Iterable[Result], head: Mapping[str, Any]) -> str:
     """What a reader must know, in a paragraph."""
-    suite, machine = head["suite"], head["machine"]
+    suite = head["suite"]
+    machine = head["machine"]
     runs = 1 + max(run["run"] for result in results for run in result.runs)
     spread = "--scheduler ADDRESS" if machine["at a time"] == "a cluster" else f"--jobs {machine['at a time']}"
     command = f"rrtik bench {suite['name']} --runs {runs} {spread}"

@@ -186,14 +186,16 @@ def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any]
     from rrtik_ompl import solve_ik
     from rrtik_ompl.cli import ik_report
 
-    robot, world = given.robot, given.world
+    robot = given.robot
+    world = given.world
     with progress(f"inverse kinematics of {robot.name}"):
         result, turns = ik_report.fold_full_turns(robot, solve_ik(robot, goal, all=everything, **common), given.near)
     names = ik_report.branch_names(robot, goal, result.solutions)
     if output.as_json:
         print(json.dumps(ik_report.document(robot, result, names, turns)))
     elif output.as_csv:
-        reasons, notes = [""] * len(result.solutions), ik_report.solution_notes(names, turns)
+        reasons = [""] * len(result.solutions)
+        notes = ik_report.solution_notes(names, turns)
         print(ik_report.rows_csv(robot, result.solutions, result.residuals, reasons, notes), end="")
     elif result.found:
         checked = world if world is not None and world.scene.obstacles else None
@@ -223,7 +225,8 @@ def _many(
     from rrtik_ompl.cli import ik_report
     from rrtik_ompl.problem_files.poses import load_poses
 
-    robot, rows = given.robot, load_poses(file)
+    robot = given.robot
+    rows = load_poses(file)
     if rows.ndim == 2:
         refuse_orientation(tolerances, "leave it out")
     with progress(f"inverse kinematics of {count(len(rows), 'pose')}"):

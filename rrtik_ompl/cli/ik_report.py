@@ -68,7 +68,9 @@ def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tupl
     Q = np.where(counted & (robot.lower <= turned) & (turned <= robot.upper), turned, result.solutions)
     looks = np.hstack([np.where(whole, np.cos(Q), Q), np.where(whole, np.sin(Q), 0.0)])
     kept = different_rows(looks, np.linalg.norm(Q - posture, axis=1).argsort(kind="stable"))
-    q, lower, upper = Q[kept][:, counted], robot.lower[counted], robot.upper[counted]
+    q = Q[kept][:, counted]
+    lower = robot.lower[counted]
+    upper = robot.upper[counted]
     fitting = 1.0 + np.floor((upper - q) / TAU) + np.floor((q - lower) / TAU)
     folded = replace(result, solutions=frozen(Q[kept]), residuals=frozen(result.residuals[kept]))
     return folded, [int(number) - 1 for number in fitting.prod(axis=1)]
@@ -105,7 +107,9 @@ def solutions_table(
 
     Columns that have nothing to say are left out.
     """
-    named, turned, cleared = any(names), any(turns), len(clearances) > 0
+    named = any(names)
+    turned = any(turns)
+    cleared = len(clearances) > 0
     heads = ["no.", *(["branch"] if named else []), *joint_heads(robot), "off [mm]", "off [deg]"]
     heads += ["by full turns"] * turned + ["clearance [mm]"] * cleared
     table = Table(*heads, right={*range(len(heads))} - ({1} if named else set()))

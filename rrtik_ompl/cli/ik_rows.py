@@ -40,15 +40,18 @@ def each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], 
     if rows.ndim == 3 and not tolerances:
         batch = solve_ik_batch(robot, rows, **common)
         return Solved(batch.q, batch.residuals, list(batch.reasons), list(batch.details), [""] * len(rows))
-    q, residuals = np.full((len(rows), robot.dof), np.nan), np.full((len(rows), 2), np.nan)
-    reasons, details = [], []
+    q = np.full((len(rows), robot.dof), np.nan)
+    residuals = np.full((len(rows), 2), np.nan)
+    reasons = []
+    details = []
     for k, row in enumerate(rows):
         goal = point(row, tolerances) if rows.ndim == 2 else PoseGoal(row, **tolerances)
         result = solve_ik(robot, goal, **{**common, "seed": common["seed"] + k})
         reasons.append(result.reason)
         details.append(result.detail)
         if result.found:
-            q[k], residuals[k] = result.solutions[0], result.residuals[0]
+            q[k] = result.solutions[0]
+            residuals[k] = result.residuals[0]
     return Solved(q, residuals, reasons, details, [""] * len(rows))
 
 
@@ -58,7 +61,8 @@ def followed(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, floa
 
     options: dict[str, Any] = dict(tolerances)
     done = solve_ik_trajectory(robot, rows, **common, **options)
-    notes, details = [""] * len(rows), [""] * len(rows)
+    notes = [""] * len(rows)
+    details = [""] * len(rows)
     for text, where in (("jump", done.jumps), ("collision on the way", done.blocked)):
         for k in where:
             notes[k] = f"{notes[k]}, {text}" if notes[k] else text

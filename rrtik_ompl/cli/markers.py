@@ -62,7 +62,8 @@ def print_sheet(
 
     if kind is Kind.board:
         small = BOARD_MARKER * side if marker is None else marker
-        square, inner = 1e-3 * side, 1e-3 * small
+        square = 1e-3 * side
+        inner = 1e-3 * small
         sheets.print_board(
             out, columns=columns, rows=rows, square=square, marker=inner, dictionary=dictionary, paper=paper
         )
@@ -126,7 +127,8 @@ def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
     with progress("detecting the board"):
         moments = list(pictures_together([str(each) for each in photographs]))
         found = calibrate_rig([[each[k].pixels for each in moments] for k in range(len(photographs))], board)
-    files, rig = save_rig(found.rig, out), found.rig
+    files = save_rig(found.rig, out)
+    rig = found.rig
     for k, (each, file) in enumerate(zip(found.cameras, files, strict=True)):
         _tell(each, [f"{photographs[k].name}/{pictures[k].name}" for pictures in moments])
         say(f"camera {k + 1}: error {each.error:.3f} px; wrote {file}")

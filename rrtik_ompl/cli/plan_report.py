@@ -30,7 +30,8 @@ def moves_table(path: JointPath) -> Table:
     """One row per single-joint move: joint, from, to, change; degrees, or metres for a prismatic joint."""
     table = Table(*COLUMNS, right=(0, 2, 3, 4))
     for number, move in enumerate(path.moves(), start=1):
-        (start, unit), (end, _) = reading(move.start, move.unit), reading(move.end, move.unit)
+        start, unit = reading(move.start, move.unit)
+        end, _ = reading(move.end, move.unit)
         digits = 4 if unit == "m" else 2
         values = (f"{start:.{digits}f}", f"{end:.{digits}f}", f"{end - start:+.{digits}f}")
         table.add_row(str(number), move.joint, *values, unit)
@@ -58,7 +59,8 @@ def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     numbers = range(1, len(heads) + 1)
     table = Table("joint", *heads, "unit", "switches/s", right=(*numbers, len(heads) + 2))
     often = motion_report(trajectory, limits).switches
-    peaks, words = trajectory.peaks(), ("jumps", "none")  # said of a peak, of a limit, that is infinite
+    peaks = trajectory.peaks()
+    words = ("jumps", "none")  # said of a peak, of a limit, that is infinite
     pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
     for k, name in enumerate(trajectory.joint_names):
         factor, unit = shown_unit(trajectory.prismatic[k])
@@ -164,7 +166,8 @@ def timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimits
     """A timed motion for machines: duration and each joint's peaks (a jerk of null is a jump of acceleration)."""
     from rrtik_ompl.motion.trajectory import motion_report
 
-    peaks, report = trajectory.peaks(), motion_report(trajectory, limits)
+    peaks = trajectory.peaks()
+    report = motion_report(trajectory, limits)
     return {
         "problem": problem.name,
         "robot": trajectory.robot_name,
@@ -257,7 +260,8 @@ def how_proven(problem: Problem, motion: Trajectory) -> str:
 
 def path_lines(problem: Problem, route: JointPath, kept: str) -> list[str]:
     """What is said of a path without faults; ``kept`` follows its clearance."""
-    world, lines = problem.world, []
+    world = problem.world
+    lines = []
     if any(body.kind == "obstacle" for body in world.bodies):
         lines.append(f"{clearance_along(world, route.waypoints)}{kept}")
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"

@@ -89,7 +89,8 @@ def reproduce(
 
 def _rows(table: Table, quick: bool, kept: Kept, *, shown: bool) -> Sequence[Row]:
     """Measured, or as an earlier round that was interrupted left them."""
-    begin, known = time.perf_counter(), kept.known(table)
+    begin = time.perf_counter()
+    known = kept.known(table)
     with progress(f"{table.name}: {table.title}, about {_time(_seconds(table, quick))}"):
         rows = table.run(quick) if known is None else known
     kept.add(table, rows)

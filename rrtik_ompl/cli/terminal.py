@@ -36,7 +36,8 @@ class Table:
     """
 
     def __init__(self, *heads: str, right: Collection[int] = ()) -> None:
-        self._rows, self._right = [heads], right
+        self._rows = [heads]
+        self._right = right
 
     def add_row(self, *cells: str) -> None:
         """Add a row below the others."""
@@ -73,7 +74,8 @@ def prepare_terminal() -> None:
 
     A stream that was closed leads nowhere; a letter that a terminal lacks is spelt out.
     """
-    warnings.showwarning, notice.listener = warn, note
+    warnings.showwarning = warn
+    notice.listener = note
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
@@ -94,7 +96,8 @@ def stoppable() -> Iterator[None]:
     Where numpy compares rows it makes another error of it, and where the collector of garbage calls something Python
     prints it and goes on: then it comes once more.
     """
-    usual, unraised = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    usual = signal.getsignal(signal.SIGINT)
+    unraised = sys.unraisablehook
     came = in_hook = False
 
     def interrupted(*_: object) -> None:

@@ -80,7 +80,8 @@ def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> N
     data: dict[str, Any] = {"size": [lens.width, lens.height], "fx": fx, "fy": fy, "cx": cx, "cy": cy}
     data["distortion"] = lens.distortion.tolist()
     if lens.sigmas.any():
-        data["sigmas_px"], data["distortion_sigmas"] = lens.sigmas[:4].tolist(), lens.sigmas[4:].tolist()
+        data["sigmas_px"] = lens.sigmas[:4].tolist()
+        data["distortion_sigmas"] = lens.sigmas[4:].tolist()
     if lens.tone is not None:
         data["tone"] = lens.tone
     if isinstance(camera, Calibration):

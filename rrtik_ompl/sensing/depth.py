@@ -55,7 +55,8 @@ def cloud_from_depth(
     if picture.shape != (camera.height, camera.width):
         size = f"{camera.height} rows of {camera.width}"
         raise InputError(f"depth picture: the camera has {size} pixels, got an array of shape {picture.shape}")
-    step, low = whole_number(every, "every", 1), not_negative(nearest, "nearest")
+    step = whole_number(every, "every", 1)
+    low = not_negative(nearest, "nearest")
     z = positive(scale, "scale") * picture[::step, ::step]
     seen = np.isfinite(z) & (z >= low) & (z <= positive(farthest, "farthest")) & (z > 0.0)
     if not seen.any():

@@ -31,11 +31,14 @@ class MotionFilter:
     def restart(self, pose: pin.SE3, covariance: Matrix) -> None:
         """Forget everything but a pose and its covariance, shape (6, 6)."""
         self._reference = pose.rotation.copy()
-        state, spread = np.zeros(12), np.zeros((12, 12))
+        state = np.zeros(12)
+        spread = np.zeros((12, 12))
         state[:3] = pose.translation
         spread[_MEASURED, _MEASURED] = covariance
         spread[_RATES, _RATES] = np.diag(np.repeat(np.square(FIRST_SPEED), 3))
-        self._states, self._spreads, self._shares = np.stack([state] * 2), np.stack([spread] * 2), np.full(2, 0.5)
+        self._states = np.stack([state] * 2)
+        self._spreads = np.stack([spread] * 2)
+        self._shares = np.full(2, 0.5)
 
     def update(self, pose: pin.SE3, covariance: Matrix, seconds: float) -> pin.SE3:
         """The pose after a measurement, ``seconds`` after the one before."""
@@ -76,8 +79,10 @@ class MotionFilter:
         forward[_MEASURED, _RATES] = seconds * np.eye(6)
         change = np.diag(np.repeat(np.square((STILL, MOVING)[k]), 3))
         growth = np.kron([[seconds**3 / 3.0, seconds**2 / 2.0], [seconds**2 / 2.0, seconds]], change)
-        state, spread = forward @ state, forward @ spread @ forward.T + growth
-        away, expected = seen - state[_MEASURED], spread[_MEASURED, _MEASURED] + noise
+        state = forward @ state
+        spread = forward @ spread @ forward.T + growth
+        away = seen - state[_MEASURED]
+        expected = spread[_MEASURED, _MEASURED] + noise
         gain = np.linalg.solve(expected, spread[_MEASURED]).T
         self._states[k] = state + gain @ away
         spread = spread - gain @ spread[_MEASURED]

@@ -75,5 +75,6 @@ def series_of(values: ArrayLike) -> Series:
     if len(rows) < 2:
         raise InputError(f"a series needs at least two measurements, got {len(rows)}")
     low, middle, high = np.quantile(rows, [0.25, 0.5, 0.75]).tolist()
-    mean, deviation = float(rows.mean()), float(rows.std(ddof=1))
+    mean = float(rows.mean())
+    deviation = float(rows.std(ddof=1))
     return Series(len(rows), float(rows.max()), float(rows.min()), mean, deviation, (low, middle, high))

@@ -114,7 +114,8 @@ def _in_first(sight: Sighting, rig: Rig, number: int) -> Sighting:
     """A sighting of one of the cameras in the frame of the first one."""
     if number == 0:
         return sight
-    T, pose = rig.poses[number], sight.pose
+    T = rig.poses[number]
+    pose = sight.pose
     axes = np.kron(np.eye(2), T.rotation)
     lever = np.eye(6)
     lever[:3, 3:] = -pin.skew(T.rotation @ pose.T_camera_object.translation)
@@ -143,7 +144,8 @@ def _branches(sight: Sighting) -> list[pin.SE3]:
 def _joined(sightings: Sequence[Sighting], poses: Sequence[pin.SE3]) -> CornerPose:
     """The pose that is nearest to some poses by their covariances, and by how much they contradict each other."""
     weights = [np.linalg.inv(each.pose.covariance) for each in sightings]
-    covariance, found = np.linalg.inv(sum(weights)), poses[0]
+    covariance = np.linalg.inv(sum(weights))
+    found = poses[0]
     for _ in range(ROUNDS):
         away = [_away(found, pose) for pose in poses]
         step = covariance @ sum(w @ a for w, a in zip(weights, away, strict=True))

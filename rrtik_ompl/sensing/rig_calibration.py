@@ -80,7 +80,10 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
         except InputError as reason:
             raise InputError(f"camera {number}: {reason}") from None
     corners = [[board_corners(as_gray(picture), board) for picture in taken] for taken in pictures]
-    poses, moments, errors, sigmas = [pin.SE3.Identity()], [], [], []
+    poses = [pin.SE3.Identity()]
+    moments = []
+    errors = []
+    sigmas = []
     for number in range(1, len(pictures)):
         common = [each for pair in zip(corners[0], corners[number], strict=True) if (each := _common(*pair))]
         if len(common) < MIN_MOMENTS:

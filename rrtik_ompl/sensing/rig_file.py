@@ -51,7 +51,8 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
     """
     document = read_yaml(path)
     entry = parse(document, RigFile)
-    cameras, poses = [], []
+    cameras = []
+    poses = []
     for k, each in enumerate(entry.cameras):
         with document.at(("cameras", k)):
             if k > 0 and each.pose is None:

@@ -35,9 +35,11 @@ def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None 
     solids = [
         name for each in sensor.marker_map.objects if each.role not in ("base", "arm") for name in each.solid_names
     ]
-    given, seen = {obstacle.name for obstacle in given_scene.obstacles}, dict[str, Obstacle]()
+    given = {obstacle.name for obstacle in given_scene.obstacles}
+    seen = dict[str, Obstacle]()
     around = replace(given_scene, obstacles=tuple(_at_rest(o, solids) for o in given_scene.obstacles))
-    begin, why = None, ""
+    begin = None
+    why = ""
     last = dict[str, float]()  # when each was seen
     for picture in pictures:
         view = sensor.view(picture)

@@ -106,7 +106,8 @@ class Sensor:
         """
         self._rig = camera if isinstance(camera, Rig) else None
         self.camera = camera.cameras[0] if isinstance(camera, Rig) else camera
-        self.marker_map, self._sigmas = marker_map, checked_sigmas(sigmas)
+        self.marker_map = marker_map
+        self._sigmas = checked_sigmas(sigmas)
         self._trackers = {each.name: PoseTracker() for each in marker_map.objects} if smooth else {}
         self._before: tuple[Sighting, ...] = ()
         self._count = 0  # of pictures
@@ -124,7 +125,8 @@ class Sensor:
                 backwards.
         """
         found = self._detected(picture, others)
-        self._before, self._count = (found if self._trackers else ()), self._count + 1
+        self._before = found if self._trackers else ()
+        self._count += 1
         seen = tuple(self._tracked(each, picture.time) for each in found)
         if not seen:
             self._blank = picture.pixels
@@ -152,7 +154,8 @@ class Sensor:
         """
         if self._blank is None:
             return f"{source}: markers of the map are in view, but none that says where the arm's base is"
-        wanted, found = self.marker_map.dictionary, dictionaries_seen(as_gray(self._blank))
+        wanted = self.marker_map.dictionary
+        found = dictionaries_seen(as_gray(self._blank))
         if wanted in found:
             return f"{source}: markers are in view, but none that the map knows; add their ids to the map"
         if found:
@@ -163,9 +166,11 @@ class Sensor:
         tracker = self._trackers.get(sight.object.name)
         if tracker is None or sight.refused:
             return sight
-        found, pose = tracker.update(sight, time), sight.pose
+        found = tracker.update(sight, time)
+        pose = sight.pose
         refused = "jumped: left out as an outlier" if found.outlier else ""
-        first, second = (pose.T_camera_object, pose.error), (pose.other, pose.other_error)
+        first = (pose.T_camera_object, pose.error)
+        second = (pose.other, pose.other_error)
         taken, other = (second, first) if found.other_branch else (first, second)
         if found.sure:  # by this picture or those before it
             other = None, np.inf

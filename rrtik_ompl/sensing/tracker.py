@@ -73,7 +73,8 @@ class PoseTracker:
         """
         if not time > self._time:
             raise InputError(f"times of pictures must increase, got {time:g} s after {self._time:g} s")
-        seconds, pose = time - self._time, sight.pose
+        seconds = time - self._time
+        pose = sight.pose
         branches = [pose.T_camera_object, pose.other] if pose.ambiguous else [pose.T_camera_object]
         belief = self._believed(branches, np.array([pose.error, pose.other_error])[: len(branches)], pose, seconds)
         taken, switched = self._taken(branches, belief)
@@ -83,7 +84,10 @@ class PoseTracker:
         if outlier and not settled and self._strays < MAX_OUTLIERS:
             return Tracked(self._filter.ahead(seconds), pose.covariance, True, taken == 1, self._sure(self._belief))
         begin = outlier or switched or self._last is None
-        self._time, self._branches, self._belief, self._last = time, branches, belief, branches[taken]
+        self._time = time
+        self._branches = branches
+        self._belief = belief
+        self._last = branches[taken]
         smooth = self._smoothed(branches[taken], pose.covariance, None if begin else seconds)
         return Tracked(*smooth, False, taken == 1, self._sure(belief))
 

@@ -100,7 +100,8 @@ def drawn(text: str, frames: int, size: tuple[int, int]) -> list[Image.Image]:
     script = f'<script id="film" type="application/json">{work}</script><script>{asset("film.js")}</script>'
     added = PICTURE_ONLY.format(*size) + script
     pictures: list[Image.Image] = []
-    news, ended = threading.Event(), threading.Event()
+    news = threading.Event()
+    ended = threading.Event()
 
     def take(body: bytes) -> None:
         if body == b"end":

@@ -43,7 +43,8 @@ class Fingers:
 
 def fingers_of(plan: TaskPlan, drawn: Robot, at: Vector) -> Fingers:
     """The fingers of a plan's motions, beside a robot that is drawn; ``at`` as in :class:`Fingers`."""
-    nodes, first = joint_nodes(drawn), _placements(drawn)
+    nodes = joint_nodes(drawn)
+    first = _placements(drawn)
     places = [_placements(world.robot) for world in plan.worlds]
     poses = {}
     for (joint, name), placement in first.items():

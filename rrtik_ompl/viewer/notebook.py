@@ -56,7 +56,8 @@ def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | Non
         shown = robot
         path = value
     else:
-        shown, path = value, None
+        shown = value
+        path = None
     planning = isinstance(value, (Plan, Problem))
     return InlinePage(page(shown, path, still=not planning))._repr_html_()
 

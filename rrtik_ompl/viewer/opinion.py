@@ -63,7 +63,8 @@ def opinion(problem: Problem, asked: bytes) -> dict[str, Any]:
 
 def _scene(problem: Problem, placed: list[_Placed]) -> Scene:
     """The scene of the problem with obstacles where the page has them, without those that were removed."""
-    scene, there = problem.world.scene, {each.name: each for each in placed}
+    scene = problem.world.scene
+    there = {each.name: each for each in placed}
     known = {obstacle.name for obstacle in scene.obstacles}
     scene = scene.without(*(name for name, each in there.items() if name in known and not each.shown))
     moved = [_moved(obstacle, there.get(obstacle.name)) for obstacle in scene.obstacles]

@@ -42,7 +42,8 @@ def standing_parts(world: World) -> list[dict[str, Any]] | None:
 
 
 def _solids(body: Body) -> list[dict[str, Any]] | None:
-    around, placement = convex_solids(body.geometry).around, body.placement
+    around = convex_solids(body.geometry).around
+    placement = body.placement
     if not around or any(solid.kind != CONVEX_SOLID for solid in around):
         return None
     rounded = is_mesh(body.geometry)
@@ -93,7 +94,8 @@ def _planes(rows: NDArray[Any]) -> bytes:
 
 def _enclosed(body: Body) -> dict[str, Any]:
     """What an open mesh encloses, as cells in its own frame, and how the page comes from the world to these."""
-    found, box = enclosure(body.geometry), body.geometry.aabb_local
+    found = enclosure(body.geometry)
+    box = body.geometry.aabb_local
     return {
         "into": body.placement.inverse().homogeneous.ravel().tolist(),
         "low": box.min_.tolist(),

@@ -61,7 +61,8 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     problem, spare = _with_spares(problem, scene, side)
     room = room_between(problem.world, np.stack([problem.start, goal]), None) or Room(0.0, 0.0)
     world = leaving_room(densely_checked(problem).world, room)
-    module, motions = page_kernels(), world.motions
+    module = page_kernels()
+    motions = world.motions
     if module is None or motions is None:
         return None
     try:
@@ -73,7 +74,8 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     fixed = standing_parts(problem.world)
     if fixed is None or not {course["name"] for course in courses} <= {obstacle["name"] for obstacle in obstacles}:
         return None
-    still, (lower, upper) = JointPath.of(problem.robot, problem.start[None]), problem.robot.finite_range()
+    still = JointPath.of(problem.robot, problem.start[None])
+    lower, upper = problem.robot.finite_range()
     return {
         "module": packed(module),
         "image": packed(image.bytes()),
@@ -106,7 +108,8 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
 
 def _tips(problem: Problem, image: MemoryImage) -> list[dict[str, Any]]:
     """The tips that can be dragged, each with where its inverse kinematics stand, which are added to the image."""
-    robot, tips = problem.robot, []
+    robot = problem.robot
+    tips = []
     for name in dragged_tips(problem.robot, problem.goal):
         places = add_limb(image, robot if name == robot.tip else replace(robot, tip=name, closed_form=None))
         tips += [tip_entry(robot, name) | places] if places else []
@@ -145,7 +148,8 @@ def _with_spares(problem: Problem, scene: Scene, side: float) -> tuple[Problem, 
         "cylinder": Cylinder(0.5 * side, side),
         "capsule": Capsule(0.3 * side, side),
     }
-    far, spares = pose([0.0, 0.0, -FAR_AWAY]), []
+    far = pose([0.0, 0.0, -FAR_AWAY])
+    spares = []
     for key, count in SPARES.items():
         names = [name for name in (f"{key} {k}" for k in range(1, count + len(taken) + 1)) if name not in taken]
         spares += [Obstacle(name, shapes[key], far) for name in names[:count]]
@@ -158,10 +162,12 @@ def _names(world: World, numbers: Iterable[int]) -> str:
 
 def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str]) -> list[dict[str, Any]]:
     """The obstacles of simple shapes, which a page can move: how they are packed, and what is kept from each [m]."""
-    found, shapes = [], {obstacle.name: obstacle.shape for obstacle in world.scene.obstacles}
+    found = []
+    shapes = {obstacle.name: obstacle.shape for obstacle in world.scene.obstacles}
     for place, number in enumerate(fast.standing):
         body = world.bodies[number]
-        packed, shape = _packed_shape(body), shapes.get(body.name)
+        packed = _packed_shape(body)
+        shape = shapes.get(body.name)
         if packed is not None and shape is not None and shape.key in SPARES:
             placed = body.placement.homogeneous
             found.append(
@@ -190,7 +196,8 @@ def _packed_shape(body: Body) -> dict[str, Any] | None:
     core = None if body.kind != "obstacle" else core_of(body.geometry)
     if core is None or len(convex_solids(body.geometry).around) != 1:
         return None
-    kind, half = primitive_kind(body.geometry), core.half_sides
+    kind = primitive_kind(body.geometry)
+    half = core.half_sides
     if kind is None or kind >= layout.CENTRED_KINDS:
         return None
     return {

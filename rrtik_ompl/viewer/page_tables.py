@@ -61,7 +61,8 @@ def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[M
     Raises:
         InputError: If joints go farther than the kernels cover.
     """
-    image, fast = MemoryImage(BASE), motions.fast
+    image = MemoryImage(BASE)
+    fast = motions.fast
     for each in fast.tables:
         image.add(each)
     places = {
@@ -102,7 +103,8 @@ def _add_connect(image: MemoryImage, problem: Problem, motions: FastMotions) -> 
 
 def _add_crdt(image: MemoryImage, problem: Problem, world: World, motions: FastMotions) -> int:
     """The search that moves one joint at a time, with its trees."""
-    same, none = np.ones(motions.dof), np.zeros(motions.dof)
+    same = np.ones(motions.dof)
+    none = np.zeros(motions.dof)
     rules = CrdtRules(*problem.robot.finite_range(), same, none, same)
     root = problem.start[None]
     table, trees = CrdtSearch(world, rules, 1, None, root, root, vertices=VERTICES).tables

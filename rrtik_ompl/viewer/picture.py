@@ -37,7 +37,8 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
     """Draw a subject: arm in its first posture, obstacles, goal and trail (ghosts are the page's copies of the arm)."""
     recording = Recording()
     vis = recording.root
-    robot, scene = subject.robot, subject.scene
+    robot = subject.robot
+    scene = subject.scene
     if robot is None:
         frame = frame_around(None, scene, [mark.vertices for mark in subject.marks])
     else:

@@ -106,9 +106,12 @@ def _tips(robot: Robot, path: Matrix) -> Matrix:
 
 def _replaced(run: ReplanRun, numbers: list[int]) -> list[int]:
     """For each tick the number of the path that a repair has replaced a moment ago, or -1."""
-    found, last, until = [], -1, -1
+    found = []
+    last = -1
+    until = -1
     for k, tick in enumerate(run.ticks):
         if tick.event == "repair" and k and numbers[k - 1] != numbers[k]:
-            last, until = numbers[k - 1], k + int(SHOWN_SECONDS * run.rate)
+            last = numbers[k - 1]
+            until = k + int(SHOWN_SECONDS * run.rate)
         found.append(last if k <= until else -1)
     return found

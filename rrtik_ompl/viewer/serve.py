@@ -47,7 +47,8 @@ class PageServer:
         except (OSError, OverflowError, TypeError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"port {port}: cannot be used: {reason}; choose another one, or 0 for any") from error
-        self._server.body, self._server.answer = text.encode("utf-8"), answer
+        self._server.body = text.encode("utf-8")
+        self._server.answer = answer
         self._thread = threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
 
     @property

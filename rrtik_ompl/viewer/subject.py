@@ -161,12 +161,14 @@ def subject_of(
             raise InputError("view: a path needs a robot; show a problem, a world or a robot instead of a scene alone")
         return Subject("Scene", None, shown, None, frozen(np.empty((0, 0))), False, marks=marks)
     if isinstance(shown, Robot):
-        robot, scene = shown, Scene()
+        robot = shown
+        scene = Scene()
     else:
         world: Any = getattr(shown, "world", shown)
         if not isinstance(getattr(world, "robot", None), Robot) or not isinstance(getattr(world, "scene", None), Scene):
             raise InputError(f"view: cannot show a {type(shown).__name__}; give a problem, world, robot or scene")
-        robot, scene = world.robot, world.scene
+        robot = world.robot
+        scene = world.scene
     subject = _posture(shown, robot, scene)
     if ghosts is not None:
         subject = replace(subject, ghosts=_path(robot, ghosts).waypoints)

@@ -59,7 +59,8 @@ def run_of(played: PlayedTask) -> ReplanRun:
     kept = _kept(plan)
     ticks: list[Tick] = []
     for number, q in zip(played.motions.tolist(), played.waypoints, strict=True):
-        path, world = plan.paths[number], plan.worlds[number]
+        path = plan.paths[number]
+        world = plan.worlds[number]
         text = f"motion {number + 1} of {len(plan.paths)}: {plan.stages[number]}"
         poses = {name: pose_row(place) for name, place in _places(world, q).items() if name not in kept}
         ticks.append(Tick(len(ticks) / played.rate, q, "walk", path.waypoints, poses, {}, reason=text))

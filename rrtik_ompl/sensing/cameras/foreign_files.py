@@ -105,7 +105,8 @@ def _first(storage: cv2.FileStorage, names: tuple[str, ...], read: Callable[[cv2
 
 
 def _camera(matrix: ArrayLike, lens: ArrayLike, width: float, height: float) -> Camera:
-    numbers, rest = np.ravel(np.asarray(lens, dtype=np.float64)), 5
+    numbers = np.ravel(np.asarray(lens, dtype=np.float64))
+    rest = 5
     if np.any(numbers[rest:]):
         raise InputError(
             f"the lens has {len(numbers)} coefficients; five are modelled: k1, k2, p1, p2, k3; calibrate with these"

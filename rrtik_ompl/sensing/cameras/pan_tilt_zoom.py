@@ -74,7 +74,8 @@ class PanTiltZoom:
             raise InputError("cameras of one zoom lens have one size of pictures")
         self.T_base_head = rigid(T_base_head, "pose of the head")
         self.T_head_camera = rigid(T_head_camera, "pose of the camera on its head")
-        self._pan, self._tilt = pan, tilt
+        self._pan = pan
+        self._tilt = tilt
 
     def pose(self, pan: float, tilt: float) -> pin.SE3:
         """``T_base_camera`` for counts of pan and tilt."""
@@ -98,7 +99,8 @@ class PanTiltZoom:
         low = int(np.clip(np.searchsorted(self.zooms, at, side="right") - 1, 0, max(len(self.zooms) - 2, 0)))
         high = min(low + 1, len(self.zooms) - 1)
         share = (at - self.zooms[low]) / (self.zooms[high] - self.zooms[low]) if high > low else 0.0
-        first, second = self.cameras[low], self.cameras[high]
+        first = self.cameras[low]
+        second = self.cameras[high]
         matrix = (1.0 - share) * first.matrix + share * second.matrix
         for k in range(2):
             matrix[k, k] = first.matrix[k, k] ** (1.0 - share) * second.matrix[k, k] ** share

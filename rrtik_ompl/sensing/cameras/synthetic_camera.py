@@ -127,7 +127,8 @@ def _draw(picture: NDArray[np.float32], camera: Camera, pose: pin.SE3, sheet: Pr
 
 def _seen(rays: Matrix, pose: pin.SE3, sheet: Print, brightness: NDArray[np.float32]) -> NDArray[np.float32]:
     """Brightness of the print where rays meet it, NaN where they miss it. Shape (m,)."""
-    directions, normal = np.c_[rays, np.ones(len(rays))], pose.rotation[:, 2]
+    directions = np.c_[rays, np.ones(len(rays))]
+    normal = pose.rotation[:, 2]
     with np.errstate(divide="ignore"):
         depth = (normal @ pose.translation) / (directions @ normal)
     points = (directions * depth[:, None] - pose.translation) @ pose.rotation

@@ -139,7 +139,8 @@ def _laid_over(
         Where the piece of the picture begins that was looked at, corners of the pattern in the ideal picture, and the
         fit; None if it does not converge.
     """
-    count, side = len(framed) - 2, float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
+    count = len(framed) - 2
+    side = float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
     cell = int(np.clip(round(side / count), *sizes))
     rim = round(_RIM_CELLS * cell)
     square = np.array([[0, 0], [count, 0], [count, count], [0, count]], dtype=np.float64) * cell + rim - 0.5
@@ -172,7 +173,8 @@ def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | Non
             look = look._replace(tone=LINEAR)
         if (before is not None or number > 1) and _as_before(look, best.look):
             break
-        best, known = _fit(ideal, piece, best.homography, look), True
+        best = _fit(ideal, piece, best.homography, look)
+        known = True
     return best._replace(look=best.look._replace(likeness=best.likeness))
 
 
@@ -244,7 +246,8 @@ def _ideal(framed: NDArray[np.uint8], cell: int, rim: int) -> Pixels:
 def _spread(homography: Pixels, shape: tuple[int, ...]) -> Matrix:
     """Covariance, in the middle of the ideal marker, of what a round spot in the picture covers. Shape (2, 2)."""
     middle = np.array([0.5 * (shape[1] - 1), 0.5 * (shape[0] - 1), 1.0])
-    (x, y), bottom = homography[:2] @ middle, homography[2] @ middle
+    x, y = homography[:2] @ middle
+    bottom = homography[2] @ middle
     slope = (homography[:2, :2] - np.outer([x, y], homography[2, :2]) / bottom) / bottom
     back = np.linalg.inv(slope)
     return np.asarray(back @ back.T, dtype=np.float64)

@@ -90,6 +90,7 @@ class Chessboard:
                     grid[row + a : row + a + side, column + b : column + b + side] for a in (0, 1) for b in (0, 1)
                 )
                 across, down = np.rint(middles).astype(np.intp).reshape(-1, 2).T
-                seen, inner = gray[down, across], odd[1:-1, 1:-1].ravel()
+                seen = gray[down, across]
+                inner = odd[1:-1, 1:-1].ravel()
                 white = odd == bool(seen[inner].mean() > seen[~inner].mean())
                 yield np.array([grid[end] for end in ends]), np.where(white, 255, 0).astype(np.uint8)

@@ -104,7 +104,10 @@ def pose_of_square(
     refined = [_refined(camera, points, pixels, guess) for guess in guesses]
     errors = [_error(camera, points, pixels, pose) for pose in refined]
     best = int(np.argmin(errors))
-    first, error, other, other_error = refined[best], errors[best], None, np.inf
+    first = refined[best]
+    error = errors[best]
+    other = None
+    other_error = np.inf
     if len(guesses) > 1:
         merged = turn_between(first, refined[1 - best]) < MIN_BRANCH_ANGLE
         other = max(guesses, key=lambda guess: turn_between(first, guess)) if merged else refined[1 - best]
@@ -135,7 +138,8 @@ def pose_of_points(
 
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
     """Poses in closed form that explain the pixels, best first."""
-    rows, seen = np.ascontiguousarray(points), np.ascontiguousarray(pixels)
+    rows = np.ascontiguousarray(points)
+    seen = np.ascontiguousarray(pixels)
     _, turns, shifts, _ = cv2.solvePnPGeneric(rows, seen, camera.matrix, camera.distortion, flags=method)
     found = [pin.SE3(cv2.Rodrigues(r)[0], t.ravel()) for r, t in zip(turns, shifts, strict=True)]
     return [T for T in found if _plausible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
@@ -150,7 +154,8 @@ def _plausible(pose: pin.SE3, facing: bool) -> bool:
 
 def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> pin.SE3:
     """The nearby pose of least error: Levenberg's steps about the axes of the camera, kept where they help."""
-    damping, error = 1e-6, _error(camera, points, pixels, pose)
+    damping = 1e-6
+    error = _error(camera, points, pixels, pose)
     for _ in range(_MAX_STEPS):
         turned = points @ pose.rotation.T
         slopes = camera.jacobian(turned, pose.translation)
@@ -161,7 +166,9 @@ def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> p
         better = _error(camera, points, pixels, tried)
         gain = error - better
         if gain > 0.0:
-            pose, error, damping = tried, better, 0.1 * damping
+            pose = tried
+            error = better
+            damping = 0.1 * damping
         else:
             damping *= 100.0
         if abs(gain) <= 1e-9 * error or damping > 1e3:
@@ -194,7 +201,8 @@ def _covariance(
     camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, known: tuple[Matrix, Matrix]
 ) -> tuple[Matrix, float]:
     """Of (position, rotation), larger where the points deviate from their pixels by more than they should; how much."""
-    turned, (found, doubted) = points @ pose.rotation.T, known
+    turned = points @ pose.rotation.T
+    found, doubted = known
     slopes = camera.jacobian(turned, pose.translation)
     back = np.linalg.pinv(slopes)
     away = (camera.project(turned + pose.translation) - pixels).ravel()
@@ -209,11 +217,13 @@ def _strain(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, known
     """Squared deviations that another focal length or another k1 would explain: their score tests [69]."""
     turned = points @ pose.rotation.T
     seen = turned + pose.translation
-    away, slopes = (camera.project(seen) - pixels).ravel(), camera.jacobian(turned, pose.translation)
+    away = (camera.project(seen) - pixels).ravel()
+    slopes = camera.jacobian(turned, pose.translation)
     own = camera.own_slopes(seen)
     lens = np.c_[own[:, :2] @ camera.matrix[[0, 1], [0, 1]], own[:, 4]]
     weighed = np.linalg.solve(known[0] + known[1], np.c_[away, slopes, lens])
     lever = slopes.T @ weighed
     freed = weighed - weighed[:, 1:7] @ np.linalg.solve(lever[:, 1:7], lever)  # of what another pose explains
-    score, told = lens.T @ freed[:, 0], np.einsum("ij,ij->j", lens, freed[:, 7:])
+    score = lens.T @ freed[:, 0]
+    told = np.einsum("ij,ij->j", lens, freed[:, 7:])
     return float((score**2 / np.maximum(told, 1e-9)).max())

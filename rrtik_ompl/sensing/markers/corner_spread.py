@@ -41,10 +41,12 @@ def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) 
     """
     every = max(len(model) // _FEW, 1)
     columns = _columns(model, square, corners, every)
-    light, shape = seen[::every, ::every].ravel().astype(np.float64), columns.shape[:2]
+    light = seen[::every, ::every].ravel().astype(np.float64)
+    shape = columns.shape[:2]
     columns = columns.reshape(len(light), -1)
     repeated = max(_area(square) / _area(corners) / every**2, 1.0)  # samples of one pixel err alike
-    normal, right = columns.T @ columns, columns.T @ light
+    normal = columns.T @ columns
+    right = columns.T @ light
     normal += np.diag(_TINY * normal.diagonal() + _TINY)
     whole = np.linalg.inv(normal)
     found = whole @ right
@@ -62,13 +64,18 @@ def _columns(model: Pixels, square: Matrix, corners: Matrix, every: int) -> Matr
 
     Of one sample among ``every`` along each side.
     """
-    across, down = _slope(model, 1, 0), _slope(model, 0, 1)
+    across = _slope(model, 1, 0)
+    down = _slope(model, 0, 1)
     blurs = [_slope(across, 1, 0), _slope(across, 0, 1), _slope(down, 0, 1)]
-    across, down, model = across[::every, ::every], down[::every, ::every], model[::every, ::every]
+    across = across[::every, ::every]
+    down = down[::every, ::every]
+    model = model[::every, ::every]
     blurs = [each[::every, ::every] for each in blurs]
     x, y = _places(*model.shape, every)
-    low, high = square[0], square[2]
-    u, v = (2.0 * x - low[0] - high[0]) / (high[0] - low[0]), (2.0 * y - low[1] - high[1]) / (high[1] - low[1])
+    low = square[0]
+    high = square[2]
+    u = (2.0 * x - low[0] - high[0]) / (high[0] - low[0])
+    v = (2.0 * y - low[1] - high[1]) / (high[1] - low[1])
     # Motions of second order that no homography has: those of homographies are (u u, u v) and (u v, v v).
     bends = [across * v * v, down * u * u, across * u * u - down * u * v, across * u * v - down * v * v]
     more = [np.ones(model.shape), model, np.hypot(across, down), *blurs, *bends]
@@ -99,7 +106,8 @@ def _blocks(height: int, width: int) -> tuple[NDArray[np.intp], NDArray[np.intp]
 
 
 def _area(corners: Matrix) -> float:
-    (a, b), (c, d) = corners[2] - corners[0], corners[3] - corners[1]
+    a, b = corners[2] - corners[0]
+    c, d = corners[3] - corners[1]
     return 0.5 * abs(float(a * d - b * c))
 
 
@@ -118,8 +126,10 @@ def _slopes(across: Matrix, down: Matrix, places: tuple[Matrix, Matrix], square:
 def _perspectives(before: Matrix, after: Matrix) -> Matrix:
     """The homographies that lead four points to four others, in float64. Each of shape (k, 4, 2); (k, 3, 3)."""
     count = len(before)
-    (x, y), (u, v) = np.moveaxis(before, 2, 0), np.moveaxis(after, 2, 0)
-    one, none = np.ones((count, 4)), np.zeros((count, 4))
+    x, y = np.moveaxis(before, 2, 0)
+    u, v = np.moveaxis(after, 2, 0)
+    one = np.ones((count, 4))
+    none = np.zeros((count, 4))
     rows = np.concatenate([
         np.stack([x, y, one, none, none, none, -u * x, -u * y], axis=2),
         np.stack([none, none, none, x, y, one, -v * x, -v * y], axis=2),

@@ -111,7 +111,8 @@ def find_markers(
     if numbers is None:
         return ()
     for k in np.argsort(np.ravel(numbers), kind="stable"):
-        number, rough = int(np.ravel(numbers)[k]), corners[k].reshape(4, 2).astype(np.float64)
+        number = int(np.ravel(numbers)[k])
+        rough = corners[k].reshape(4, 2).astype(np.float64)
         rough = np.roll(rough, 2 if _is_turned(dictionary) else 0, axis=0)
         if not align:
             found.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
@@ -123,7 +124,8 @@ def find_markers(
 
 def _again(gray: NDArray[np.uint8], before: Sequence[SeenMarker]) -> tuple[Any, Any]:
     """Corners and numbers of what the picture before showed, searched for around its place; None where one is not."""
-    corners, numbers = [], []
+    corners = []
+    numbers = []
     for marker in before:
         around = int(_NEAR_SIDES * marker.side) + _NEAR_PIXELS
         low = np.maximum(np.floor(marker.corners.min(axis=0)).astype(int) - around, 0)

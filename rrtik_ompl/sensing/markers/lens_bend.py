@@ -30,7 +30,8 @@ def lens_bend(camera: Camera, corners: Matrix, side: float) -> Matrix:
     at = pose_of_square(camera, corners, side).T_camera_object
     row = 0.5 * _RIM * side * np.linspace(-1.0, 1.0, _PLACES)
     x, y = (each.ravel() for each in np.meshgrid(row, row))
-    flat, square = np.c_[x, y], square_corners(side)
+    flat = np.c_[x, y]
+    square = square_corners(side)
     pixels = camera.project(np.c_[flat, np.zeros(len(flat))] @ at.rotation.T + at.translation)
     homography, _ = cv2.findHomography(flat, pixels, 0)
     back = cv2.perspectiveTransform(np.ascontiguousarray(pixels)[:, None], np.linalg.inv(homography))[:, 0]
@@ -46,7 +47,8 @@ def lens_bend(camera: Camera, corners: Matrix, side: float) -> Matrix:
 def _motions(places: Matrix) -> tuple[Matrix, Matrix]:
     """Small motions of a plane, x and y by themselves: those of homographies, then four bends. Shapes (m, 12)."""
     u, v = places.T
-    none, one = np.zeros(len(u)), np.ones(len(u))
+    none = np.zeros(len(u))
+    one = np.ones(len(u))
     along = [one, u, v, none, none, none, u * u, u * v, v * v, none, u * u, u * v]
     across = [none, none, none, one, u, v, u * v, v * v, none, u * u, -u * v, -v * v]
     return np.stack(along, axis=1), np.stack(across, axis=1)

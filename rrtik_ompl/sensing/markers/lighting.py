@@ -60,7 +60,8 @@ def _shown(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Pixels:
     normal[:, 3:, :3] = normal[:, :3, 3:]
     inside = (even * whole).T
     right = np.empty((max(len(shares), len(tones)), 6))
-    right[:, :3], right[:, 3:] = lights @ inside, (lights * shares) @ inside
+    right[:, :3] = lights @ inside
+    right[:, 3:] = (lights * shares) @ inside
     weights = np.linalg.solve(normal + 1e-3 * np.eye(6), right[..., None])[..., 0].astype(np.float32)
     made = weights[:, :3] @ even + shares * (weights[:, 3:] @ even)
     if len(tones) == 1:

@@ -101,7 +101,8 @@ def print_board(
     fine = 100  # cells a square: the side of a marker becomes a whole number of them to 1 %
     picture = np.asarray(board.generateImage((columns * fine, rows * fine), marginSize=0, borderBits=1), dtype=np.uint8)
     caption = f"ChArUco {columns} x {rows}, {dictionary}, squares {1e3 * square:g} mm, markers {1e3 * marker:g} mm"
-    x, y = 0.5 * (width - columns * square), height - EDGE - rows * square
+    x = 0.5 * (width - columns * square)
+    y = height - EDGE - rows * square
     _write(path, [[_Tile(picture, x, y, square / fine, caption, y - CAPTION)]], (width, height), dots_per_inch)
 
 
@@ -129,7 +130,8 @@ def _write(
         write_bytes(file, made.getvalue())
         return
     for k, figure in enumerate(figures):
-        target, made = file if len(figures) == 1 else file.with_stem(f"{file.stem}-{k + 1}"), BytesIO()
+        target = file if len(figures) == 1 else file.with_stem(f"{file.stem}-{k + 1}")
+        made = BytesIO()
         figure.savefig(made, format=file.suffix[1:].lower(), dpi=dots_per_inch)
         write_bytes(target, made.getvalue())
 

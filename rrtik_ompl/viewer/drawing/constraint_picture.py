@@ -57,7 +57,8 @@ def _cone(length: float, radius: float) -> tuple[Matrix, NDArray[np.int64]]:
     """A cone that opens along z from its tip: corners and faces, shapes (n, 3)."""
     angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(SIDES, length)])
-    around, following = np.arange(SIDES) + 1, np.roll(np.arange(SIDES) + 1, -1)
+    around = np.arange(SIDES) + 1
+    following = np.roll(np.arange(SIDES) + 1, -1)
     faces = np.column_stack([np.zeros(SIDES, dtype=np.int64), following, around])
     lid = np.column_stack([np.full(SIDES, SIDES + 1), around, following])
     return np.vstack([np.zeros(3), rim, [0.0, 0.0, length]]), np.vstack([faces, lid])

@@ -55,16 +55,20 @@ def frame_around(
     boxes = [obstacle_corners(o) for o in scene.obstacles if o.shape.bounded]
     if arm_points is None or len(arm_points) == 0:
         everything = np.concatenate([*boxes, *extra, *([] if boxes or extra else [EMPTY_BOX])])
-        low, high = everything.min(axis=0), everything.max(axis=0)
+        low = everything.min(axis=0)
+        high = everything.max(axis=0)
         return Frame(low, high, max(float(np.linalg.norm(high - low)), 1e-3))
     points = np.concatenate([arm_points, *extra])
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     arm = max(float(np.linalg.norm(high - low)), 1e-3)
-    near_low, near_high = low - SURROUNDINGS_MARGIN * arm, high + SURROUNDINGS_MARGIN * arm
+    near_low = low - SURROUNDINGS_MARGIN * arm
+    near_high = high + SURROUNDINGS_MARGIN * arm
     for corners in boxes:
         if not whole and float(np.ptp(corners, axis=0).max()) > SURROUNDINGS_RATIO * arm:
             corners = np.clip(corners, near_low, near_high)
-        low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
+        low = np.minimum(low, corners.min(axis=0))
+        high = np.maximum(high, corners.max(axis=0))
     return Frame(low, high, max(arm, 0.1 * float(np.linalg.norm(high - low))))
 
 

@@ -89,7 +89,8 @@ def cubes(
         size: Side of a cell [m].
         **options: ``opacity`` and ``shown`` of the `Mark`.
     """
-    origin, pieces = np.asarray(corner, dtype=np.float64), []
+    origin = np.asarray(corner, dtype=np.float64)
+    pieces = []
     filled = np.pad(inside, 1)
     for axis in range(3):
         for side in (0, 1):
@@ -114,7 +115,9 @@ def draw_marks(vis: Node, marks: Iterable[Mark]) -> None:
 
 
 def _joined(name: str, color: str, bodies: Iterable[tuple[Matrix, Faces]], options: MarkOptions) -> Mark:
-    vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0
+    vertices = [np.empty((0, 3))]
+    faces = [np.empty((0, 3), dtype=np.int64)]
+    count = 0
     for points, triangles in bodies:
         vertices.append(points)
         faces.append(np.asarray(triangles, dtype=np.int64) + count)

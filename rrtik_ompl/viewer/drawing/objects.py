@@ -127,10 +127,12 @@ class Material:
 def described_object(path: str, geometry: Geometry, material: Material) -> dict[str, Any]:
     """A solid with its material; all parts are named after its path, so that the same picture gives the same bytes."""
     names = {part: f"{path}/{part}" for part in ("geometry", "material")}
-    kind, look = "Mesh", material.described()
+    kind = "Mesh"
+    look = material.described()
     if isinstance(geometry, PointGeometry):
         seen = {name: look[name] for name in ("color", "opacity", "transparent")}
-        kind, look = "Points", {"type": "PointsMaterial", "size": 2.0 * geometry.radius, **seen}
+        kind = "Points"
+        look = {"type": "PointsMaterial", "size": 2.0 * geometry.radius, **seen}
     return {
         "metadata": {"version": 4.5, "type": "Object"},
         "geometries": [{"uuid": names["geometry"], **geometry.described()}],

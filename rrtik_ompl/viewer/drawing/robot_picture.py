@@ -107,7 +107,8 @@ def attached_parts(robot: Robot, attached: Sequence[AttachedObject]) -> list[Par
 
 def nodes_of(robot: Robot, scene: Scene, names: Collection[str]) -> list[list[str]]:
     """Where links, attached objects and obstacles of these names are drawn: steps of paths in the scene tree."""
-    joints, frames = joint_nodes(robot), robot.model.frames
+    joints = joint_nodes(robot)
+    frames = robot.model.frames
     solids = (*robot.visual.geometryObjects, *robot.collision.geometryObjects)
     links = {(joints[s.parentJoint], node_name(s.name)) for s in solids if frames[s.parentFrame].name in names}
     held = {(joints[p.joint], p.name) for p in attached_parts(robot, [a for a in scene.attached if a.name in names])}

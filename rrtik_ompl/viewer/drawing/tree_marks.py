@@ -26,7 +26,8 @@ def tree_marks(run: TreeSearch, *, unit: float = 1.0) -> list[Mark]:
         InputError: If ``run`` is something else.
     """
     require(run, TreeSearch, "tree to show")
-    reach, goal = run.links.reach * unit, _in_space(run.goal[None]) * unit
+    reach = run.links.reach * unit
+    goal = _in_space(run.goal[None]) * unit
     marks = []
     for index in range(1, run.links.count + 1):
         color = palette.SERIES[(index - 1) % len(palette.SERIES)]

@@ -24,11 +24,13 @@ def split_creases(vertices: Matrix, faces: Faces, angle: float = CREASE) -> tupl
     Returns:
         Vertices, shape (n', 3) with n' >= n used ones, and faces, shape (m, 3), in the same order.
     """
-    start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)  # half-edge h starts at corner h
+    start = faces.reshape(-1)
+    end = np.roll(faces, -1, axis=1).reshape(-1)  # half-edge h starts at corner h
     first, second = _half_edge_pairs(start, end, len(vertices))
     normals = _unit_normals(vertices, faces)
     smooth = np.einsum("ij,ij->i", normals[first // 3], normals[second // 3]) > np.cos(angle)
-    first, second = first[smooth], second[smooth]
+    first = first[smooth]
+    second = second[smooth]
     opposed = start[first] == end[second]
     at_start = np.where(opposed, _next_corner(second), second)
     at_end = np.where(opposed, second, _next_corner(second))
@@ -45,7 +47,8 @@ def thin_out(vertices: Matrix, faces: Faces, limit: int) -> tuple[Matrix, Faces]
     """
     extent = float(np.ptp(vertices, axis=0).max())
     cell = extent / 400.0
-    thin_vertices, thin_faces = vertices, faces
+    thin_vertices = vertices
+    thin_faces = faces
     while len(thin_faces) > limit and cell < extent:
         thin_vertices, thin_faces = _cluster(vertices, faces, cell)
         cell *= max(1.1, 0.9 * np.sqrt(len(thin_faces) / limit))  # the number of triangles goes with the cell's area
@@ -71,7 +74,8 @@ def tube(points: Matrix, radius: float, sides: int = 8) -> tuple[Matrix, Faces]:
 def box_corners(points: ArrayLike) -> Matrix:
     """The eight corners of the axis-aligned box around points, shape (8, 3)."""
     rows = np.asarray(points, dtype=np.float64)
-    low, high = rows.min(axis=0), rows.max(axis=0)
+    low = rows.min(axis=0)
+    high = rows.max(axis=0)
     pick = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], dtype=bool)
     corners: Matrix = np.where(pick, high, low)
     return corners

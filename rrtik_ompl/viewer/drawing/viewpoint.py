@@ -22,7 +22,8 @@ def overview(points: Matrix, scene: Scene) -> Vector:
         scene: Its obstacles hide what lies behind the boxes around them.
     """
     obstacles = [o for o in scene.obstacles if o.shape.bounded]
-    best, least = direction(0.0, float(ELEVATIONS[0])), np.inf
+    best = direction(0.0, float(ELEVATIONS[0]))
+    least = np.inf
     for elevation in ELEVATIONS:
         for turn in TURNS:
             away = direction(float(turn), float(elevation))
@@ -32,7 +33,8 @@ def overview(points: Matrix, scene: Scene) -> Vector:
             extra = TURN_COST * (abs(turn) / (0.5 * np.pi) + (elevation > ELEVATIONS[0]))
             cost = (float(hidden.mean()) if len(points) else 0.0) + float(extra)
             if cost < least - 1e-9:
-                best, least = away, cost
+                best = away
+                least = cost
     return best
 
 
@@ -49,7 +51,8 @@ def behind(points: Matrix, away: Vector, obstacle: Obstacle) -> Mask:
     local = (points - obstacle.pose.translation) @ rotation.T
     ray = rotation @ away
     ray = np.where(np.abs(ray) < 1e-12, 1e-12, ray)
-    to_low, to_high = (corners.min(axis=0) - local) / ray, (corners.max(axis=0) - local) / ray
+    to_low = (corners.min(axis=0) - local) / ray
+    to_high = (corners.max(axis=0) - local) / ray
     enter = np.minimum(to_low, to_high).max(axis=1)
     leave = np.maximum(to_low, to_high).min(axis=1)
     hit: Mask = (leave >= enter) & (leave > 1e-9)

@@ -42,7 +42,8 @@ def plot_distances(
     panel = figure.subplots()
     for k, (name, run) in enumerate(runs.items()):
         counts = f"{name}: {len(run.q)} points in {run.generations} generations"
-        over, distance = np.arange(1, run.generations + 1), MILLIMETRES * np.maximum(run.distances, LEAST)
+        over = np.arange(1, run.generations + 1)
+        distance = MILLIMETRES * np.maximum(run.distances, LEAST)
         panel.plot(over, distance, color=COLORS[k % len(COLORS)], linewidth=0.9, label=counts)
     if tolerance is not None:
         panel.axhline(MILLIMETRES * tolerance, color="#1d2733", linewidth=1.0, linestyle="dashed", label="tolerance")

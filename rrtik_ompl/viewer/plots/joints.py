@@ -85,7 +85,8 @@ def save_figure(figure: Figure, file: str | os.PathLike[str], *, dpi: int = 150)
     """
     import matplotlib
 
-    ending, picture = known_ending(file, FORMATS, "plot"), BytesIO()
+    ending = known_ending(file, FORMATS, "plot")
+    picture = BytesIO()
     metadata = {"Date": None} if ending == ".svg" else {}
     with matplotlib.rc_context({"svg.hashsalt": "rrtik", "svg.fonttype": "none"}):
         figure.savefig(picture, format=ending[1:], dpi=dpi, metadata=metadata)

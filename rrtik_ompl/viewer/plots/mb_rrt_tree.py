@@ -58,8 +58,10 @@ def _region(panel: Axes, run: TreeSearch, index: int) -> None:
     """The ring about the goal in which the joint of an index can be part of a solution."""
     from matplotlib.patches import Annulus, Circle
 
-    far, near = float(run.links.remaining[index]), float(run.links.folded[index])
-    x, y = float(run.goal[0]), float(run.goal[1])
+    far = float(run.links.remaining[index])
+    near = float(run.links.folded[index])
+    x = float(run.goal[0])
+    y = float(run.goal[1])
     width = min(far - near, 0.999 * far)
     if width > 1e-3 * run.links.reach:
         panel.add_patch(Annulus((x, y), far, width, facecolor=_color(index), alpha=0.05, edgecolor="none", zorder=0))
