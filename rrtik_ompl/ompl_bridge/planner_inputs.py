@@ -10,11 +10,11 @@ import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.results import IllPosed
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.world.motion_queries import Stop
 
 GOAL_SAMPLES = 32  # how often a goal that can give any number of configurations is sampled
 WAIT_FOR_GOAL = 0.002  # [s] between two samples of a goal that is still computing its first sample

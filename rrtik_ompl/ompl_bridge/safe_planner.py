@@ -19,6 +19,7 @@ from ompl import base as ob
 from ompl import util as ou
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, whole_number
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import PlannerError
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
@@ -30,7 +31,7 @@ from rrtik_ompl.ompl_bridge.results import Failure, IllPosed, SearchResult, expl
 from rrtik_ompl.ompl_bridge.spaces.coordinates import coordinates_of
 from rrtik_ompl.ompl_bridge.spaces.unrolled import Unrolled
 from rrtik_ompl.ompl_bridge.states import StateIO
-from rrtik_ompl.world.motion_queries import MotionQueries, Stop, turning_joints
+from rrtik_ompl.world.motion_queries import MotionQueries, turning_joints
 from rrtik_ompl.world.route_check import route_violations, verification_resolution
 from rrtik_ompl.world.world import World
 

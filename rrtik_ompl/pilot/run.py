@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import cv2
 import numpy as np
 
+from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
@@ -17,7 +18,6 @@ from rrtik_ompl.pilot.interlock import Sight
 from rrtik_ompl.pilot.machine import VERBS
 from rrtik_ompl.pilot.web.handlers import MAX_PAGES
 from rrtik_ompl.pilot.web.server import PilotServer
-from rrtik_ompl.world.motion_queries import Stop, no_stop
 
 PERIOD_SECONDS = 1.0 / 32.0  # a little less than a camera's, so that none of its pictures is left out
 CAMERA = "C"  # kinds of pictures, see `web.server`

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.connect_layout import KERNELS as CONNECT_KERNELS
 from rrtik_ompl.kernels.search.shortcut import ShortcutSearch
@@ -19,7 +20,7 @@ from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as CUT_KERNELS
 from rrtik_ompl.model.transitions import without_repeats
 from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect
 from rrtik_ompl.planning.search.tree import ConfigurationTree
-from rrtik_ompl.world.motion_queries import KernelWorld, MotionFree, MotionQueries, Stop
+from rrtik_ompl.world.motion_queries import KernelWorld, MotionFree, MotionQueries
 
 KERNELS = (CONNECT_KERNELS, CUT_KERNELS)  # libraries that replanning in kernels needs
 ITERATIONS = 4000  # samples of one search at most, so that the same seed gives the same run

@@ -15,10 +15,11 @@ from typing import ClassVar
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.base.choices import Replanner
 from rrtik_ompl.model.transitions import part_counts, subdivided, without_repeats
 from rrtik_ompl.replanning.connecting import Connect, Joined, PythonConnect
-from rrtik_ompl.world.motion_queries import MotionQueries, Stop, no_stop
+from rrtik_ompl.world.motion_queries import MotionQueries
 
 MAX_CUTS = 24  # shortcut ends that are tried from one point of a path
 STRAIGHT_TOLERANCE = 1e-9  # change of the unit direction

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.repair import PathRepair
 from rrtik_ompl.replanning.connecting import CUTS, ITERATIONS, PATIENCE, KernelConnect, KernelCuts
 from rrtik_ompl.replanning.drrt_con import DrrtCon
-from rrtik_ompl.world.motion_queries import MotionQueries, Stop, has_kernels, no_stop
+from rrtik_ompl.world.motion_queries import MotionQueries, has_kernels
 from rrtik_ompl.world.moving_world import MovingWorld
 
 REPAIR_CUTS, REPAIR_PATIENCE = 16, 6  # as CUTS and PATIENCE, where only a detour is new; walking shortens it further

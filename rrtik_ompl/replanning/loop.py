@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_number
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.choices import TickEvent
 from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.goal import JOINT_TOLERANCE
@@ -30,7 +31,6 @@ from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_g
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.world.kept_clearance import CLEARANCE
-from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld, check_held
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World

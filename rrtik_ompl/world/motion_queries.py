@@ -16,6 +16,7 @@ from typing import Protocol, TypeAlias, TypeGuard
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.kernels import FastWorld
@@ -25,7 +26,6 @@ from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.robot import Chain, Robot
 
 MotionFree: TypeAlias = Callable[[Vector, Vector], bool]  # as MotionQueries.motion_valid
-Stop: TypeAlias = Callable[[], object]  # true when it is time to stop
 
 LARGEST_BATCH = 1024  # motions
 FIRST_BATCH = 64
@@ -156,11 +156,6 @@ def turning_joints(world: object) -> Mask | None:
     """Which joints of a world's arm turn, shape (n,); None for a stand-in without an arm, or no world."""
     robot = getattr(world, "robot", None)
     return ~robot.prismatic if isinstance(robot, Robot) else None
-
-
-def no_stop() -> bool:
-    """It is never time to stop."""
-    return False
 
 
 class OutOfTime(Exception):

@@ -5,6 +5,7 @@ import time
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.budget import no_stop
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS
 from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect, extend, path_between, reach, straight_path
 from rrtik_ompl.planning.search.tree import ConfigurationTree
@@ -17,7 +18,6 @@ from rrtik_ompl.world.motion_queries import (
     OutOfTime,
     has_kernels,
     is_conservative,
-    no_stop,
 )
 
 LOW, HIGH = np.zeros(2), np.full(2, 10.0)

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.transitions import merge_moves
-from rrtik_ompl.world.motion_queries import MotionsFree, Stop, no_stop
+from rrtik_ompl.world.motion_queries import MotionsFree
 
 PART, LONGER = 16, 4  # moves of the first parts that are cut, and how many times longer they are the next time
 FIRST_TESTS, MORE_TESTS = 4, 4  # waypoints tried together from a pivot, and how many times more the next time

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.transitions import lower_bound, route_length, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_cut, check_once, double_axis_cut
-from rrtik_ompl.world.motion_queries import MotionsFree, Stop, no_stop
+from rrtik_ompl.world.motion_queries import MotionsFree
 
 MAX_CUT_ROUNDS = 20
 

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import no_stop
 from rrtik_ompl.model.transitions import edge_keys, merge_moves, transitions
 from rrtik_ompl.planning.moves.axis_cut import cut_parts, double_axis_cut
 from rrtik_ompl.planning.moves.lattice import MoveLattice
 from rrtik_ompl.planning.moves.rules import long_enough
 from rrtik_ompl.planning.moves.values import Values, lattice_size, within_travel
-from rrtik_ompl.world.motion_queries import BatchedMotionQueries, no_stop
+from rrtik_ompl.world.motion_queries import BatchedMotionQueries
 
 DIGITS = 9  # of the travel after the point; the rest is rounding
 NONE = 2**31  # moves, if there is no route

@@ -14,9 +14,9 @@ from typing import TypeAlias
 import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.geometry.collision.overlap_depth import OverlapDepth
 from rrtik_ompl.model.transitions import moved
-from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.world import World
 
 MOST_WORK = 4096  # parts of a range, times the corners of the other joints

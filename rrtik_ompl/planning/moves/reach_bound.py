@@ -13,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.geometry.collision.overlap_depth import OverlapDepth
 from rrtik_ompl.model.transitions import SAME
-from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.world import World
 
 CELLS = (64, 128, 256)  # along each joint, one division after the other; each is cut into the next

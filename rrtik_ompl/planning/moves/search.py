@@ -15,12 +15,13 @@ from typing import TypeAlias
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_moves
 from rrtik_ompl.planning.moves.best_route import BestRoute
 from rrtik_ompl.planning.moves.staircase import staircase_orders
 from rrtik_ompl.planning.moves.values import Values, lattice_size, near_values, values_of, with_spread
-from rrtik_ompl.world.motion_queries import BatchedMotionQueries, MotionsFree, OutOfTime, Stop, no_stop
+from rrtik_ompl.world.motion_queries import BatchedMotionQueries, MotionsFree, OutOfTime
 
 MOST_NODES = 4096  # of a lattice: some milliseconds in the kernels
 MOST_FREE = 3  # joints with free values in one lattice

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, filled_rows, finite_array, positive, whole_number
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import InputError, called, require
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.text import known_ending, write_bytes
@@ -21,7 +22,7 @@ from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, KERNELS, UNKNOWN
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.planning.search.roadmap_in_python import PythonGraph
-from rrtik_ompl.world.motion_queries import MotionQueries, Stop, decider, has_kernels, keeps_constraints
+from rrtik_ompl.world.motion_queries import MotionQueries, decider, has_kernels, keeps_constraints
 from rrtik_ompl.world.problem import usable_configurations
 from rrtik_ompl.world.world import World
 

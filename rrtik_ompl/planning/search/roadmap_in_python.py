@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, SURE, UNKNOWN
-from rrtik_ompl.world.motion_queries import MotionFree, Stop
+from rrtik_ompl.world.motion_queries import MotionFree
 
 ROOT = -1  # by which edge a start was reached
 

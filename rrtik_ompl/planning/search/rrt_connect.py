@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.planning.search.tree import ConfigurationTree
-from rrtik_ompl.world.motion_queries import MotionFree, Stop
+from rrtik_ompl.world.motion_queries import MotionFree
 
 
 @dataclass(frozen=True, slots=True, eq=False)

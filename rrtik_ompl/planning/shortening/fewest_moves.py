@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, positive
+from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, single_joint, transitions
@@ -18,7 +19,6 @@ from rrtik_ompl.planning.moves.lower_bounds import remembered, sharper_bound
 from rrtik_ompl.planning.moves.reach_bound import reach_bound
 from rrtik_ompl.planning.moves.rules import MoveRules
 from rrtik_ompl.planning.moves.search import MoveSearch, Proof
-from rrtik_ompl.world.motion_queries import Stop, no_stop
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

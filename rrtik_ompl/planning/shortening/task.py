@@ -8,11 +8,12 @@ from collections.abc import Callable
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS
 from rrtik_ompl.model.transitions import edge_keys, length_of, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_moves
 from rrtik_ompl.planning.moves.rules import MoveRules
-from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, Stop, has_kernels
+from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, has_kernels
 
 
 class Task:

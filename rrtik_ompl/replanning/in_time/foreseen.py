@@ -15,13 +15,13 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.certificate import distance
 from rrtik_ompl.geometry.collision.extent import farthest
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.replanning.feed import ROTATION_NOISE
-from rrtik_ompl.world.motion_queries import Stop
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 

@@ -11,9 +11,9 @@ from collections import deque
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.tree import Pace
-from rrtik_ompl.world.motion_queries import Stop
 
 Place = tuple[int, int]  # slot and number of a place
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.hurry import hurried
 from rrtik_ompl.replanning.in_time.tree import Pace, TimeTree
-from rrtik_ompl.world.motion_queries import Stop
 
 PIECE = 8  # slots of one extension
 FIRST_SHARE = 1.5  # of the least time: the first last arrival

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from rrtik_ompl.base.budget import no_stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.kernels.search.repair import PathRepair
@@ -14,7 +15,6 @@ from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.replanning.connecting import PythonConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
-from rrtik_ompl.world.motion_queries import no_stop
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 

@@ -7,13 +7,13 @@ import pytest
 
 from bench.moves.fewest_moves_oracle import drawn_case
 from rrtik_bench.shortening.plane_arms import PlaneArm, PlaneGrid
+from rrtik_ompl.base.budget import no_stop
 from rrtik_ompl.planning.moves.clearance_levels import clearance_levels
 from rrtik_ompl.planning.moves.fine_grids import FineGrids
 from rrtik_ompl.planning.moves.reach_bound import reach_bound
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.world.motion_queries import no_stop
 from rrtik_planners import FewestMoves
 
 WINDING = 26  # a case of two joints with 8 moves

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.budget import no_stop
 from rrtik_ompl.replanning.connecting import KernelConnect, PythonConnect
-from rrtik_ompl.world.motion_queries import no_stop
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_tests.moving_plane import HIGH, LOW, box, plane
 

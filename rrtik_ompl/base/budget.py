@@ -1,0 +1,74 @@
+"""What a work may cost: one value that goes through in place of seconds, iterations, a stop and a seed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+import numpy as np
+
+Stop: TypeAlias = Callable[[], object]  # true when it is time to stop
+
+
+def no_stop() -> bool:
+    """It is never time to stop."""
+    return False
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """What a work may cost, and the seed of all that is random in it.
+
+    Its time runs from the moment it is made; :meth:`begun_now` sets the clock back.
+
+    Attributes:
+        seed: Of everything random.
+        seconds: Limit of wall time [s]; +inf for none.
+        iterations: Limit of whatever the work counts, so that the clock does not decide; None for none.
+        stop: Called often; true ends the work.
+        begun: When the time began [s, of ``time.monotonic``].
+
+    Example:
+        >>> budget = Budget(seed=1, seconds=60.0)
+        >>> budget.over(), budget.part(0.5).seconds < 30.1
+        (False, True)
+    """
+
+    seed: int = 0
+    seconds: float = np.inf
+    iterations: int | None = None
+    stop: Stop = no_stop
+    begun: float = field(default_factory=lambda: time.monotonic())
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the work began [s]."""
+        return time.monotonic() - self.begun
+
+    @property
+    def left(self) -> float:
+        """Time that is left [s]; none after a stop, less than none when it is over."""
+        return -np.inf if self.stop() else self.begun + self.seconds - time.monotonic()
+
+    @property
+    def limited(self) -> bool:
+        """Whether time or iterations end at some point, whoever stops the work."""
+        return self.iterations is not None or bool(np.isfinite(self.seconds))
+
+    def over(self) -> bool:
+        """Whether it is time to stop: a :data:`Stop` for searches that are given nothing else."""
+        return self.left <= 0.0
+
+    def begun_now(self) -> Budget:
+        """The same budget, whose time begins now."""
+        return replace(self, begun=time.monotonic())
+
+    def part(self, share: float, least: float = 0.0) -> Budget:
+        """A share of the time that is left, from now on; at least ``least`` seconds."""
+        return replace(self, seconds=max(share * self.left, least), begun=time.monotonic())
+
+    def put_off(self, seconds: float) -> Budget:
+        """The budget after some seconds that do not count."""
+        return replace(self, begun=self.begun + seconds)
