@@ -14,6 +14,7 @@ from ompl import geometric as og
 
 from rrtik_ompl import Obstacle, Problem, ProblemError, Scene, World, list_problems, load_problem, load_robot
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import changed
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder
@@ -171,7 +172,7 @@ def asked_configurations(problem: Problem, count: int, rng: np.random.Generator)
     listened = changed(problem, world=listener)
     goals = goal_configurations(problem, np.random.default_rng(0)).rows
     for seed in range(ATTEMPTS):
-        attempt(listened, og.RRTConnect, goals, seconds=1.0, seed=seed, parameters={"range": 1.0})
+        attempt(listened, og.RRTConnect, goals, Budget(seed, seconds=1.0), parameters={"range": 1.0})
         if len(listener.motions) >= MOTIONS:
             break
     A, B = np.array(listener.motions).transpose(1, 0, 2)

@@ -13,6 +13,7 @@ from ompl import geometric as og
 
 from rrtik_ompl import Problem, World
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
@@ -40,7 +41,7 @@ def our_search(problem: Problem, *, seconds: float, per_radian: float | None = N
     if planner == PLANNER and problem.world.fast is not None:
         return _kernel_search(problem, goals, seconds, per_radian)
     factory = find_planner(planner)
-    return lambda seed: attempt(problem, factory, goals, seconds=seconds, seed=seed, parameters={}).rows
+    return lambda seed: attempt(problem, factory, goals, Budget(seed, seconds)).rows
 
 
 def ompl_overhead(problem: Problem, *, seconds: float, seed: int) -> Callable[[], tuple[float, float]] | None:

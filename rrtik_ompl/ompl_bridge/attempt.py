@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from ompl import base as ob
 from ompl import util as ou
 
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import PlannerError, RrtikError
 from rrtik_ompl.ompl_bridge.ownership import foreign_code
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, other_planner, safe_planner
@@ -36,11 +38,9 @@ from rrtik_ompl.ompl_bridge.setup import (
 from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
 from rrtik_ompl.world.problem import Problem
 
-# What an attempt of effort 1 may take: iterations of our planners, checked motions of OMPL's.
-ITERATION_LIMIT = "max_iterations"
-EFFORT_ITERATIONS = 1000
-EFFORT_MOTIONS = 5000
-
+NO_PARAMETERS: Mapping[str, Any] = MappingProxyType({})
+ITERATION_LIMIT = "max_iterations"  # the option of our planners
+MOTIONS_PER_ITERATION = 5  # checked motions of OMPL's planners that count as one iteration of ours
 
 INVALID = (ob.PlannerStatus.INVALID_START, ob.PlannerStatus.INVALID_GOAL)
 
@@ -69,86 +69,104 @@ def attempt(
     problem: Problem,
     factory: PlannerFactory,
     goals: Matrix,
+    budget: Budget,
     *,
-    seconds: float,
-    seed: int,
-    parameters: Mapping[str, Any],
-    effort: int | None = None,
+    parameters: Mapping[str, Any] = NO_PARAMETERS,
     checked: bool = False,
 ) -> Attempt:
-    """Let a planner work for at most ``seconds`` from the start of a problem to any of ``goals``, shape (k, n).
+    """Let a planner work from the start of a problem to any of ``goals``, shape (k, n), within a budget.
 
-    There may be none if the planner finds goals itself; one that takes one goal gets the first. With an ``effort`` (for
-    planners that support an iteration limit) the attempt ends after a number of iterations or checked motions, so that
-    what it finds does not depend on the computer's speed. With ``checked``, start and goals are known to be free,
-    and a planner of ours does not check them again. Where joints have weights, distances are weighted.
+    There may be no goals if the planner finds some itself; one that takes one goal gets the first. Where the budget
+    limits iterations (for planners that support it) the attempt ends after so many, or after five times as many checked
+    motions of a planner of OMPL, so that what it finds does not depend on the computer's speed. Where joints have
+    weights, distances are weighted.
+
+    Args:
+        problem: What to solve.
+        factory: Makes the planner.
+        goals: Shape (k, n).
+        budget: Time from now on, iterations and the seed.
+        parameters: Options of the planner.
+        checked: Whether start and goals are known to be free, so that a planner of ours does not check them again.
 
     Raises:
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner refused its options for this problem, or broke.
         KeyboardInterrupt: After a planner of OMPL has stopped in good order; one of ours is left at once.
     """
-    traits, name = traits_of(factory), getattr(factory, "__name__", str(factory))
+    traits = traits_of(factory)
     goals = goals[:1] if traits.one_goal else goals
     if len(goals) and not traits.one_joint and has_weights(problem):
         form = WeightedProblem(problem)
-        limits: dict[str, Any] = {"seconds": seconds, "seed": seed, "parameters": parameters, "effort": effort}
-        found = attempt(form.problem, factory, form.there(goals), **limits, checked=checked)
+        aims = form.there(goals)
+        found = attempt(form.problem, factory, aims, budget, parameters=parameters, checked=checked)
         return replace(found, rows=form.found(found.rows, goals))
+
     with quiet():
-        ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
+        ou.RNG.setSeed(1 + budget.seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         if is_safe(factory):
-            limit = {} if effort is None else {ITERATION_LIMIT: effort * EFFORT_ITERATIONS}
-            return _on_arrays(problem, factory, name, goals, seconds, seed, {**limit, **parameters}, checked=checked)
-        validity = ValidityCallback(problem.world, most_motions=np.inf if effort is None else effort * EFFORT_MOTIONS)
-        si = space_information(problem, goals, validity)
-        definition = problem_definition(problem, goals, si)
-        with _named(name):
-            planner = other_planner(factory, name, si, definition, parameters)
-        validity.deadline = time.monotonic() + seconds
-        condition = ob.timedPlannerTerminationCondition(seconds)
-        validity.stop = condition.terminate
-        with _named(name):
-            planner.setProblemDefinition(definition)
-            planner.setup()
-            straight = _straight_motion(problem, goals) if traits.straight_first else None
-            if straight is not None:
-                return Attempt(straight, "Exact solution", {})
-            with interrupt_ends(condition), foreign_code(planner, definition):
-                status = _status(planner.solve(condition))
-        _raise_failure(planner, name, status, validity.error)
-        rows = exact_path(definition, si)
-        if rows is None and validity.late and status in INVALID:  # only because all answers were no by then
-            status = ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
-        begin = time.perf_counter()
-        graph = _graph(planner, si) if factory in OMPL_TRAITS and traits.has_graph else {}
-        return Attempt(rows, str(status), {**validity.counts(), **graph}, counting=time.perf_counter() - begin)
+            return _on_arrays(problem, factory, goals, budget, parameters, checked=checked)
+        return _in_ompl(problem, factory, goals, budget, parameters)
 
 
 def _on_arrays(
     problem: Problem,
     factory: type[SafePlanner],
-    name: str,
     goals: Matrix,
-    seconds: float,
-    seed: int,
-    options: Mapping[str, Any],
+    budget: Budget,
+    parameters: Mapping[str, Any],
     *,
     checked: bool,
 ) -> Attempt:
     """Of a planner of ours, which needs of OMPL a space alone."""
-    end, bounds = time.perf_counter() + seconds, planning_bounds(problem, goals)
+    name = factory.__name__
+    bounds = planning_bounds(problem, goals)
+    limit = {} if budget.iterations is None else {ITERATION_LIMIT: budget.iterations}
     with _named(name):
-        planner = safe_planner(factory, name, shared_space(*bounds), problem, seed, options)
+        planner = safe_planner(factory, name, shared_space(*bounds), problem, budget.seed, {**limit, **parameters})
         planner.setup()
+
     straight = _straight_motion(problem, goals) if factory.straight_first else None
     if straight is not None:
         return Attempt(straight, "Exact solution", {})
-    status, rows = planner.solve_rows(
-        problem.start[None], goals, bounds, lambda: time.perf_counter() > end, checked=checked
-    )
+    status, rows = planner.solve_rows(problem.start[None], goals, bounds, budget.over, checked=checked)
     _raise_failure(planner, name, status, None)
     return Attempt(rows, str(status), dict(planner.statistics), planner.reason)
+
+
+def _in_ompl(
+    problem: Problem, factory: PlannerFactory, goals: Matrix, budget: Budget, parameters: Mapping[str, Any]
+) -> Attempt:
+    """Of a planner of OMPL, or of anybody else's, whose objects all live in here."""
+    name = getattr(factory, "__name__", str(factory))
+    traits = traits_of(factory)
+    seconds = max(budget.left, 0.0)
+    most = np.inf if budget.iterations is None else budget.iterations * MOTIONS_PER_ITERATION
+    validity = ValidityCallback(problem.world, most_motions=most)
+    si = space_information(problem, goals, validity)
+    definition = problem_definition(problem, goals, si)
+    with _named(name):
+        planner = other_planner(factory, name, si, definition, parameters)
+
+    validity.deadline = time.monotonic() + seconds
+    condition = ob.timedPlannerTerminationCondition(seconds)
+    validity.stop = condition.terminate
+    with _named(name):
+        planner.setProblemDefinition(definition)
+        planner.setup()
+        straight = _straight_motion(problem, goals) if traits.straight_first else None
+        if straight is not None:
+            return Attempt(straight, "Exact solution", {})
+        with interrupt_ends(condition), foreign_code(planner, definition):
+            status = _status(planner.solve(condition))
+
+    _raise_failure(planner, name, status, validity.error)
+    rows = exact_path(definition, si)
+    if rows is None and validity.late and status in INVALID:  # only because all answers were no by then
+        status = ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
+    begin = time.perf_counter()
+    graph = _graph(planner, si) if factory in OMPL_TRAITS and traits.has_graph else {}
+    return Attempt(rows, str(status), {**validity.counts(), **graph}, counting=time.perf_counter() - begin)
 
 
 def _status(answer: object) -> ob.PlannerStatus:

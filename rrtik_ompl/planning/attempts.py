@@ -1,265 +1,337 @@
-"""Attempt after attempt of one planner at one problem, until the second check accepts a path."""
+"""The one loop of `plan()`: :func:`walk` goes through a table of attempts until the second check accepts a path.
+
+The rows of a planner's `Turn`; which one comes next depends on what has come of those before:
+
+| row | its motions are checked | its effort | when |
+|---|---|---|---|
+| quick | by kernels alone | 1 | first |
+| plain | exactly; twice as densely once a path was rejected | 1, 2, 4, ... | if no strict one is due |
+| strict | in steps, with room beyond the clearance | 4, 16, ... | see below |
+| proving | by proofs, with that room | 2, 4, ... | after five strict ones, or without kernels |
+
+Strict ones are due from the first path on that is valid but not proven, for half of the effort. A plain one that no
+other could follow which aims elsewhere has no bound but time.
+
+"auto" and ``improve=`` are turns one after the other (:mod:`rrtik_ompl.planning.portfolio`,
+:mod:`rrtik_ompl.planning.improving`); a planner that is named has one.
+"""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
-from typing import Any
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.base.choices import ProofMode
-from rrtik_ompl.ik.goal_configurations import MAX_ROUNDS, GoalSearch
-from rrtik_ompl.model.goal import TipGoal, has_continuous
+from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.base.errors import InputError, PlannerError
+from rrtik_ompl.ik.methods import load_kernels
+from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.path import JointPath
-from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, EFFORT_MOTIONS, Attempt, attempt
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
+from rrtik_ompl.ompl_bridge.attempt import MOTIONS_PER_ITERATION, Attempt, attempt, attempt_seeds
+from rrtik_ompl.ompl_bridge.planner_options import check_options
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, planners_with, traits_of
+from rrtik_ompl.planning.aims import Aims
+from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.second_check import SecondCheck
 from rrtik_ompl.world.problem import Problem, densely_checked
+from rrtik_ompl.world.proof import PROOF_KERNELS
 
 SHORTEST = 1e-3  # [s] that an attempt gets at least
+EFFORT_ITERATIONS = 1000  # that an attempt of effort 1 may take
+SHORT_WAY_EFFORT = 16  # for the short way round alone, before the long way is tried; some 0.2 s of kernels
+ANYTIME_SHARE = 0.8  # of the time, for the first attempt of an anytime planner, which keeps a clearance
 ROUNDS = 24  # attempts to find a proven path, once there is one that is checked in steps
 BRIEF_ROUNDS = 2  # attempts to find one that keeps the clearance, once there is a proven one that keeps less
 IN_KERNELS = 5  # of them, without proofs while searching, for planners that run in kernels
-MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")  # options of planners, see MoveRules
 SEPARATED = 2  # attempts with further goal configurations, once none that is known can be reached
-SHORT_WAY_EFFORT = 16  # for the short way round alone, before the long way is tried; some 0.2 s of kernels
-ANYTIME_SHARE = 0.8  # of the time, for the first attempt of an anytime planner, which keeps a clearance
+
+Kind: TypeAlias = Literal["quick", "plain", "strict"]
 
 
-class Search:
-    """Attempt after attempt, one per seed, until the second check accepts a path.
+class Row(NamedTuple):
+    """A row of the table: one attempt.
 
     Attributes:
+        kind: As in the table; "strict" for proving ones too.
+        problem: In the form in which its motions are checked.
+        aims: Configurations at the goal, shape (k, dof); none for a planner that finds them itself.
+        budget: Until when, with how many iterations, by which random numbers.
+        checked: Whether start and aims are known to be free.
+    """
+
+    kind: Kind
+    problem: Problem
+    aims: Matrix
+    budget: Budget
+    checked: bool = False
+
+
+def run_planner(problem: Problem, planner: NamedPlanner, request: Request) -> Plan:
+    """Let one planner search for a path that the second check accepts.
+
+    Raises:
+        InputError: If the planner does not take a parameter.
+        PlannerError: If the planner broke.
+    """
+    (turn,) = walk([Turn(problem, planner, request)])
+    if turn.error is not None:
+        raise turn.error
+    return turn.plan()
+
+
+def walk(turns: Iterable[Turn]) -> Iterator[Turn]:
+    """Go through the tables of turns, attempt by attempt; yields each turn when its last attempt is over.
+
+    A turn whose planner breaks is over too, and keeps the error.
+    """
+    for turn in turns:
+        try:
+            for row in turn.rows():
+                outcome = attempt(
+                    row.problem,
+                    turn.planner.factory,
+                    row.aims,
+                    row.budget,
+                    parameters=turn.parameters,
+                    checked=row.checked,
+                )
+                turn.take(row, outcome)
+        except PlannerError as error:
+            turn.error = error
+        turn.finish()
+        yield turn
+
+
+class Turn:
+    """One planner at one problem: its attempts, and what has come of them.
+
+    Attributes:
+        planner: Whose turn it is.
+        parameters: Its options.
+        budget: Of all attempts together; its time begins with the first row, once all kernels are loaded.
+        path: What was found, or None.
+        reason: Why nothing was found, in a line; "" if something was.
+        seconds: How long it took.
         totals: The counts of all attempts.
-        reason: Why there is no path, in a line; "" if there is one.
-        counting: Time that was no planning [s]; the deadline was put off by it.
+        error: What broke the planner, or None.
 
     Args:
         problem: What to solve.
-        factory: Makes the planner.
-        name: Of the planner, for messages.
-        deadline: When to end [s, of ``time.perf_counter``].
-        seeds: One for each attempt.
-        parameters: Options of the planner.
-        proof: See :func:`rrtik_ompl.planning.plan.plan`.
-        clearance: Likewise.
-        iterations: Of all attempts together, about; of planners that support a limit of iterations.
+        planner: Solves it.
+        request: Options, proofs, clearance, restarts; and the budget, if there is no other.
+        budget: Of this turn, in place of the request's.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        factory: PlannerFactory,
-        name: str,
-        deadline: float,
-        seeds: list[int],
-        parameters: Mapping[str, Any],
-        proof: ProofMode,
-        clearance: float | None,
-        *,
-        iterations: int | None = None,
-    ) -> None:
+    def __init__(self, problem: Problem, planner: NamedPlanner, request: Request, budget: Budget | None = None) -> None:
+        self.planner = planner
+        self.budget = request.budget if budget is None else budget
+        self.path: JointPath | None = None
+        self.reason = ""
+        self.seconds = 0.0
         self.totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
-        self.reason, self.counting = "", 0.0
-        self._problem, self._factory, self._clearance = problem, factory, clearance
-        self._deadline, self._seeds = deadline, seeds
-        self._goals = GoalSearch(problem, seeds[0], seconds_left=self._left)
-        self._traits, joints = traits_of(factory), problem.goal.q is not None
-        self._iterations = iterations if self._traits.supports_iteration_limit else None
-        wanted = {"clearance": clearance} if self._traits.leaves_room and clearance is not None else {}
-        self._parameters = {**wanted, **parameters}
-        self._aimless = self._traits.finds_goals and isinstance(problem.goal, TipGoal)
-        self._long_ways = joints and has_continuous(problem.robot) and len(seeds) > 1
-        ruled = any(option in parameters for option in MOVE_RULES)
-        self._check = SecondCheck(problem, name, proof, clearance, self._traits, ruled=ruled)
-        self._strict: dict[bool, Problem] = {}  # by whether motions have to be proven
-        self._strict_attempts = 0
-        self._spent = {True: 0, False: 0}  # by whether room was left: checked motions, and what an attempt costs beside
+        self.error: PlannerError | None = None
 
-    def run(self) -> JointPath | None:
-        """The path, or None and a reason."""
+        traits = traits_of(planner.factory)
+        seeds = attempt_seeds(self.budget.seed, request.restarts)
+        leaving = {"clearance": request.clearance} if traits.leaves_room and request.clearance is not None else {}
+        self.parameters: Mapping[str, object] = {**leaving, **request.parameters}
+        self._problem = problem
+        self._request = request
+        self._traits = traits
+        self._seeds = seeds
+        self._aims = Aims(
+            problem,
+            traits,
+            request.clearance,
+            attempts=len(seeds),
+            seed=seeds[0],
+            seconds_left=lambda: self.budget.left,
+        )
+        self._check = SecondCheck(problem, planner, request, seed=seeds[0])
+        self._made: Counter[Kind] = Counter()
+        self._spent: Counter[Kind] = Counter()  # checked motions, and what an attempt costs beside
+        self._forms: dict[bool, Problem] = {}  # for strict attempts, by whether motions have to be proven
+
+    def rows(self) -> Iterator[Row]:
+        """The table: attempts until there is a path, no time, or nothing better to be expected."""
+        if self._problem.constraints:
+            _refuse_if_it_breaks_constraints(self.planner)
+        load_kernels_for(self._problem, self.planner.factory)
+        self.budget = self.budget.begun_now()
+
+        still = _nothing_to_do(self._problem)  # some planners would find a detour
+        if still:
+            check_options(self.planner.factory, self.planner.name, self._request.parameters)
         self.reason = self._check.impossible()
         if self.reason:
-            return None
+            return
+        if still:
+            self.path = self._check.still()
+            return
+
         for number in range(len(self._seeds)):
-            if self._done():
-                break
+            if self._over():
+                return
             self.totals["attempts"] += 1
-            aims = self._aims(number)
-            if len(aims) == 0 and not self._aimless:
-                if self._goals.exhausted:
-                    break
+            aims = self._aims.of(number)
+            if len(aims) == 0 and not self._aims.none_needed:
+                if self._aims.exhausted:
+                    return
                 continue
-            path = self._quick_path(aims) if number == 0 else None
-            if path is None and not self._done():
-                path = self._path(number, aims)
-            if path is not None:
-                return path
-        self.reason = "" if self._check.best is not None else self._check.reason or self._goals.reason
-        return self._check.best
+            if number == 0:
+                yield from self._quick(aims)
+                if self._over():
+                    return
+            yield self._strict(number, aims) or self._plain(number, aims)
 
-    def still(self) -> JointPath | None:
-        """The path that stays at the start, or None and a reason."""
-        self.reason = self._check.impossible()
-        path = JointPath.of(self._problem.robot, self._problem.start[None])
-        return None if self.reason else self._check.still(path) if self._check.proves else path
+    def take(self, row: Row, outcome: Attempt) -> None:
+        """Count what has come of an attempt, and keep its path if the second check accepts it."""
+        self.budget = self.budget.put_off(outcome.counting)
+        for key, value in outcome.statistics.items():
+            self.totals[key] = value if key in self._traits.path_statistics else self.totals.get(key, 0) + value
+        self._made[row.kind] += 1
+        self._spent[row.kind] += int(outcome.statistics.get("checked_motions", 0))
+        self._spent[row.kind] += EFFORT_ITERATIONS * MOTIONS_PER_ITERATION
+        self.path = self._check.accepted(outcome)
+        self.totals["rejected"] = self._check.rejected
 
-    def _done(self) -> bool:
-        """Whether there is no time left, or nothing better to be expected."""
-        best = self._check.best
-        enough = best is not None and self._check.open > (BRIEF_ROUNDS if best.proven else ROUNDS)
-        return self._left() <= 0.0 or self._used_up() or self._check.settled or enough or self._separated()
+    def finish(self) -> None:
+        """Say how long the attempts took and, where none was accepted, fall back on the best path, or say why not."""
+        self.seconds = self.budget.elapsed
+        if self.error is not None or self.path is not None:
+            return
+        if not self.reason:
+            self.path = self._check.best
+            self.reason = "" if self.path is not None else self._check.reason or self._aims.reason
+        if self.path is None and self.seconds >= self.budget.seconds:
+            attempts = self.totals["attempts"]
+            tried = f"{attempts} attempt{'s' * (attempts != 1)}"
+            last = self.reason or "out of time"
+            self.reason = f"no path within {self.budget.seconds:g} s of wall time ({tried}; the last one: {last})"
 
-    def _used_up(self) -> bool:
-        """Whether all iterations are used."""
-        return self._iterations is not None and self.totals.get("iterations", 0) >= self._iterations
+    def plan(self) -> Plan:
+        """What has come of the turn."""
+        counts = MappingProxyType(self.totals)
+        found = self.path is not None
+        name, seed = self.planner.name, self.budget.seed
+        return Plan(found, self.path, self.reason, self.seconds, name, seed, counts, problem=self._problem)
 
-    def _separated(self) -> bool:
-        """Whether path constraints keep start and goal apart, as far as the planner sees."""
-        seen = self.totals.get("separated", 0)
-        return seen > 0 and (self._goals.exhausted or seen > SEPARATED)
-
-    def _left(self) -> float:
-        return self._deadline - time.perf_counter()
-
-    def _short_way(self, number: int) -> bool:
-        """Whether an attempt goes the short way round alone."""
-        return self._long_ways and number == 0
-
-    def _aims(self, number: int) -> Matrix:
-        """What an attempt aims at: all that is known, the newest first, for some planners take the first alone."""
-        if self._aimless:
-            return np.zeros((0, self._problem.robot.dof))
-        known = len(self._goals.rows)
-        newer = number > 0 and self._goals.more()
-        rows, first = self._roomy_goals(), known if newer else number
-        return rows[:1] if self._short_way(number) else np.roll(rows, -first, axis=0) if first else rows
-
-    def _roomy_goals(self) -> Matrix:
-        """All that is known to be at a goal of the tip: those that keep the clearance asked for, if there are any."""
-        rows, wanted = self._goals.first(), self._clearance
-        if wanted is None or self._problem.goal.q is not None:
-            return rows
-        for _ in range(MAX_ROUNDS):
-            kept = self._problem.world.prover.proven(rows, rows, clearance=wanted)
-            if kept.any():
-                return rows[kept]
-            if not self._goals.more():
-                break
-            rows = self._goals.rows
-        return rows
-
-    def _quick_path(self, aims: Matrix) -> JointPath | None:
-        """Of a brief attempt on what the kernels can prove; None where it finds nothing or cannot prove an end."""
+    def _quick(self, aims: Matrix) -> list[Row]:
+        """A brief attempt on what the kernels can prove; none where they cannot prove an end."""
         if not self._traits.supports_iteration_limit or self._problem.world.accuracy != "exact":
-            return None
-        if self._aimless and not self._traits.kernels:
-            return None
+            return []
+        if self._aims.none_needed and not self._traits.kernels:
+            return []
         proven = self._problem.with_accuracy("conservative")
         free = proven.world.checks.free(np.concatenate([proven.start[None], aims]))
         aims = aims[free[1:]]
-        if not free[0] or (len(aims) == 0 and not self._aimless):
-            return None
-        return self._accepted(self._attempt(proven, 0, aims, self._left(), effort=1, checked=True))
+        if not free[0] or (len(aims) == 0 and not self._aims.none_needed):
+            return []
+        return [Row("quick", proven, aims, self._budget(0, effort=1), checked=True)]
 
-    def _path(self, number: int, aims: Matrix) -> JointPath | None:
-        """Of an attempt with exact checks, with room to spare as soon as a path was not proven."""
-        if self._leaves_room(number):
-            proving = not self._traits.kernels or self._strict_attempts >= IN_KERNELS
-            strict = self._strict_problem(proving)
-            roomy = aims[strict.world.checks.free(aims)]
-            if len(roomy) or self._aimless:
-                return self._strict_path(strict, number, roomy, base=2 if proving else 4)
-        effort = self._effort(number)
+    def _plain(self, number: int, aims: Matrix) -> Row:
+        """An attempt with exact checks."""
         dense = self._traits.anytime or self._check.rejected
         asked = densely_checked(self._problem) if dense else self._problem
         checked = asked.world.accuracy == "exact"  # by the problem and by the search for goals
-        seconds = self._share(number) * self._left()
-        outcome = self._attempt(asked, number, aims, seconds, effort, checked=checked)
-        self._count(outcome, room=False)
-        return self._accepted(outcome)
+        effort = self._plain_effort(number)
+        return Row("plain", asked, aims, self._budget(number, effort, share=self._share(number)), checked)
 
-    def _effort(self, number: int) -> int | None:
-        """Of an attempt after which others aim elsewhere, of planners that have it; None for all there is time for."""
-        if not self._traits.supports_iteration_limit:
+    def _strict(self, number: int, aims: Matrix) -> Row | None:
+        """An attempt with room to spare; None if it is not due, or no aim has that room."""
+        if not self._strict_is_due(number):
             return None
-        if self._short_way(number):
-            return SHORT_WAY_EFFORT
-        return 2**number if self._others(number) else None
+        earlier = self._made["strict"]
+        proving = not self._traits.kernels or earlier >= IN_KERNELS
+        if proving not in self._forms:
+            self._forms[proving] = self._check.strict(proving=proving)
+        form = self._forms[proving]
+        roomy = aims[form.world.checks.free(aims)]
+        if len(roomy) == 0 and not self._aims.none_needed:
+            return None
+        base = 2 if proving else 4
+        effort = base ** (earlier + 1) if self._traits.supports_iteration_limit else None
+        share = ANYTIME_SHARE if self._traits.anytime else self._share(number)
+        return Row("strict", form, roomy, self._budget(number, effort, share))
 
-    def _strict_problem(self, proving: bool) -> Problem:
-        """See :meth:`SecondCheck.strict`; made once."""
-        if proving not in self._strict:
-            self._strict[proving] = self._check.strict(proving=proving)
-        return self._strict[proving]
-
-    def _leaves_room(self, number: int) -> bool:
+    def _strict_is_due(self, number: int) -> bool:
         """Whether an attempt keeps more than the clearance: half of the effort, from the first unproven path on.
 
         The first one of an anytime planner does: an optimal path touches what it goes round.
         """
         first = self._traits.anytime and number == 0 and len(self._seeds) > 1
-        less = self._strict_attempts == 0 or self._spent[True] < self._spent[False]
+        less = self._made["strict"] == 0 or self._spent["strict"] < self._spent["plain"]
         turn = self._check.open > 0 and (self._traits.anytime or less)
         return self._check.proves and not self._traits.leaves_room and (first or turn)
 
-    def _strict_path(self, strict: Problem, number: int, aims: Matrix, base: int) -> JointPath | None:
-        """Of an attempt with room to spare, each with ``base`` times the effort of the one before."""
-        self._strict_attempts += 1
-        effort = base**self._strict_attempts if self._traits.supports_iteration_limit else None
-        share = ANYTIME_SHARE if self._traits.anytime else self._share(number)
-        outcome = self._attempt(strict, number, aims, share * self._left(), effort)
-        self._count(outcome, room=True)
-        return self._accepted(outcome)
-
-    def _count(self, outcome: Attempt, *, room: bool) -> None:
-        self._spent[room] += int(outcome.statistics.get("checked_motions", 0)) + EFFORT_MOTIONS
+    def _plain_effort(self, number: int) -> int | None:
+        """Of an attempt after which others aim elsewhere, of planners that have it; None for all there is time for."""
+        if not self._traits.supports_iteration_limit:
+            return None
+        if self._aims.short_way(number):
+            return SHORT_WAY_EFFORT
+        return 2**number if self._aims.others_after(number) else None
 
     def _share(self, number: int) -> float:
         """Of time and iterations left, what an attempt gets: half for the short way round, before the long one."""
-        return 0.5 if self._short_way(number) else 1.0
+        return 0.5 if self._aims.short_way(number) else 1.0
 
-    def _accepted(self, outcome: Attempt) -> JointPath | None:
-        """The path of an attempt, if the second check accepts it."""
-        path = self._check.accepted(outcome, self._seeds[0])
-        self.totals["rejected"] = self._check.rejected
-        return path
+    def _budget(self, number: int, effort: int | None, share: float = 1.0) -> Budget:
+        """Of one attempt: a share of the time, and iterations by its effort, as far as there are any left."""
+        left = self._iterations_left()
+        if left is not None:
+            most = max(int(-(-self._share(number) * left // EFFORT_ITERATIONS)), 1)
+            effort = most if effort is None else min(effort, most)
+        iterations = None if effort is None else effort * EFFORT_ITERATIONS
+        budget = self.budget.part(share, least=SHORTEST)
+        return replace(budget, iterations=iterations, seed=self._seeds[number])
 
-    def _others(self, number: int) -> bool:
-        """Whether later attempts would aim at other configurations than this one."""
-        if self._aimless or number == len(self._seeds) - 1:
-            return False
-        return not self._goals.exhausted or (self._traits.one_goal and number + 1 < len(self._goals.rows))
+    def _iterations_left(self) -> int | None:
+        """Of all attempts together; None without a limit, or where the planner knows none."""
+        if self.budget.iterations is None or not self._traits.supports_iteration_limit:
+            return None
+        return self.budget.iterations - int(self.totals.get("iterations", 0))
 
-    def _attempt(
-        self,
-        problem: Problem,
-        number: int,
-        aims: Matrix,
-        seconds: float,
-        effort: int | None,
-        *,
-        checked: bool = False,
-    ) -> Attempt:
-        """One attempt, counted; ``checked``: start and goals are known to be free."""
-        if self._iterations is not None:
-            open_ = self._share(number) * (self._iterations - int(self.totals.get("iterations", 0)))
-            left = int(-(-open_ // EFFORT_ITERATIONS))
-            effort = max(left if effort is None else min(effort, left), 1)
-        outcome = attempt(
-            problem,
-            self._factory,
-            aims,
-            seconds=max(seconds, SHORTEST),
-            seed=self._seeds[number],
-            parameters=self._parameters,
-            effort=effort,
-            checked=checked,
-        )
-        self.counting += outcome.counting
-        self._deadline += outcome.counting
-        for key, value in outcome.statistics.items():
-            self.totals[key] = value if key in self._traits.path_statistics else self.totals.get(key, 0) + value
-        return outcome
+    def _over(self) -> bool:
+        """Whether there is a path, no time or iterations left, or nothing better to be expected."""
+        best = self._check.best
+        enough = best is not None and self._check.open > (BRIEF_ROUNDS if best.proven else ROUNDS)
+        if self.path is not None or enough or self._check.settled or self._separated():
+            return True
+        left = self._iterations_left()
+        return self.budget.over() or (left is not None and left <= 0)
+
+    def _separated(self) -> bool:
+        """Whether path constraints keep start and goal apart, as far as the planner sees."""
+        seen = self.totals.get("separated", 0)
+        return seen > 0 and (self._aims.exhausted or seen > SEPARATED)
+
+
+def load_kernels_for(problem: Problem, factory: PlannerFactory) -> None:
+    """Load what the search will use: compiling it for the first time is no part of planning."""
+    if problem.goal.q is None:
+        load_kernels(problem.robot)
+    if problem.world.fast is not None or problem.constraints:
+        load_together((*traits_of(factory).kernels, PROOF_KERNELS))
+
+
+def _refuse_if_it_breaks_constraints(planner: NamedPlanner) -> None:
+    """Refuse a planner whose paths would leave the regions of a problem's path constraints."""
+    traits = traits_of(planner.factory)
+    if traits.keeps_constraints:
+        return
+    able = ", ".join(planners_with(lambda traits: traits.keeps_constraints)) or "none is installed"
+    why = "moves one joint at a time, which leaves their regions" if traits.one_joint else "does not keep them"
+    raise InputError(f"planner {planner.name}: the problem has path constraints, and it {why}; use {able}")
+
+
+def _nothing_to_do(problem: Problem) -> bool:
+    """Whether the start is the goal, to the bit if that is a configuration; a `Problem` has checked its start."""
+    if problem.goal.q is not None:
+        return bool((problem.start == problem.goal.q).all())
+    return problem.reached(problem.start)

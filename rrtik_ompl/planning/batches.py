@@ -11,7 +11,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -19,14 +19,14 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
-from rrtik_ompl.ompl_bridge.attempt import EFFORT_ITERATIONS, ITERATION_LIMIT, attempt_seeds
+from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, reseed, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.results import SearchResult
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import shared_space
-from rrtik_ompl.planning.one_planner import load_kernels_for
-from rrtik_ompl.planning.outcome import Plan
+from rrtik_ompl.planning.attempts import EFFORT_ITERATIONS, load_kernels_for
+from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.world.kept_clearance import Room, rooms_between
 from rrtik_ompl.world.problem import Problem, known_problem
 from rrtik_ompl.world.world import World
@@ -51,44 +51,37 @@ class _Found:
 
 
 def plans_together(
-    world: World,
-    factory: PlannerFactory,
-    name: str,
-    queries: Sequence[Query],
-    *,
-    seconds: float,
-    restarts: int,
-    parameters: Mapping[str, Any],
+    world: World, planner: NamedPlanner, queries: Sequence[Query], request: Request
 ) -> list[Plan | None]:
     """The plans of queries by one planner; None for each that is to be planned alone.
 
     Args:
         world: Where they are.
-        factory: Of the planner.
-        name: Of the planner.
+        planner: Searches for each.
         queries: Configurations inside the limits, or not.
-        seconds: Limit of wall time for each [s].
-        restarts: As for `plan()`.
-        parameters: Options of the planner.
+        request: What is asked for each, but for the seed.
     """
     plans: list[Plan | None] = [None] * len(queries)
-    if not (queries and serves(world, factory)):
+    if not (queries and serves(world, planner.factory)):
         return plans
     ends = np.array([[each.start, each.goal.q] for each in queries])
     any_problem = known_problem(world, *ends[0])
-    load_kernels_for(any_problem, factory)
+    load_kernels_for(any_problem, planner.factory)
+
     begin = time.perf_counter()
     free = _usable(world, ends)
     rooms = dict(zip(np.flatnonzero(free).tolist(), rooms_between(world, ends[free], None), strict=True))
-    searcher = _Searcher(world, factory, name, any_problem, parameters, seconds)
-    found = searcher.paths({k: queries[k] for k, room in rooms.items() if room is not None}, restarts)
+    searcher = _Searcher(any_problem, planner, request)
+    found = searcher.paths({k: queries[k] for k, room in rooms.items() if room is not None})
     proofs = _proofs(world, {k: (each.path.waypoints, rooms[k]) for k, each in found.items()})
     taken = (time.perf_counter() - begin) / len(queries)
+
     for k, proof in proofs.items():
-        query, path = found[k].query, found[k].path.with_proof(proof)
+        query = found[k].query
+        path = found[k].path.with_proof(proof)
         counts = MappingProxyType({"attempts": 1, "rejected": 0, **found[k].counts} | {"rejected": 0})
         problem = known_problem(world, path.start, query.goal)
-        plans[k] = Plan(True, path, "", taken, name, query.seed, counts, problem=problem)
+        plans[k] = Plan(True, path, "", taken, planner.name, query.seed, counts, problem=problem)
     return plans
 
 
@@ -125,25 +118,19 @@ class SolvesEach(Protocol):
 class _Searcher:
     """One planner that searches for one query after the other."""
 
-    def __init__(
-        self,
-        world: World,
-        factory: PlannerFactory,
-        name: str,
-        problem: Problem,
-        parameters: Mapping[str, Any],
-        seconds: float,
-    ) -> None:
-        self._robot, self._seconds = world.robot, seconds
-        self._bounds = world.robot.lower, world.robot.upper
-        options = {ITERATION_LIMIT: EFFORT_ITERATIONS, **parameters}
+    def __init__(self, problem: Problem, planner: NamedPlanner, request: Request) -> None:
+        self._robot = problem.world.robot
+        self._request = request
+        self._bounds = self._robot.lower, self._robot.upper
+        options = {ITERATION_LIMIT: EFFORT_ITERATIONS, **request.parameters}
         brief = problem.with_accuracy("conservative")
-        assert is_safe(factory)
-        self._planner: SafePlanner = safe_planner(factory, name, shared_space(*self._bounds), brief, 0, options)
+        assert is_safe(planner.factory)
+        space = shared_space(*self._bounds)
+        self._planner: SafePlanner = safe_planner(planner.factory, planner.name, space, brief, 0, options)
 
-    def paths(self, queries: Mapping[int, Query], restarts: int) -> dict[int, _Found]:
+    def paths(self, queries: Mapping[int, Query]) -> dict[int, _Found]:
         """What the first attempts of `plan()` find, by the numbers of the queries."""
-        seeds = [attempt_seeds(query.seed, restarts)[0] for query in queries.values()]
+        seeds = [attempt_seeds(query.seed, self._request.restarts)[0] for query in queries.values()]
         quick: Sequence[SearchResult | None] = [None] * len(seeds)
         if isinstance(self._planner, SolvesEach) and queries:
             ends = np.array([(query.start, query.goal.q) for query in queries.values()])
@@ -157,8 +144,9 @@ class _Searcher:
     def _alone(self, query: Query, seed: int) -> SearchResult:
         """What a search for one query finds."""
         reseed(self._planner, seed)
-        end, ends = time.perf_counter() + self._seconds, (query.start[None], query.goal.q[None])
-        _, rows = self._planner.solve_rows(*ends, self._bounds, lambda: time.perf_counter() > end, checked=True)
+        ends = query.start[None], query.goal.q[None]
+        budget = self._request.budget.begun_now()
+        _, rows = self._planner.solve_rows(*ends, self._bounds, budget.over, checked=True)
         return SearchResult(rows, self._planner.statistics)
 
     def _path(self, query: Query, found: SearchResult) -> _Found | None:

@@ -6,19 +6,18 @@ each new path is shortened for a moment, and of a few such paths only the best o
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.base.choices import ImproveStrategy, PathObjective
-from rrtik_ompl.base.errors import PlannerError
 from rrtik_ompl.model.path import JointPath
-from rrtik_ompl.planning.outcome import Plan, Request
+from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT
+from rrtik_ompl.ompl_bridge.planner_options import planner_options
+from rrtik_ompl.planning.attempts import Turn, walk
+from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.path_costs import COSTS, least_cost
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.planning.shortening.restarts import BOUND, BOUNDED_SAMPLES, GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
@@ -27,6 +26,7 @@ from rrtik_ompl.world.problem import Problem
 
 LEAST_SECONDS = 1e-3  # for which another round is begun
 PLANS = 4  # of which the best is shortened further, if it is worth it
+BOUND_OPTION = "bound"  # of planners that can be told how long a path may be
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +37,20 @@ class Improvement:
         seconds: How much longer it may take [s].
         objective: What is to be made small.
         strategy: Whether further plans are made, or the first path alone is shortened.
-        bounded: Whether the planner takes a bound of the path's length.
     """
 
     seconds: float
     objective: PathObjective = "length"
     strategy: ImproveStrategy = "restart-shorten"
-    bounded: bool = False
 
 
-def improved(
-    problem: Problem, first: Plan, again: Callable[[Request], Plan], request: Request, how: Improvement
-) -> Plan:
+def improved(problem: Problem, first: Plan, planner: NamedPlanner, request: Request, how: Improvement) -> Plan:
     """The best of many plans, each shortened.
 
     Args:
         problem: What was planned.
         first: A plan that found a path.
-        again: Plans with another request.
+        planner: Makes the further ones.
         request: That of the first plan; the work ends when its time is up.
         how: What is to be made small, for how long, and by what.
 
@@ -67,9 +63,10 @@ def improved(
     Raises:
         InputError: If the objective cannot be computed for the robot.
     """
-    work = _Work(problem, first, again, request, how)
+    work = _Work(problem, first, planner, request, how)
     with suppress(KeyboardInterrupt):  # what was found by then is the answer
         work.run()
+
     name = "length_bound" if how.objective == "length" else "cost_bound"
     bound = {name: work.bound} if work.bound > 0.0 else {}
     course = {"improving_rounds": work.rounds, "cost_over_time": tuple(work.course)}
@@ -82,34 +79,45 @@ class _Work:
     """The rounds of plans and shortenings; ``best`` and ``course`` hold at any moment."""
 
     def __init__(
-        self, problem: Problem, first: Plan, again: Callable[[Request], Plan], request: Request, how: Improvement
+        self, problem: Problem, first: Plan, planner: NamedPlanner, request: Request, how: Improvement
     ) -> None:
         assert first.path is not None
-        self._problem, self._first, self._again, self._request, self._how = problem, first, again, request, how
-        self._begin, self._seconds = time.perf_counter(), min(how.seconds, request.seconds - first.seconds)
-        self.best, self.bound, self.rounds = first.path, least_cost(problem, how.objective), 0
-        self._one_joint, self._proven = first.path.one_joint_at_a_time, first.path.proven
+        self.best = first.path
+        self.bound = least_cost(problem, how.objective)
+        self.rounds = 0
+        self._problem = problem
+        self._first = first
+        self._planner = planner
+        self._request = request
+        self._how = how
+        self._one_joint = first.path.one_joint_at_a_time
+        self._bounded = BOUND_OPTION in planner_options(planner.factory) and not self._one_joint
+        seconds = min(how.seconds, request.budget.seconds - first.seconds)
+        self._budget = replace(request.budget, seconds=seconds).begun_now()
         self._least = self._cost(first.path)
         self.course = [(first.seconds, self._least[1])]
-        self._idle = self._shortenings = 0
+        self._idle = 0
+        self._shortenings = 0
 
     def clock(self) -> float:
         """Time since the first plan was begun [s]."""
-        return self._first.seconds + time.perf_counter() - self._begin
+        return self._first.seconds + self._budget.elapsed
 
     def run(self) -> None:
         """Go on until the time is up, nothing is gained any more, or the path costs as little as can be."""
-        seeds = np.random.default_rng([self._request.seed, 1])
+        seeds = np.random.default_rng([self._request.budget.seed, 1])
         paths = [self._shortened(self.best, self._quick)]
         while self._how.strategy == "restart-shorten" and self._idle < PATIENCE:
-            while len(paths) < PLANS and self._idle < PATIENCE:
-                if self._done():
-                    return
-                self.rounds, self._idle = self.rounds + 1, self._idle + 1
-                found = _found(self._again, self._next_request(int(seeds.integers(2**31))))
-                paths += [] if found is None else [self._shortened(found, self._quick)]
-            self._settle(min(paths, key=self._cost, default=self.best))
-            paths = []
+            if self._done():
+                return
+            self.rounds += 1
+            self._idle += 1
+            (turn,) = walk([self._turn(int(seeds.integers(2**31)))])
+            if turn.path is not None:
+                paths.append(self._shortened(turn.path, self._quick))
+            if len(paths) == PLANS or self._idle >= PATIENCE:
+                self._settle(min(paths, key=self._cost, default=self.best))
+                paths = []
         self._settle(self.best)
 
     @property
@@ -117,13 +125,15 @@ class _Work:
         """Checks by which it is seen what a path is worth; ways to shorten single-joint moves know no such limit."""
         return None if self._one_joint else QUICK_CHECKS
 
-    def _next_request(self, seed: int) -> Request:
-        """For another plan; of a planner that takes a bound, one whose path is not much longer than the best."""
-        request = replace(self._request, seconds=self._left(), seed=seed)
-        if not self._how.bounded or self._one_joint:
-            return request
-        limits = {"bound": BOUND * COSTS["length"](self.best, self._problem), "max_iterations": BOUNDED_SAMPLES}
-        return replace(request, restarts=0, parameters={**limits, **request.parameters})
+    def _turn(self, seed: int) -> Turn:
+        """Another plan; by a planner that takes a bound, one whose path is not much longer than the best."""
+        request = self._request
+        if self._bounded:
+            bound = BOUND * COSTS["length"](self.best, self._problem)
+            limits = {BOUND_OPTION: bound, ITERATION_LIMIT: BOUNDED_SAMPLES}
+            request = replace(request, restarts=0, parameters={**limits, **request.parameters})
+        budget = replace(request.budget, seconds=self._budget.left, seed=seed)
+        return Turn(self._problem, self._planner, request, budget)
 
     def _settle(self, path: JointPath) -> None:
         """Shorten a path as long as that gains something, if it is worth it."""
@@ -135,44 +145,41 @@ class _Work:
             path = self._shortened(path, None)
 
     def _done(self) -> bool:
-        return self._left() <= LEAST_SECONDS or self._least[1] <= self.bound * (1.0 + GAIN)
-
-    def _left(self) -> float:
-        return self._seconds - (time.perf_counter() - self._begin)
+        return self._budget.left <= LEAST_SECONDS or self._least[1] <= self.bound * (1.0 + GAIN)
 
     def _shortened(self, path: JointPath, checks: int | None) -> JointPath:
         """A path after some work, kept if it is the best; as it was if there is no time, or it does not move."""
-        left = self._left()
-        if left <= LEAST_SECONDS or len(path.waypoints) < 2:
+        if self._budget.left <= LEAST_SECONDS or len(path.waypoints) < 2:
             return path
         self._shortenings += 1
-        end, seed = time.perf_counter() + left, self._request.seed + self._shortenings
         clearance = possible_clearance(self._problem.world, self._request.clearance, path.waypoints)
-        limits: dict[str, Any] = {"checks": checks, "clearance": clearance, "seed": seed}
-        single = None if self._one_joint else False
-        found = shorten(path, self._problem, stop=lambda: time.perf_counter() > end, one_joint=single, **limits)
+        found = shorten(
+            path,
+            self._problem,
+            checks=checks,
+            seed=self._request.budget.seed + self._shortenings,
+            one_joint=None if self._one_joint else False,
+            clearance=clearance,
+            stop=self._budget.over,
+        )
         self._take(found)
         return found
 
     def _take(self, candidate: JointPath) -> None:
         """Keep a path if it is the best: proven and of single-joint moves if the first one is."""
-        if (self._one_joint and not candidate.one_joint_at_a_time) or (self._proven and not candidate.proven):
+        if self._one_joint and not candidate.one_joint_at_a_time:
             return
-        moves, cost = self._cost(candidate)
-        if (moves, cost) >= self._least:
+        if self._first.proven and not candidate.proven:
             return
-        if (moves, cost) < (self._least[0], self._least[1] * (1.0 - GAIN)):
+        cost = self._cost(candidate)
+        if cost >= self._least:
+            return
+        if cost < (self._least[0], self._least[1] * (1.0 - GAIN)):
             self._idle = 0
-        self.best, self._least = candidate, (moves, cost)
-        self.course.append((self.clock(), cost))
+        self.best = candidate
+        self._least = cost
+        self.course.append((self.clock(), cost[1]))
 
     def _cost(self, path: JointPath) -> tuple[int, float]:
         """What is to be small; of single-joint moves their number first."""
         return (path.transitions if self._one_joint else 0), COSTS[self._how.objective](path, self._problem)
-
-
-def _found(again: Callable[[Request], Plan], request: Request) -> JointPath | None:
-    try:
-        return again(request).path
-    except PlannerError:  # the first plan stands
-        return None

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector, dimensions, finite_array, positive, whole_number
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, ProblemError, require
 from rrtik_ompl.kernels.threads import in_threads
@@ -19,8 +20,8 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_options import is_safe
 from rrtik_ompl.planning.batches import Query, plans_together
-from rrtik_ompl.planning.outcome import Plan
-from rrtik_ompl.planning.plan import PROOF_MODES, RESTARTS, plan
+from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
+from rrtik_ompl.planning.plan import PROOF_MODES, plan
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -104,10 +105,10 @@ def _batch(
     """The plans of some queries: together as far as that goes, the others one after the other."""
     known: dict[int, Plan | None] = {}
     if planner is not None and not is_auto(planner) and options["proof"] != "off":
-        limit, parameters = positive(options["seconds"], "seconds"), options["parameters"] or {}
+        budget = Budget(seconds=positive(options["seconds"], "seconds"))
+        request = Request(budget, parameters=options["parameters"] or {})
         joints = {k: Query(q, goal, seed) for k, (q, goal, seed) in enumerate(queries) if isinstance(goal, JointGoal)}
-        given = find_planner(planner), planner, list(joints.values())
-        found = plans_together(world, *given, seconds=limit, restarts=RESTARTS, parameters=parameters)
+        found = plans_together(world, NamedPlanner(planner, find_planner(planner)), list(joints.values()), request)
         known = dict(zip(joints, found, strict=True))
     return [known.get(k) or _planned(world, planner, options, query) for k, query in enumerate(queries)]
 

@@ -6,11 +6,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ProofMode
 from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
 from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import as_it_stands
+
+RESTARTS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class NamedPlanner:
+    """A planner, and the name by which messages call it."""
+
+    name: str
+    factory: PlannerFactory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,22 +30,18 @@ class Request:
     """What `plan()` is asked for beside the problem and the planner; every value has been checked.
 
     Attributes:
-        seconds: Limit of wall time [s].
-        seed: Of everything random.
+        budget: Time, iterations of each planner, about, and the seed of everything random.
         restarts: Further attempts at most.
         parameters: Options of the planner.
         proof: Whether motions are to be proven.
         clearance: To be kept from obstacles [m], or None.
-        iterations: Of all attempts of a planner together, about; None: as many as there is time for.
     """
 
-    seconds: float
-    seed: int
-    restarts: int
-    parameters: Mapping[str, Any]
-    proof: ProofMode
-    clearance: float | None
-    iterations: int | None = None
+    budget: Budget
+    restarts: int = RESTARTS
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    proof: ProofMode = "preferred"
+    clearance: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,30 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, get_args
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import not_negative, positive, whole_number
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import Accuracy, ImproveStrategy, PathObjective, ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
-from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
+from rrtik_ompl.planning.attempts import run_planner
 from rrtik_ompl.planning.improving import Improvement, improved
-from rrtik_ompl.planning.one_planner import run_planner
+from rrtik_ompl.planning.outcome import RESTARTS, NamedPlanner, Request
 from rrtik_ompl.planning.outcome import Plan as Plan
-from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.planning.portfolio import run_portfolio
 from rrtik_ompl.planning.second_check import fixed_ends
 from rrtik_ompl.world.kept_clearance import check_clearance
 from rrtik_ompl.world.problem import Problem
 
-RESTARTS = 20
 MAX_RESTARTS = 1_000_000
-BOUND_OPTION = "bound"  # of planners that can be told how long a path may be
 MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 OBJECTIVES: tuple[PathObjective, ...] = get_args(PathObjective)
@@ -110,9 +107,8 @@ def plan(
     if isinstance(restarts, bool) or not isinstance(restarts, int) or not 0 <= restarts <= MAX_RESTARTS:
         raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
-    used = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")
+    drawn = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")
     one_of(PROOF_MODES, proof, "proof")
-    request = Request(limit, used, restarts, parameters or {}, proof, clearance)
     problem = problem if accuracy is None else problem.with_accuracy(accuracy)
     check_clearance(problem.world, clearance, fixed_ends(problem))
     how = Improvement(
@@ -120,18 +116,16 @@ def plan(
         one_of(OBJECTIVES, objective, "objective"),
         one_of(STRATEGIES, strategy, "strategy of improve"),
     )
-    found = _search_of(problem, planner)(request)
-    found = _improved(problem, planner, found, request, how) if found.found and how.seconds > 0.0 else found
+
+    request = Request(Budget(drawn, limit), restarts, parameters or {}, proof, clearance)
+    alone = _named(planner)
+    found = run_portfolio(problem, request) if alone is None else run_planner(problem, alone, request)
+    if found.found and how.seconds > 0.0:
+        finder = alone or NamedPlanner(found.planner, find_planner(found.planner))
+        found = improved(problem, found, finder, request, how)
     if found.path is None:
         return found
     return replace(found, member=problem.goal.member_at(problem.robot, found.path.end))
-
-
-def _improved(problem: Problem, planner: str | PlannerFactory, found: Plan, request: Request, how: Improvement) -> Plan:
-    """The plan improved by its planner; of several by the one that found the path."""
-    again = found.planner if isinstance(planner, str) else planner
-    bounded = BOUND_OPTION in planner_options(find_planner(again) if isinstance(again, str) else again)
-    return improved(problem, found, _search_of(problem, again), request, replace(how, bounded=bounded))
 
 
 def plan_counted(problem: Problem, iterations: int, *, seconds: float, seed: int) -> Plan:
@@ -143,13 +137,11 @@ def plan_counted(problem: Problem, iterations: int, *, seconds: float, seed: int
         seconds: Limit of wall time on top of that [s].
         seed: Of everything random.
     """
-    return run_portfolio(problem, Request(seconds, seed, RESTARTS, {}, "preferred", None, iterations))
+    return run_portfolio(problem, Request(Budget(seed, seconds, iterations)))
 
 
-def _search_of(problem: Problem, planner: str | PlannerFactory) -> Callable[[Request], Plan]:
-    """What plans by a planner, given a request."""
+def _named(planner: str | PlannerFactory) -> NamedPlanner | None:
+    """The one planner that is asked for; None for "auto"."""
     if not isinstance(planner, str):
-        return partial(run_planner, problem, planner.__name__, planner)
-    if is_auto(planner):
-        return partial(run_portfolio, problem)
-    return partial(run_planner, problem, planner, find_planner(planner))
+        return NamedPlanner(planner.__name__, planner)
+    return None if is_auto(planner) else NamedPlanner(planner, find_planner(planner))

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import chain
 from types import MappingProxyType
-from typing import Any
 
-from rrtik_ompl.base.errors import InputError, PlannerError
+from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUT_KERNELS
 from rrtik_ompl.kernels.search.taut.layout import KERNELS as TAUT_KERNELS
 from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.goal import TipGoal
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits, planners_with, traits_of
-from rrtik_ompl.planning.one_planner import run_planner
-from rrtik_ompl.planning.outcome import Plan, Request
+from rrtik_ompl.planning.attempts import Turn, walk
+from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.world.kept_clearance import possible_clearance
 from rrtik_ompl.world.problem import Problem
@@ -44,56 +45,19 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
     """
     refuse_options(request.parameters)
     _load_kernels(problem)
-    best, reasons, totals, spent = _search(problem, request)
-    path, left = best.path, request.seconds - spent
-    if path is not None and len(path.waypoints) > 2 and left > 0.0:
-        begin = time.perf_counter()
-        clearance = possible_clearance(problem.world, request.clearance, path.waypoints)
-        limits: dict[str, Any] = {"seconds": left, "checks": SHORTENING_CHECKS, "clearance": clearance}
-        shorter = shorten(path, problem, method="auto", one_joint=False, seed=request.seed, **limits)
-        path = shorter.with_waypoints(shorter.waypoints) if request.proof == "off" else shorter
-        spent += time.perf_counter() - begin
-    reason = "" if best.found else reasons
-    return replace(best, path=path, reason=reason, seconds=spent, statistics=MappingProxyType(totals))
-
-
-def _load_kernels(problem: Problem) -> None:
-    """Load what the first planner and the shortening will use: the first time on a machine that takes a while."""
-    if problem.world.fast is not None:
-        first = [traits_of(find_planner(name)).kernels for name in members(problem)[:1]]
-        load_together((*chain.from_iterable(first), PROOF_KERNELS, SHORTCUT_KERNELS, PROVEN_KERNELS, TAUT_KERNELS))
-
-
-def _search(problem: Problem, request: Request) -> tuple[Plan, str, dict[str, int | float], float]:
-    """The best plan of the planners that tried, why the others found none, the counts of all, and their time [s]."""
-    names, spent = members(problem), 0.0
-    best: Plan | None = None
-    broken: PlannerError | None = None
-    reasons: list[str] = []
-    totals: dict[str, int | float] = {}
-    for number, name in enumerate(names):
-        share = 1.0 if number == len(names) - 1 else SHARE
-        left = share * (request.seconds - spent)
-        if left <= 0.0:
+    turns: list[Turn] = []
+    for turn in walk(_turns(problem, request)):
+        turns.append(turn)
+        if turn.path is not None and turn.plan().proven is not False:
             break
-        begin = time.perf_counter()
-        try:
-            tried = run_planner(problem, name, find_planner(name), replace(request, seconds=left))
-        except PlannerError as error:
-            broken = error
-            reasons.append(str(error))
-            spent += time.perf_counter() - begin
-            continue
-        spent += tried.seconds
-        for key, value in tried.statistics.items():
-            totals[key] = totals.get(key, 0) + value
-        reasons += [] if tried.found else [f"{name}: {tried.reason}"]
-        best = tried if best is None or not best.found or _rank(tried) < _rank(best) else best
-        if best.found and best.proven is not False:
-            break
-    if best is None:
-        raise broken or InputError(f"planner '{AUTO}': no planner is installed; name one of OMPL's, such as RRTConnect")
-    return best, "; ".join(reasons), totals, spent
+
+    best = _best(turns)
+    reason = "" if best.found else "; ".join(map(_reason, filter(_in_vain, turns)))
+    counts = MappingProxyType(_totals(turns))
+    spent = sum(turn.seconds for turn in turns)
+    left = replace(request.budget, seconds=request.budget.seconds - spent).begun_now()
+    path = best.path if best.path is None else _shortened(best.path, problem, request, left)
+    return replace(best, path=path, reason=reason, seconds=spent + left.elapsed, statistics=counts)
 
 
 def members(problem: Problem) -> tuple[str, ...]:
@@ -114,6 +78,67 @@ def _by_turn() -> tuple[tuple[str, PlannerTraits], ...]:
     return tuple(sorted(found.items(), key=lambda item: item[1].portfolio_turn))
 
 
-def _rank(plan: Plan) -> tuple[bool, bool]:
-    """What is to be small: no path, then a path that is not proven."""
-    return not plan.found, plan.proven is False
+def _load_kernels(problem: Problem) -> None:
+    """Load what the first planner and the shortening will use: the first time on a machine that takes a while."""
+    if problem.world.fast is not None:
+        first = [traits_of(find_planner(name)).kernels for name in members(problem)[:1]]
+        load_together((*chain.from_iterable(first), PROOF_KERNELS, SHORTCUT_KERNELS, PROVEN_KERNELS, TAUT_KERNELS))
+
+
+def _turns(problem: Problem, request: Request) -> Iterator[Turn]:
+    """The turns of the planners, each with a share of the time that is left then, as long as there is any."""
+    names = members(problem)
+    left = request.budget.seconds
+    for number, name in enumerate(names):
+        share = 1.0 if number == len(names) - 1 else SHARE
+        if left <= 0.0:
+            return
+        planner = NamedPlanner(name, find_planner(name))
+        turn = Turn(problem, planner, request, replace(request.budget, seconds=share * left))
+        yield turn
+        left -= turn.seconds
+
+
+def _best(turns: Sequence[Turn]) -> Plan:
+    """Of the first turn with a proven path, or else with any, or else of the last one whose planner did not break."""
+    plans = [turn.plan() for turn in turns if turn.error is None]
+    if not plans:
+        broken = next((turn.error for turn in reversed(turns)), None)
+        raise broken or InputError(f"planner '{AUTO}': no planner is installed; name one of OMPL's, such as RRTConnect")
+    found = [plan for plan in plans if plan.found]
+    return min(found, key=lambda plan: plan.proven is False, default=plans[-1])
+
+
+def _in_vain(turn: Turn) -> bool:
+    return turn.path is None
+
+
+def _reason(turn: Turn) -> str:
+    return f"{turn.planner.name}: {turn.reason}" if turn.error is None else str(turn.error)
+
+
+def _totals(turns: Sequence[Turn]) -> dict[str, int | float]:
+    """The counts of all planners that did not break."""
+    totals: dict[str, int | float] = {}
+    for turn in turns:
+        for key, value in turn.totals.items() if turn.error is None else ():
+            totals[key] = totals.get(key, 0) + value
+    return totals
+
+
+def _shortened(path: JointPath, problem: Problem, request: Request, budget: Budget) -> JointPath:
+    """The path after a fixed number of checks, as far as there is time."""
+    if len(path.waypoints) < 3 or budget.over():
+        return path
+    clearance = possible_clearance(problem.world, request.clearance, path.waypoints)
+    shorter = shorten(
+        path,
+        problem,
+        method="auto",
+        one_joint=False,
+        seed=budget.seed,
+        seconds=budget.seconds,
+        checks=SHORTENING_CHECKS,
+        clearance=clearance,
+    )
+    return shorter.with_waypoints(shorter.waypoints) if request.proof == "off" else shorter

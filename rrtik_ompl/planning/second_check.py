@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.base.choices import ProofMode
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.ompl_bridge.attempt import Attempt
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
+from rrtik_ompl.ompl_bridge.planner_traits import traits_of
 from rrtik_ompl.planning.moves.clearance_levels import roomiest
+from rrtik_ompl.planning.outcome import NamedPlanner, Request
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import Room, keeping, leaving_room, proved, proved_as_clear, room_between
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.route_check import violations_of
 
+MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")  # options of planners, see MoveRules
 TOUCHING = 1e-6  # [m]; bodies that are nearer to their margin than this count as touching
 
 
@@ -32,28 +33,25 @@ class SecondCheck:
 
     Args:
         problem: What is solved.
-        name: Of the planner, for messages.
-        proof: See :func:`rrtik_ompl.planning.plan.plan`.
-        clearance: Likewise.
-        traits: Of the planner.
-        ruled: Whether its options say which moves there may be, so that none are added.
+        planner: Whose paths are checked.
+        request: Which proofs and which clearance are asked for; where the planner's options say which moves there may
+            be, none are added.
+        seed: Of the detours.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        name: str,
-        proof: ProofMode,
-        clearance: float | None,
-        traits: PlannerTraits,
-        *,
-        ruled: bool,
-    ) -> None:
+    def __init__(self, problem: Problem, planner: NamedPlanner, request: Request, *, seed: int) -> None:
         self.best: JointPath | None = None
+        self.reason = ""
+        self.rejected = 0
+        self.open = 0
+        self._problem = problem
+        self._name = planner.name
+        self._traits = traits_of(planner.factory)
+        self._proof = request.proof
+        self._clearance = request.clearance
+        self._ruled = any(option in request.parameters for option in MOVE_RULES)
+        self._seed = seed
         self._ends_proven = True
-        self.reason, self.rejected, self.open = "", 0, 0
-        self._problem, self._name, self._proof, self._clearance = problem, name, proof, clearance
-        self._traits, self._ruled = traits, ruled
 
     @property
     def proves(self) -> bool:
@@ -78,8 +76,11 @@ class SecondCheck:
             return f"the {what} is not proven free: {self._first_gap(np.stack([q, q]))}"
         return ""
 
-    def still(self, path: JointPath) -> JointPath:
-        """A path that stays where it is, with a proof of the clearance, or of what there is of it."""
+    def still(self) -> JointPath:
+        """The path that stays at the start, with a proof of the clearance, or of what there is of it."""
+        path = JointPath.of(self._problem.robot, self._problem.start[None])
+        if not self.proves:
+            return path
         room = self._room(path.waypoints)
         return proved_as_clear(path, self._problem.world, 0.0 if room is None else room.kept)
 
@@ -97,34 +98,29 @@ class SecondCheck:
             return strict.with_world(keeping(strict.world, room.searched, proven=room.kept))
         return strict.with_world(leaving_room(strict.world, room))
 
-    def accepted(self, outcome: Attempt, seed: int) -> JointPath | None:
-        """The path of an attempt if it is accepted.
-
-        Args:
-            outcome: Of the attempt.
-            seed: Of the detours.
-        """
+    def accepted(self, outcome: Attempt) -> JointPath | None:
+        """The path of an attempt if it is accepted."""
         if outcome.rows is None:
-            why = (
-                f": {outcome.reason}" if outcome.reason else f" with '{outcome.status}'"
-            )  # OMPL's words where it has none
+            why = f": {outcome.reason}" if outcome.reason else f" with '{outcome.status}'"  # or else OMPL's words
             self.reason = f"{self._name} ended{why}"
             return None
-        problem, path = self._problem, JointPath.of(self._problem.robot, outcome.rows)
+        problem = self._problem
+        path = JointPath.of(problem.robot, outcome.rows)
         if not (path.start == problem.start).all() or not _at_goal(problem, path.end):
             self.reason = f"the path of {self._name} does not lead from the start to the goal"
             self.rejected += 1
             return None
-        proven = self._proven(path, seed) if self.proves else None
+        proven = self._proven(path) if self.proves else None
         return proven if proven is not None else self._checked(path)
 
-    def _proven(self, path: JointPath, seed: int) -> JointPath | None:
+    def _proven(self, path: JointPath) -> JointPath | None:
         """The path, with detours where it needs them, if it is proven to keep the clearance."""
         room = self._room(path.waypoints[[0, -1]])
         if room is None:
             self._ends_proven = False
             return None
-        world, rows = self._problem.world, path.waypoints
+        world = self._problem.world
+        rows = path.waypoints
         leaves_room = self._traits.leaves_room
         first = proved_as_clear(path, world, room.kept) if leaves_room else proved(path, world, clearance=room.kept)
         if first.proven:
@@ -132,7 +128,8 @@ class SecondCheck:
             return first
         if self._ruled or self._problem.constraints:
             return None
-        rng, single = np.random.default_rng(seed), self._traits.one_joint
+        rng = np.random.default_rng(self._seed)
+        single = self._traits.one_joint
         known = None if leaves_room else first.proof
         repaired = with_detours(world, rows, clearance=room.kept, rng=rng, one_joint=single, proof=known)
         mended = None if repaired is None else proved(path_through(path, repaired), world, clearance=room.kept)

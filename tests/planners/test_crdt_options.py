@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.transitions import merge_moves, single_joint
@@ -22,14 +23,14 @@ def solved(problem: Problem, planner: Any, seed: int, world: Any = None, **optio
     aims, parameters = problem.goal.q[None], {"max_iterations": 4000, **options}
     factory = planner if world is None else lambda si, seed, **more: planner(si, world=world, seed=seed, **more)
     if world is None:
-        found = attempt(problem, factory, aims, seconds=20.0, seed=seed, parameters=parameters)
+        found = attempt(problem, factory, aims, Budget(seed, seconds=20.0), parameters=parameters)
         return found.rows, dict(found.statistics)
 
     class InAnotherWorld(planner):  # type: ignore[misc]
         def __init__(self, si: Any, **given: Any) -> None:
             super().__init__(si, **{**given, **parameters, "world": world})
 
-    found = attempt(problem, InAnotherWorld, aims, seconds=20.0, seed=seed, parameters={})
+    found = attempt(problem, InAnotherWorld, aims, Budget(seed, seconds=20.0))
     return found.rows, dict(found.statistics)
 
 
@@ -108,7 +109,7 @@ def test_goals_that_differ_in_frozen_joints_are_left_out() -> None:
     problem = shipped("titan4_sdu")
     other = problem.goal.q + np.array([0, 0, 0, 0, 0, 0.2])
     goals = np.vstack([other, problem.goal.q])
-    found = attempt(problem, BiCRDT, goals, seconds=20.0, seed=1, parameters={"frozen_joints": [5]})
+    found = attempt(problem, BiCRDT, goals, Budget(1, seconds=20.0), parameters={"frozen_joints": [5]})
     np.testing.assert_array_equal(found.rows[-1], problem.goal.q)
 
 
@@ -165,9 +166,9 @@ def test_goals_whose_last_moves_are_not_free_are_left_out() -> None:
     start = np.array([15.0, 9.0])
     assert not problem.world.motion_valid(np.array([15.0, 9.0]), goals[0])
     other = Problem(problem.world, start, goals[1])
-    found = attempt(other, BiCRDT, goals, seconds=20.0, seed=1, parameters={"last_joints": [1]})
+    found = attempt(other, BiCRDT, goals, Budget(1, seconds=20.0), parameters={"last_joints": [1]})
     assert found.rows.tolist()[-2:] == [[22.0, 9.0], [22.0, 16.0]]
-    blocked = attempt(other, BiCRDT, goals[:1], seconds=20.0, seed=1, parameters={"last_joints": [1]})
+    blocked = attempt(other, BiCRDT, goals[:1], Budget(1, seconds=20.0), parameters={"last_joints": [1]})
     assert blocked.rows is None
 
 
@@ -175,8 +176,8 @@ def test_a_last_move_shorter_than_the_smallest_is_not_made() -> None:
     problem = shipped("titan4_sdu")
     other = Problem(problem.world, problem.start, problem.goal.q + np.array([0, 0, 0, 0, 0, 0.05]))
     options = {"last_joints": [5], "smallest_move": 0.06}
-    found = attempt(other, BiCRDT, other.goal.q[None], seconds=20.0, seed=1, parameters=options)
+    found = attempt(other, BiCRDT, other.goal.q[None], Budget(1, seconds=20.0), parameters=options)
     assert found.rows is None
     options["smallest_move"] = 0.04
-    found = attempt(other, BiCRDT, other.goal.q[None], seconds=20.0, seed=1, parameters=options)
+    found = attempt(other, BiCRDT, other.goal.q[None], Budget(1, seconds=20.0), parameters=options)
     assert found.rows is not None

@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 from ompl import base as ob
 
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.geometry.covers.spheres import inner_spheres, outer_cover
@@ -348,7 +349,7 @@ def test_ends_that_only_the_world_knows_to_collide_are_refused(coarse):
 def test_ends_that_are_known_to_be_free_are_not_checked_again():
     problem = Problem(three_joints(True), START[0], GOAL[0])
     once, again = (
-        attempt(problem, FastRRTConnect, GOAL, seconds=10.0, seed=1, parameters={}, checked=checked)
+        attempt(problem, FastRRTConnect, GOAL, Budget(seed=1, seconds=10.0), checked=checked)
         for checked in (True, False)
     )
     assert (once.statistics["checked_states"], again.statistics["checked_states"]) == (0, 2)

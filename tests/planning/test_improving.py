@@ -7,15 +7,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
+from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.planning import improving
 from rrtik_ompl.planning.improving import Improvement, improved
-from rrtik_ompl.planning.outcome import Request
+from rrtik_ompl.planning.outcome import NamedPlanner, Request
 from rrtik_ompl.planning.path_costs import COSTS, least_time, weighted_length
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
+from rrtik_planners import FastRRTConnect
 
 LONG = 20.0  # [s] a limit that the tests do not come near to
 
@@ -68,41 +70,44 @@ def test_single_joint_moves_stay_so_and_never_become_more(few_rounds):
     assert better.path.transitions <= first.path.transitions
 
 
-def test_planners_that_find_nothing_or_break_leave_the_first_path(few_rounds):
+def ended_by(error, after):
+    """A planner that raises an error in place of every search after some number of them."""
+    searches = []
+
+    class Ended(FastRRTConnect):
+        def search(self, *given):
+            searches.append(given)
+            if len(searches) > after:
+                raise error
+            return super().search(*given)
+
+    return Ended
+
+
+@pytest.mark.parametrize("error", [RuntimeError("it broke"), InputError("not like this")])
+def test_planners_that_break_after_the_first_path_leave_it(few_rounds, error):
     problem = load_problem("titan4_prisms")
     first = plan(problem, "fastrrtconnect", seed=1)
-    request = Request(LONG, 1, 0, {}, "preferred", None)
-
-    def broken(_):
-        raise PlannerError("it broke")
-
-    kept = improved(problem, first, broken, request, Improvement(LONG))
+    kept = plan(problem, ended_by(error, after=1), seed=1, seconds=LONG, improve=LONG)
     assert kept.found
     assert kept.path.length <= first.path.length
+    assert kept.statistics["improving_rounds"] >= 3
 
 
 def test_ctrl_c_ends_the_work_and_keeps_the_best_path():
     problem = load_problem("titan4_prisms")
     first = plan(problem, "fastrrtconnect", seed=1)
-    asked = []
-
-    def interrupted(request):
-        asked.append(request)
-        if len(asked) == 3:
-            raise KeyboardInterrupt
-        return plan(problem, "fastrrtconnect", seed=request.seed)
-
-    kept = improved(problem, first, interrupted, Request(LONG, 1, 0, {}, "preferred", None), Improvement(LONG))
-    assert kept.statistics["improving_rounds"] == 3
+    kept = plan(problem, ended_by(KeyboardInterrupt(), after=3), seed=1, seconds=LONG, improve=LONG)
+    assert 0 < kept.statistics["improving_rounds"] <= 3  # a round may search twice
     assert kept.path.length < first.path.length
     assert kept.path.length == kept.statistics["cost_over_time"][-1][1]
 
 
 def test_no_round_begins_when_the_time_of_all_is_up():
     problem = load_problem("titan4_prisms")
-    first = plan(problem, "fastrrtconnect", seed=1)
-    request = Request(first.seconds, 1, 0, {}, "preferred", None)
-    kept = improved(problem, first, lambda _: pytest.fail("a further plan"), request, Improvement(LONG))
+    planner = NamedPlanner("fastrrtconnect", FastRRTConnect)
+    first = plan(problem, planner.factory, seed=1)
+    kept = improved(problem, first, planner, Request(Budget(1, first.seconds)), Improvement(LONG))
     assert kept.path is first.path
     assert kept.statistics["improving_rounds"] == 0
 

@@ -9,12 +9,9 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
-from rrtik_ompl.ompl_bridge.planner_names import find_planner
 from rrtik_ompl.planning import improving
-from rrtik_ompl.planning.improving import Improvement, improved
-from rrtik_ompl.planning.one_planner import run_planner
-from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.planning.path_costs import least_cost, length
+from rrtik_planners import FastRRTConnect
 
 HEAVY = 6.0
 
@@ -99,15 +96,16 @@ def test_plans_that_shall_be_shorter_than_the_best_path_are_bounded_in_the_weigh
     robot = rrtik.weighted(rrtik.load_robot("ur5"), {"shoulder_pan_joint": 5.0})
     start, goal = np.array([[-1.2, -0.9, 1.2, -0.3, 1.6, 0.0], [1.2, -0.9, 1.2, -0.3, 1.6, 0.0]])
     problem = rrtik.Problem(rrtik.World(robot, rrtik.Scene([post])), start, goal)
-    request = Request(20.0, 1, 0, {}, "preferred", None)
     tried = []
 
-    def again(request):
-        tried.append(run_planner(problem, "fastrrtconnect", find_planner("fastrrtconnect"), request).found)
-        return first
+    class Watched(FastRRTConnect):
+        def search(self, *given):
+            found = super().search(*given)
+            if self.bound is not None:
+                tried.append(found.path is not None)
+            return found
 
-    first = run_planner(problem, "fastrrtconnect", find_planner("fastrrtconnect"), request)
-    improved(problem, first, again, request, Improvement(20.0, bounded=True))
+    rrtik.plan(problem, Watched, seed=1, seconds=20.0, improve=20.0)
     assert np.mean(tried) > 0.5
 
 
