@@ -19,6 +19,7 @@ import rrtik_ompl as rrtik
 from bench.proofs.judge import deepest_cut
 from bench.shared.problems import goal_joints
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ShorteningMethod
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
@@ -28,7 +29,7 @@ from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Cylinder
 from rrtik_ompl.ompl_bridge.attempt import Attempt, attempt
 from rrtik_ompl.planning.generated_problems import generated_problem
-from rrtik_ompl.planning.shortening import METHODS, Task
+from rrtik_ompl.planning.shortening import METHODS, Task, Wishes
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.world import World
@@ -141,7 +142,8 @@ def _before_and_after(
     seconds = FEWEST if METHODS[method].moves_only else None
     short = rrtik.shorten(raw, problem, method=method, seed=seed, seconds=seconds)
     dense = densely_checked(problem)
-    task = Task(dense.world, seed=seed, clearance=0.0, seconds=np.inf if seconds is None else seconds)
+    budget = Budget(seed, np.inf if seconds is None else seconds)
+    task = Task(dense.world, Wishes(budget, clearance=0.0))
     return short, raw.with_waypoints(METHODS[method].run(raw.waypoints, task, dense))
 
 

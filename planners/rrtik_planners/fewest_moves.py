@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, not_negative, whole_number
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, transitions
@@ -22,7 +23,7 @@ from rrtik_ompl.planning.moves.reach_bound import reach_bound
 from rrtik_ompl.planning.moves.rules import Joints, PerJoint
 from rrtik_ompl.planning.moves.search import MOST_NODES, MoveSearch, Proof
 from rrtik_ompl.planning.moves.staircase import one_joint_moves
-from rrtik_ompl.planning.shortening import Task
+from rrtik_ompl.planning.shortening import Task, Wishes
 from rrtik_ompl.planning.shortening.random_cut import shortcut
 from rrtik_ompl.world.world import World
 from rrtik_planners.bicrdt import BiCRDT
@@ -127,7 +128,7 @@ class FewestMoves(OneJointPlanner):
         world = self._world
         if not isinstance(world, World):
             return self._found(_Question(starts, goals, checker, ptc))
-        self._prove = remembered(world, self._movable(starts))
+        self._prove = remembered(world, self._movable(starts), ptc)
         best: SearchResult | None = None
         levels = clearance_levels(world, starts[:1], self.clearance)
         for number in range(len(levels)):
@@ -167,14 +168,15 @@ class FewestMoves(OneJointPlanner):
             self.options.joint_costs,
             self.options.smallest_move,
             levels,
+            Budget(int(self.rng.integers(2**63)), stop=ptc),
         )
         pairs = [(start, goal) for start in starts for goal in goals]
-        bound, seed = int(best.statistics["lower_bound"]), int(self.rng.integers(2**63))
+        bound = int(best.statistics["lower_bound"])
         if len(starts) == len(goals) == 1:
             moves = transitions(path)
             bound = max(bound, reach_bound(self._world, self._movable(starts), starts[0], goals[0], moves, ptc))
             best = replace(best, statistics={**best.statistics, "lower_bound": bound, "gap": moves - bound})
-        found = grids.route(pairs, merge_moves(path, tolerance=0.0), bound, seed, ptc)
+        found = grids.route(pairs, merge_moves(path, tolerance=0.0), bound)
         if found is None:
             return best
         route, number = found
@@ -205,7 +207,7 @@ class FewestMoves(OneJointPlanner):
             asked.goals,
             *self.bounds(),
             asked.checker.motion_valid_batch,
-            seed=int(self.rng.integers(2**63)),
+            budget=Budget(int(self.rng.integers(2**63)), stop=asked.stop),
             costs=self.options.joint_costs,
             frozen=frozen,
             smallest_move=self.options.smallest_move,
@@ -213,7 +215,7 @@ class FewestMoves(OneJointPlanner):
             prove=self._prove,
             all_free=None if asked.level is None or world is None else world.motion_valid_batch,
         )
-        moves.try_corner_routes(asked.stop)
+        moves.try_corner_routes()
         iterations = 0
         if asked.known is None:
             iterations = self._quick_routes(moves, asked, patient=patient)
@@ -223,7 +225,7 @@ class FewestMoves(OneJointPlanner):
             return SearchResult(None, {"iterations": iterations})
         grids_follow = asked.level is not None
         rounds = rounds_before(self.rounds, self._movable(asked.starts)) if grids_follow else self.rounds
-        moves.improve(rounds, asked.stop)
+        moves.improve(rounds)
         counts = {"iterations": iterations, "rounds": moves.rounds, "lower_bound": moves.bound}
         return SearchResult(moves.route, {**counts, "gap": moves.moves - moves.bound})
 
@@ -270,7 +272,7 @@ class FewestMoves(OneJointPlanner):
         ).search(*asked.ends)
         if sampled.path is None:
             return None
-        short = shortcut(sampled.path, Task(world, seed=seed, stop=asked.stop))
+        short = shortcut(sampled.path, Task(world, Wishes(Budget(seed, stop=asked.stop))))
         try:
             return one_joint_moves(JointPath.of(world.robot, short), world).waypoints
         except InputError:  # it comes so close to something that no single-joint moves follow it

@@ -10,6 +10,7 @@ import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.connect_layout import KERNELS
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUTS
@@ -18,7 +19,7 @@ from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.planning.shortening.best import best_in_time
 from rrtik_ompl.planning.shortening.restarts import GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
-from rrtik_ompl.planning.shortening.task import Task
+from rrtik_ompl.planning.shortening.task import Task, Wishes
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 
@@ -121,7 +122,8 @@ class RestartShorten(FastRRTConnect):
         assert motions is not None
         before = np.inf
         for turn in range(100):
-            task = Task(motions, checks=QUICK_CHECKS, seed=100 * number + turn, stop=ptc)
+            budget = Budget(100 * number + turn, iterations=QUICK_CHECKS, stop=ptc)
+            task = Task(motions, Wishes(budget))
             found = best_in_time(path, task)
             checker.checked_motions += task.asked if motions is self._world else 0
             if not self.stands(found, checker):  # parts of free motions, asked otherwise

@@ -49,8 +49,8 @@ class Budget:
 
     @property
     def left(self) -> float:
-        """Time that is left [s]; none after a stop, less than none when it is over."""
-        return -np.inf if self.stop() else self.begun + self.seconds - time.monotonic()
+        """Time that is left [s], whoever stops the work; less than none when it is over."""
+        return self.begun + self.seconds - time.monotonic()
 
     @property
     def limited(self) -> bool:
@@ -59,7 +59,7 @@ class Budget:
 
     def over(self) -> bool:
         """Whether it is time to stop: a :data:`Stop` for searches that are given nothing else."""
-        return self.left <= 0.0
+        return self.left <= 0.0 or bool(self.stop())
 
     def begun_now(self) -> Budget:
         """The same budget, whose time begins now."""

@@ -9,6 +9,7 @@ from ompl import geometric as og
 from ompl import util as ou
 
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import PlannerError
 from rrtik_ompl.ompl_bridge.attempt import in_short, interrupt_ends, quiet
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
@@ -18,7 +19,7 @@ from rrtik_ompl.world.problem import Problem
 MAX_SECONDS = 1e9  # [s]
 
 
-def simplified(problem: Problem, route: Matrix, *, seconds: float, seed: int) -> tuple[Matrix, int]:
+def simplified(problem: Problem, route: Matrix, budget: Budget) -> tuple[Matrix, int]:
     """Let ``ompl.geometric.PathSimplifier`` shorten a route, shape (k, n); also how many motions were checked.
 
     Its last step checks configurations alone of what it has bent, so the result must be checked. When the time is up
@@ -29,11 +30,12 @@ def simplified(problem: Problem, route: Matrix, *, seconds: float, seed: int) ->
         KeyboardInterrupt: After it has stopped in good order.
     """
     with quiet():
-        ou.RNG.setSeed(1 + seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
+        ou.RNG.setSeed(1 + budget.seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
         validity = ValidityCallback(problem.world)
         si = space_information(problem, route, validity)
-        validity.deadline = time.monotonic() + min(seconds, MAX_SECONDS)
-        condition = ob.timedPlannerTerminationCondition(min(seconds, MAX_SECONDS))
+        seconds = 0.0 if budget.over() else min(budget.left, MAX_SECONDS)
+        validity.deadline = time.monotonic() + seconds
+        condition = ob.timedPlannerTerminationCondition(seconds)
         validity.stop = condition.terminate
         states = StateIO(si)
         path = states.path(si, route)

@@ -12,6 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ImproveStrategy, PathObjective
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT
@@ -19,7 +20,7 @@ from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.planning.attempts import Turn, walk
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.path_costs import COSTS, least_cost
-from rrtik_ompl.planning.shortening import shorten
+from rrtik_ompl.planning.shortening import Wishes, shortened
 from rrtik_ompl.planning.shortening.restarts import BOUND, BOUNDED_SAMPLES, GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
 from rrtik_ompl.world.kept_clearance import possible_clearance
 from rrtik_ompl.world.problem import Problem
@@ -153,15 +154,9 @@ class _Work:
             return path
         self._shortenings += 1
         clearance = possible_clearance(self._problem.world, self._request.clearance, path.waypoints)
-        found = shorten(
-            path,
-            self._problem,
-            checks=checks,
-            seed=self._request.budget.seed + self._shortenings,
-            one_joint=None if self._one_joint else False,
-            clearance=clearance,
-            stop=self._budget.over,
-        )
+        budget = Budget(self._budget.seed + self._shortenings, iterations=checks, stop=self._budget.over)
+        single = self._one_joint and path.one_joint_at_a_time
+        found = shortened(path, self._problem, Wishes(budget, single, clearance=clearance))
         self._take(found)
         return found
 

@@ -19,7 +19,7 @@ from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_opti
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits, planners_with, traits_of
 from rrtik_ompl.planning.attempts import Turn, walk
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
-from rrtik_ompl.planning.shortening import shorten
+from rrtik_ompl.planning.shortening import Wishes, shortened
 from rrtik_ompl.world.kept_clearance import possible_clearance
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proof import PROOF_KERNELS
@@ -131,14 +131,6 @@ def _shortened(path: JointPath, problem: Problem, request: Request, budget: Budg
     if len(path.waypoints) < 3 or budget.over():
         return path
     clearance = possible_clearance(problem.world, request.clearance, path.waypoints)
-    shorter = shorten(
-        path,
-        problem,
-        method="auto",
-        one_joint=False,
-        seed=budget.seed,
-        seconds=budget.seconds,
-        checks=SHORTENING_CHECKS,
-        clearance=clearance,
-    )
+    counted = replace(budget, iterations=SHORTENING_CHECKS)
+    shorter = shortened(path, problem, Wishes(counted, clearance=clearance))
     return shorter.with_waypoints(shorter.waypoints) if request.proof == "off" else shorter

@@ -172,11 +172,11 @@ class BatchedMotionQueries:
         stop: True ends the search.
     """
 
-    def __init__(self, motions_free: MotionsFree) -> None:
+    def __init__(self, motions_free: MotionsFree, stop: Stop = no_stop) -> None:
         self._motions_free = motions_free
         self._batch = FIRST_BATCH
         self.asked = 0
-        self.stop: Stop = no_stop
+        self.stop = stop
 
     def __call__(self, tails: Matrix, heads: Matrix) -> Mask:
         """Which motions are free, shapes (m, n) and (m,).
@@ -184,11 +184,20 @@ class BatchedMotionQueries:
         Raises:
             OutOfTime: If it is time to stop.
         """
-        parts, first = [np.zeros(0, dtype=bool)], 0
+        return self._answers(tails, heads, self.stop)
+
+    def to_the_end(self, tails: Matrix, heads: Matrix) -> Mask:
+        """Which motions are free, shapes (m, n) and (m,), even when it is time to stop."""
+        return self._answers(tails, heads, no_stop)
+
+    def _answers(self, tails: Matrix, heads: Matrix, stop: Stop) -> Mask:
+        parts = [np.zeros(0, dtype=bool)]
+        first = 0
         while first < len(tails):
-            if self.stop():
+            if stop():
                 raise OutOfTime
-            begin, last = time.thread_time(), first + self._batch
+            begin = time.thread_time()
+            last = first + self._batch
             parts.append(self._motions_free(tails[first:last], heads[first:last]))
             first = last
             if time.thread_time() - begin > CALL_TARGET_SECONDS:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import route_length, single_joint, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_cut, double_axis_cut
@@ -67,7 +68,7 @@ def route_run(problem: Problem, seed: int) -> RouteRun:
     twice = double_axis_cut(raw, motions)
     post_seconds = perf_counter() - begin
     test = problem.world.motion_valid_batch
-    stages = [raw, axis_cut(raw, test), twice, axis_cut_rounds(raw, test, seed=seed)]
+    stages = [raw, axis_cut(raw, test), twice, axis_cut_rounds(raw, test, budget=Budget(seed))]
     passed = [sound(problem, route) for route in stages]
     routes = [route if ok else raw for route, ok in zip(stages, passed, strict=True)]
     return RouteRun(

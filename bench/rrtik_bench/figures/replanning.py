@@ -78,7 +78,7 @@ def cuts(drawing: Drawing, quick: bool) -> None:
             panel.fill(*polygon.T, color=SOLID)
         panel.plot(*route.T, color=INK, linewidth=0.7, label=f"RRT-Connect: {route_length(route):.2f}")
         for name, color in CUTS.items():
-            cut = METHODS[name](route, Task(plane, seed=0))
+            cut = METHODS[name](route, Task(plane))
             panel.plot(*cut.T, color=color, linewidth=1.6, label=f"{name}: {route_length(cut):.2f}")
         panel.set_title(f"shortest of its class: {plane.class_optimum(route):.2f}", fontsize=9)
         panel.set(aspect="equal", xlim=(0, 26), ylim=(0, 20))

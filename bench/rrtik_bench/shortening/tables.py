@@ -14,11 +14,12 @@ from rrtik_bench.report.rows import Bar, Row, exactly, judged
 from rrtik_bench.shortening.plane_worlds import PUBLISHED, Plane, sampled_route
 from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.model.transitions import part_counts, route_length, subdivided
 from rrtik_ompl.planning.shortening.random_cut import random_cut
 from rrtik_ompl.planning.shortening.retraction import retract
 from rrtik_ompl.planning.shortening.sequential import sequential_cut
-from rrtik_ompl.planning.shortening.task import Task
+from rrtik_ompl.planning.shortening.task import Task, Wishes
 
 STEP = 1.0  # of the planner
 Method: TypeAlias = Callable[[Matrix, Task], Matrix]
@@ -46,7 +47,7 @@ class Outcome:
 def _outcome(method: Method, cases: list[tuple[Plane, Matrix]]) -> Outcome:
     ratios, questions, begin = [], [], time.process_time()
     for seed, (plane, route) in enumerate(cases):
-        task = Task(plane, seed=seed)
+        task = Task(plane, Wishes(Budget(seed)))
         ratios.append(route_length(method(route, task)) / plane.class_optimum(route))
         questions.append(task.asked + task.confirmed_again)
     took = (time.process_time() - begin) / len(cases)
@@ -106,7 +107,7 @@ def _constant(case: tuple[Plane, Matrix]) -> list[Row]:
     asked: dict[str, list[int]] = {"retraction": [], "random 100": []}
     for name, counts in asked.items():
         for seed in range(10):
-            task = Task(plane, seed=seed)
+            task = Task(plane, Wishes(Budget(seed)))
             METHODS[name](route, task)
             counts.append(task.asked + task.confirmed_again)
     spread = {name: max(counts) - min(counts) for name, counts in asked.items()}

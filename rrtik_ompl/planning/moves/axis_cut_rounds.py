@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.base.budget import Stop, no_stop
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.transitions import lower_bound, route_length, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_cut, check_once, double_axis_cut
@@ -22,8 +22,7 @@ def axis_cut_rounds(
     motions_free: MotionsFree,
     *,
     rounds: int = MAX_CUT_ROUNDS,
-    seed: int = 0,
-    stop: Stop = no_stop,
+    budget: Budget | None = None,
 ) -> Matrix:
     """The double pass, then ``rounds`` passes with random joint orders in alternating direction; keeps the best.
 
@@ -34,8 +33,7 @@ def axis_cut_rounds(
         waypoints: Shape (k, n), start first.
         motions_free: Which straight motions are free, for batches of shape (m, n).
         rounds: Number of further passes, at least 0.
-        seed: Of the random orders.
-        stop: Called often; true ends the work, and the best so far is returned.
+        budget: When to end, with the best so far, and the seed of the random orders; without an end if None.
 
     Returns:
         Shape (m, n), start first: the route with the fewest transitions seen, the shortest among those.
@@ -45,13 +43,15 @@ def axis_cut_rounds(
     """
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
-    rng, free = np.random.default_rng(seed), check_once(motions_free)
-    route = best = double_axis_cut(waypoints, free, stop=stop)
+    budget = Budget() if budget is None else budget
+    rng = np.random.default_rng(budget.seed)
+    free = check_once(motions_free)
+    route = best = double_axis_cut(waypoints, free, stop=budget.over)
     fewest = lower_bound(best[0], best[-1])
     for k in range(rounds):
-        if transitions(best) == fewest or stop():
+        if transitions(best) == fewest or budget.over():
             break
-        route = axis_cut(route[::-1], free, axes=rng.permutation(route.shape[1]).tolist(), stop=stop)
+        route = axis_cut(route[::-1], free, axes=rng.permutation(route.shape[1]).tolist(), stop=budget.over)
         best = min(best, route[::-1] if k % 2 == 0 else route, key=route_rank)
     return best
 

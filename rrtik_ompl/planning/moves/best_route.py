@@ -7,13 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.base.budget import no_stop
 from rrtik_ompl.model.transitions import edge_keys, merge_moves, transitions
 from rrtik_ompl.planning.moves.axis_cut import cut_parts, double_axis_cut
 from rrtik_ompl.planning.moves.lattice import MoveLattice
 from rrtik_ompl.planning.moves.rules import long_enough
 from rrtik_ompl.planning.moves.values import Values, lattice_size, within_travel
-from rrtik_ompl.world.motion_queries import BatchedMotionQueries
+from rrtik_ompl.world.motion_queries import BatchedMotionQueries, MotionsFree
 
 DIGITS = 9  # of the travel after the point; the rest is rounding
 NONE = 2**31  # moves, if there is no route
@@ -109,10 +108,7 @@ class BestRoute:
 
     def _confirmed_cut(self, found: Matrix, route: Matrix) -> Matrix:
         """The cut of a route if it is free, else the route. That is found out even when it is time to stop."""
-        stop, self._queries.stop = self._queries.stop, no_stop
-        confirmed = self._confirmed(found, route)
-        self._queries.stop = stop
-        if not confirmed:
+        if not self._confirmed(found, route, self._queries.to_the_end):
             return route
         self.take(found)
         return found
@@ -124,8 +120,9 @@ class BestRoute:
         found = lattice.best_route(start, goal, self._order)
         return found if found is not None and self._confirmed(found, start[None]) else None
 
-    def _confirmed(self, route: Matrix, known: Matrix) -> bool:
+    def _confirmed(self, route: Matrix, known: Matrix, free: MotionsFree | None = None) -> bool:
         """Whether every edge of a route is free; those of the known one are. Runs have been checked in pieces."""
+        free = self._queries if free is None else free
         old = set(edge_keys(known))
         fresh = [k for k, edge in enumerate(edge_keys(route)) if edge not in old]
-        return not fresh or bool(self._queries(route[fresh], route[np.add(fresh, 1)]).all())
+        return not fresh or bool(free(route[fresh], route[np.add(fresh, 1)]).all())

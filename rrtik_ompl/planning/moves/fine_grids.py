@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, distinct
-from rrtik_ompl.base.budget import Stop
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.planning.moves.clearance_levels import Level
 from rrtik_ompl.planning.moves.lattice import MoveLattice
 from rrtik_ompl.planning.moves.rules import long_enough
@@ -49,6 +49,7 @@ class FineGrids:
         costs: Cost of each joint's travel, shape (n,).
         smallest_move: No move is shorter, shape (n,).
         levels: Of clearance, the largest first.
+        budget: When to end, with the best so far, and the seed of the places of the grids.
     """
 
     joints: Sequence[int]
@@ -57,23 +58,20 @@ class FineGrids:
     costs: Vector
     smallest_move: Vector
     levels: Sequence[Level]
+    budget: Budget
 
-    def route(
-        self, pairs: Sequence[tuple[Vector, Vector]], known: Matrix, least: int, seed: int, stop: Stop
-    ) -> tuple[Matrix, int] | None:
+    def route(self, pairs: Sequence[tuple[Vector, Vector]], known: Matrix, least: int) -> tuple[Matrix, int] | None:
         """A route with fewer moves than known, and the number of the level that it keeps, or None.
 
         Args:
             pairs: Of a start and a goal, shapes (n,), that agree in the joints that must not move.
             known: The best route so far, shape (k, n), every edge of which is a move.
             least: No route has fewer moves.
-            seed: Of the places of the grids.
-            stop: True ends the search; the best so far is returned.
         """
         best: tuple[Matrix, int] | None = None
         if not 0 < len(self.joints) <= MOST_JOINTS:
             return best
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(self.budget.seed)
         with suppress(OutOfTime):
             idle = 0
             for nodes, near in GRIDS:
@@ -83,7 +81,7 @@ class FineGrids:
                         return best
                     values = self._values_near(known, nodes, rng) if near else self._values(start, goal, nodes, rng)
                     first, last = (known[0], known[-1]) if near else (start, goal)
-                    found = self._kept(values, first, last, len(known) - 2, stop)
+                    found = self._kept(values, first, last, len(known) - 2)
                     if found is not None:
                         best, known, idle = found, found[0], 0
         return best
@@ -108,25 +106,22 @@ class FineGrids:
     def _each(self, nodes: int) -> int:
         return int(nodes ** (1.0 / len(self.joints)))
 
-    def _kept(self, values: Values, start: Vector, goal: Vector, most: int, stop: Stop) -> tuple[Matrix, int] | None:
+    def _kept(self, values: Values, start: Vector, goal: Vector, most: int) -> tuple[Matrix, int] | None:
         """The route of a grid with the fewest moves, at most so many, and the largest clearance that it can keep."""
         last = len(self.levels) - 1
-        route = self._proven(self.levels[last], values, start, goal, most, stop)
+        route = self._proven(self.levels[last], values, start, goal, most)
         if route is None:
             return None
         for number, level in enumerate(self.levels[:last]):
-            roomy = self._proven(level, values, start, goal, len(route) - 1, stop)
+            roomy = self._proven(level, values, start, goal, len(route) - 1)
             if roomy is not None:
                 return roomy, number
         return route, last
 
-    def _proven(
-        self, level: Level, values: Values, start: Vector, goal: Vector, most: int, stop: Stop
-    ) -> Matrix | None:
+    def _proven(self, level: Level, values: Values, start: Vector, goal: Vector, most: int) -> Matrix | None:
         """The route of a grid with the fewest moves, at most so many, that is proven to keep a level."""
-        in_steps = BatchedMotionQueries(level.searched.motion_valid_batch)
-        proving = BatchedMotionQueries(level.proving.motion_valid_batch)
-        in_steps.stop = proving.stop = stop
+        in_steps = BatchedMotionQueries(level.searched.motion_valid_batch, self.budget.over)
+        proving = BatchedMotionQueries(level.proving.motion_valid_batch, self.budget.over)
         lattice = MoveLattice(values, in_steps, self.costs)
         for _ in range(MOST_PROOFS):
             route = lattice.best_route(start, goal, range(len(start)), most)

@@ -50,11 +50,11 @@ def sharper_bound(world: World, joints: Sequence[int], start: Vector, goal: Vect
     return known + 1 if all(proofs) else known
 
 
-def remembered(world: World, joints: Sequence[int]) -> Callable[[Vector, Vector, Stop], int]:
+def remembered(world: World, joints: Sequence[int], stop: Stop) -> Callable[[Vector, Vector], int]:
     """:func:`sharper_bound` of a world, computed once for each start and goal; again if it was stopped."""
     known: dict[tuple[bytes, bytes], int] = {}
 
-    def bound(start: Vector, goal: Vector, stop: Stop) -> int:
+    def bound(start: Vector, goal: Vector) -> int:
         ends = (start.tobytes(), goal.tobytes())
         if ends not in known:
             found = sharper_bound(world, joints, start, goal, stop)

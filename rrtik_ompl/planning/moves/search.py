@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.base.budget import Stop, no_stop
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_moves
 from rrtik_ompl.planning.moves.best_route import BestRoute
@@ -31,7 +31,7 @@ CUTS = 3  # in random orders, without gain, in every round
 SPARE = 8  # configurations for each of a known part when further values come in
 REPEATS = 8  # of a search for less travel at the same width
 
-Proof: TypeAlias = Callable[[Vector, Vector, Stop], int]  # a lower bound between a start and a goal
+Proof: TypeAlias = Callable[[Vector, Vector], int]  # a lower bound between a start and a goal
 
 
 class MoveSearch:
@@ -46,7 +46,7 @@ class MoveSearch:
         goals: Free configurations, shape (g, n).
         lower, upper: Finite limits of the joint values, shapes (n,).
         motions_free: Which straight motions are free, for batches of shape (m, n).
-        seed: Of all random choices.
+        budget: When to end, with the best so far, and the seed of all random choices; without an end if None.
         costs: Cost of each joint's travel, shape (n,); all 1 if None.
         frozen: Joints that must not move.
         smallest_move: No move is shorter, shape (n,); any may be if None.
@@ -64,7 +64,7 @@ class MoveSearch:
         upper: Vector,
         motions_free: MotionsFree,
         *,
-        seed: int = 0,
+        budget: Budget | None = None,
         costs: Vector | None = None,
         frozen: Sequence[int] = (),
         smallest_move: Vector | None = None,
@@ -72,18 +72,20 @@ class MoveSearch:
         prove: Proof | None = None,
         all_free: MotionsFree | None = None,
     ) -> None:
+        budget = Budget() if budget is None else budget
         self.pairs = [(s, g) for s, g in product(starts, goals)]
         self._bounds = [lower_bound(s, g) for s, g in self.pairs]
         self._differing = min(self._bounds)
-        self._lower, self._upper = lower, upper
-        self._queries = BatchedMotionQueries(motions_free)
-        self._rng = np.random.default_rng(seed)
+        self._lower = lower
+        self._upper = upper
+        self._queries = BatchedMotionQueries(motions_free, budget.over)
+        self._rng = np.random.default_rng(budget.seed)
         count = starts.shape[1]
         order = self._rng.permutation(count).tolist()
         shortest = np.zeros(count) if smallest_move is None else smallest_move
         travel = np.ones(count) if costs is None else costs
         self._best = BestRoute(self._queries, travel, order, shortest)
-        self._unkept = None if all_free is None else BatchedMotionQueries(all_free)
+        self._unkept = None if all_free is None else BatchedMotionQueries(all_free, budget.over)
         self._any = self._best if self._unkept is None else BestRoute(self._unkept, travel, order, shortest)
         self._movable = [j for j in range(count) if j not in frozen and lower[j] < upper[j]]
         self._most_nodes = most_nodes
@@ -131,15 +133,12 @@ class MoveSearch:
         self._offers.append(merged)
         self._best.take(merged)
 
-    def try_corner_routes(self, stop: Stop = no_stop) -> None:
+    def try_corner_routes(self) -> None:
         """Find out for each start and goal whether they are joined without a detour of any joint; sharpens the bound.
 
         Such routes have no free values: they pass the corners of the box between start and goal, all of which are
         tried. If there is none, a joint has to move twice. A joint alone cannot: another has to leave and return.
         """
-        for queries in (self._queries, self._unkept):
-            if queries is not None:
-                queries.stop = stop
         with suppress(OutOfTime):
             for number, (start, goal) in enumerate(self.pairs):
                 values = values_of(np.array([start, goal]))
@@ -170,14 +169,13 @@ class MoveSearch:
             if orders:
                 self._best.take(np.vstack([start, axis_moves(start, goal, orders[0])]))
 
-    def improve(self, rounds: int, stop: Stop = no_stop) -> None:
-        """Look for better routes, for at most ``rounds`` rounds or until ``stop()``.
+    def improve(self, rounds: int) -> None:
+        """Look for better routes, for at most ``rounds`` rounds or until it is time to stop.
 
         Once it is proven that no route has fewer moves, only the travel is still made less, in a few steps.
         """
         if self.direct:
             return
-        self._queries.stop = stop
         with suppress(OutOfTime):
             self._try_some_corners()
             if not self.proven:
@@ -236,7 +234,7 @@ class MoveSearch:
         prove, self._prove = self._prove, None
         for number, (start, goal) in enumerate(self.pairs):
             if lower_bound(start, goal) < self._bounds[number] < self.moves:  # its corners are settled
-                self.raise_bound(number, prove(start, goal, self._queries.stop))
+                self.raise_bound(number, prove(start, goal))
 
     def _free_values(self, joints: Sequence[int]) -> None:
         """Routes from corner to corner, some joints free; none if a lattice cannot hold the corners."""

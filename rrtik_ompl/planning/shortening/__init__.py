@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, positive, whole_number
+from rrtik_ompl.base.budget import Budget, no_stop
 from rrtik_ompl.base.choices import ShorteningMethod, one_of
 from rrtik_ompl.base.errors import InputError, PathWarning, called, require
 from rrtik_ompl.description.joint_weights import weights_of
@@ -28,11 +27,11 @@ from rrtik_ompl.planning.shortening.corners import snap_corners
 from rrtik_ompl.planning.shortening.random_cut import random_cut, shortcut
 from rrtik_ompl.planning.shortening.retraction import retract
 from rrtik_ompl.planning.shortening.sequential import sequential_cut
-from rrtik_ompl.planning.shortening.task import Task
+from rrtik_ompl.planning.shortening.task import Task, Wishes
 from rrtik_ompl.world.kept_clearance import check_route_clearance
 from rrtik_ompl.world.problem import Problem
 
-__all__ = ["METHODS", "Method", "MoveRules", "Task", "shorten"]
+__all__ = ["METHODS", "Method", "MoveRules", "Task", "Wishes", "shorten", "shortened"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +59,7 @@ class Method:
 
 
 def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
-    rows, checked = simplified(problem, route, seconds=task.seconds_left, seed=task.seed)
+    rows, checked = simplified(problem, route, task.wishes.budget)
     task.asked += checked
     return rows
 
@@ -70,15 +69,15 @@ def _axis(route: Matrix, task: Task, _: Problem) -> Matrix:
 
 
 def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
-    return axis_cut_rounds(route, task.free_batch, seed=task.seed, stop=task.expired)
+    return axis_cut_rounds(route, task.free_batch, budget=task.rest)
 
 
 def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
     from rrtik_ompl.planning.shortening.fewest_moves import fewest_moves  # many paths are shortened without its search
 
-    return fewest_moves(
-        route, problem.world, seed=task.seed, stop=task.expired, rules=task.rules, clearance=task.clearance
-    ).route
+    wishes = task.wishes
+    found = fewest_moves(route, problem.world, budget=task.rest, rules=wishes.rules, clearance=wishes.clearance)
+    return found.route
 
 
 METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
@@ -170,22 +169,34 @@ def shorten(
     if stop is not None:
         called(stop, "stop")
     single = _single(path, method, one_joint) or rules is not None
-    chosen = _checked(path, problem, method, seconds, checks, seed, single, clearance)
-    head, tail = _parts(path.waypoints, rules)
-    if len(head) < 2:
-        return path
-    if chosen.keeps_moves and not path.one_joint_at_a_time:
+    _refuse(path, problem, method, seconds, checks, seed, single, clearance)
+    if METHODS[method].keeps_moves and not path.one_joint_at_a_time:
         remedy = "use auto, or one_joint_moves(path, problem) first"
         message = f"shortening method '{method}' is for single-joint moves, so the path stays as it is: {remedy}"
         warnings.warn(PathWarning(message), stacklevel=2)
         return _with_proof(path, problem)
-    given: dict[str, Any] = {"checks": np.inf if checks is None else checks, "seed": seed, "one_joint": single}
-    given |= {"rules": rules, "clearance": clearance, "stop": stop}
+
+    budget = Budget(seed, np.inf if seconds is None else float(seconds), checks, no_stop if stop is None else stop)
+    return shortened(path, problem, Wishes(budget, single, rules, clearance), method, on_better)
+
+
+def shortened(
+    path: JointPath,
+    problem: Problem,
+    wishes: Wishes,
+    method: ShorteningMethod = "auto",
+    on_better: Callable[[JointPath], object] | None = None,
+) -> JointPath:
+    """What :func:`shorten` does with a path that is known to be valid, by wishes that make sense for it."""
+    chosen = _method(method, problem, wishes.one_joint)
+    head, tail = _parts(path.waypoints, wishes.rules)
+    if len(head) < 2:
+        return path
     if on_better is not None:
-        given["on_better"] = lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail])))
-    end = time.monotonic() + (np.inf if seconds is None else float(seconds))
-    for each in _SINGLE_JOINT if chosen.chooses and single else (chosen,):
-        found = _shortened(path, problem, each, (head, tail), given, end)
+        wishes = replace(wishes, on_better=lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail]))))
+
+    for each in _SINGLE_JOINT if chosen.chooses and wishes.one_joint else (chosen,):
+        found = _in_forms(path, problem, each, (head, tail), wishes)
         if not chosen.chooses or found.length <= path.length:
             return found
     return _with_proof(path, problem)
@@ -196,43 +207,40 @@ def _with_proof(path: JointPath, problem: Problem) -> JointPath:
     return path if path.proven_in(problem.world) else path.proved(problem.world)
 
 
-def _shortened(
-    path: JointPath,
-    problem: Problem,
-    chosen: Method,
-    parts: tuple[Matrix, Matrix],
-    given: Mapping[str, Any],
-    end: float,
+def _in_forms(
+    path: JointPath, problem: Problem, chosen: Method, parts: tuple[Matrix, Matrix], wishes: Wishes
 ) -> JointPath:
     """The path after a method, in the first form of the problem in which that leads to one that is accepted."""
     head, tail = parts
-    rules, single = given["rules"], given["one_joint"] or chosen.keeps_moves
+    rules = wishes.rules
+    single = wishes.one_joint or chosen.keeps_moves
     traits = {"leaves_room": chosen.leaves_room, "samples": chosen.samples}
-    acceptance = Acceptance(path, problem, given["clearance"], one_joint=single, seed=given["seed"], **traits)
+    acceptance = Acceptance(path, problem, wishes, one_joint=single, **traits)
     for form in acceptance.forms():
-        limited = {**given, "seconds": form.share * (end - time.monotonic())}
-        task, found = _run(chosen, form, head, limited, single)
+        task, found = _run(chosen, form, head, replace(wishes, budget=wishes.budget.part(form.share)), single)
         rows = np.vstack([found, tail])
         if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
             continue
         shorter = acceptance.accepted(path.with_waypoints(rows))
-        counted = 1.0 if single else weights_of(problem.robot)
-        before, after = (task.rank(each.waypoints * counted) for each in (path, shorter or path))
-        if shorter is None or (not chosen.keeps_moves and after > before):
+        if shorter is None:
             continue
-        return shorter
+        counted = 1.0 if single else weights_of(problem.robot)
+        if chosen.keeps_moves or task.rank(shorter.waypoints * counted) <= task.rank(path.waypoints * counted):
+            return shorter
     return acceptance.input
 
 
-def _run(chosen: Method, form: Form, route: Matrix, given: Mapping[str, Any], single: bool) -> tuple[Task, Matrix]:
+def _run(chosen: Method, form: Form, route: Matrix, wishes: Wishes, single: bool) -> tuple[Task, Matrix]:
     """What a method makes of a route, in coordinates in which lengths are weighted where joints have weights."""
     if single or not has_weights(form.problem):
-        task = Task(form.motions, **given)
+        task = Task(form.motions, wishes)
         return task, chosen.run(route, task, form.problem)
-    weighted, on_better = WeightedProblem(form.problem, form.motions), given.get("on_better")
+
+    weighted = WeightedProblem(form.problem, form.motions)
+    on_better = wishes.on_better
     if on_better is not None:
-        given = {**given, "on_better": lambda rows: on_better(weighted.back(rows, route[[0, -1]]))}
-    task = Task(weighted.problem.world, **given)
+        wishes = replace(wishes, on_better=lambda rows: on_better(weighted.back(rows, route[[0, -1]])))
+    task = Task(weighted.problem.world, wishes)
     return task, weighted.back(chosen.run(weighted.there(route), task, weighted.problem), route[[0, -1]])
 
 
@@ -256,7 +264,7 @@ def _method(name: ShorteningMethod, problem: Problem, one_joint: bool) -> Method
     return _HELD if problem.constraints and name in _CUTS and not one_joint else chosen
 
 
-def _checked(
+def _refuse(
     path: JointPath,
     problem: Problem,
     method: ShorteningMethod,
@@ -265,8 +273,8 @@ def _checked(
     seed: int,
     one_joint: bool,
     clearance: float | None,
-) -> Method:
-    """The method, if the request makes sense."""
+) -> None:
+    """Refuse a request that makes no sense."""
     require(problem, Problem, "problem of a path to shorten")
     chosen = _method(method, problem, one_joint)
     if seconds is not None:
@@ -284,4 +292,3 @@ def _checked(
         raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
     if one_joint and not chosen.can_keep_moves:
         raise InputError(f"shortening method '{method}' cannot keep one joint at a time; use axis or auto")
-    return chosen

@@ -8,6 +8,7 @@ import numpy as np
 
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.planning.moves.clearance_levels import roomiest
+from rrtik_ompl.planning.shortening.task import Wishes
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.kept_clearance import keeping, proved_as_clear, room_between
 from rrtik_ompl.world.motion_queries import MotionQueries
@@ -41,9 +42,9 @@ class Acceptance:
     Args:
         path: Given, valid.
         problem: What it solves.
-        clearance: To be kept [m]; None for a millimetre, or what the ends of the path have.
+        wishes: Which clearance is to be kept, None for a millimetre or what the ends of the path have; and the seed of
+            the detours.
         one_joint: Whether its moves of one joint have to stay such, so that there are no detours.
-        seed: Of the detours.
         leaves_room: Whether the method keeps a clearance itself, where that costs no move.
         samples: Whether the method checks motions in steps, by the problem's world alone.
     """
@@ -52,17 +53,19 @@ class Acceptance:
         self,
         path: JointPath,
         problem: Problem,
-        clearance: float | None,
+        wishes: Wishes,
         *,
         one_joint: bool,
-        seed: int,
         leaves_room: bool = False,
         samples: bool = False,
     ) -> None:
-        self._leaves_room, self._samples = leaves_room, samples
-        self._problem, self._one_joint, self._seed = problem, one_joint, seed
+        self._problem = problem
+        self._seed = wishes.budget.seed
+        self._one_joint = one_joint
+        self._leaves_room = leaves_room
+        self._samples = samples
         room = roomiest if leaves_room else room_between
-        self._room = room(problem.world, path.waypoints[[0, -1]], clearance)
+        self._room = room(problem.world, path.waypoints[[0, -1]], wishes.clearance)
         known = path.proven_in(problem.world) and self._keeps(path)
         self.input = path if known else self._proved(path)
         self._input_keeps = self._keeps(self.input)

@@ -31,7 +31,7 @@ FINEST = 16  # times finer than usual are the steps of the last retraction where
 def best_in_time(route: Matrix, task: Task) -> Matrix:
     """Shorten a route, shape (k, n), by whatever helps."""
     if task.one_joint:
-        return task.better(route, axis_cut_rounds(route, task.free_batch, seed=task.seed, stop=task.expired))
+        return task.better(route, axis_cut_rounds(route, task.free_batch, budget=task.rest))
     world = task.kernel_world
     if len(route) < 3 or world is None or not has_kernels(world, layout.KERNELS):
         return _without_kernels(route, task)

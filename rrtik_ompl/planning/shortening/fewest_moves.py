@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, positive
-from rrtik_ompl.base.budget import Stop, no_stop
+from rrtik_ompl.base.budget import Budget, no_stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, single_joint, transitions
@@ -51,8 +51,7 @@ def fewest_moves(
     world: World,
     *,
     rounds: int = MAX_IMPROVEMENT_ROUNDS,
-    seed: int = 0,
-    stop: Stop = no_stop,
+    budget: Budget | None = None,
     rules: MoveRules | None = None,
     clearance: float | None = None,
 ) -> MovesFound:
@@ -65,8 +64,7 @@ def fewest_moves(
         world: Checks motions.
         rounds: Of improvement at most, after the first; the work ends earlier if it is proven that no route has fewer
             moves. The same number and seed give the same route.
-        seed: Of all random choices.
-        stop: Called often; True ends the work, and the best so far is returned.
+        budget: When to end, with the best so far, and the seed of all random choices; without an end if None.
         rules: Kept by the route and by what comes out. Joints that move last stay where they are.
         clearance: Wanted from obstacles, on top of their margins [m]; None for a centimetre. Less is kept where more
             moves would be needed, or where the ends have less.
@@ -87,17 +85,20 @@ def fewest_moves(
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
     kept = MoveRules.of_robot(world.robot) if rules is None else rules
-    work = _Work(rows, world, kept, rounds, seed, stop)
-    best, bound, taken = rows, lower_bound(rows[0], rows[-1]), False
+    budget = Budget() if budget is None else budget
+    work = _Work(rows, world, kept, rounds, budget)
+    best = rows
+    bound = lower_bound(rows[0], rows[-1])
+    taken = False
     levels = clearance_levels(world, rows[[0, -1]], clearance)
     for level in levels:
-        if taken and (transitions(best) == bound or stop()):
+        if taken and (transitions(best) == bound or budget.over()):
             break
         search = work.improved(level, best)
         bound = max(bound, search.bound)
         if search.route is not None and transitions(search.route) <= transitions(best) - taken:
             best, taken = search.route, True
-    if transitions(best) > bound and rounds > 0 and not stop():
+    if transitions(best) > bound and rounds > 0 and not budget.over():
         best, bound = work.finer(levels, best, bound)
     return MovesFound(best, transitions(best), bound)
 
@@ -110,8 +111,7 @@ class _Work:
     world: World
     rules: MoveRules
     rounds: int
-    seed: int
-    stop: Stop
+    budget: Budget
 
     @property
     def joints(self) -> list[int]:
@@ -122,7 +122,7 @@ class _Work:
     @cached_property
     def prove(self) -> Proof:
         """A sharper bound, the same on all levels."""
-        return remembered(self.world, self.joints)
+        return remembered(self.world, self.joints, self.budget.over)
 
     def improved(self, level: Level, offered: Matrix) -> MoveSearch:
         """A search on a level of clearance that starts from a route, if that keeps it."""
@@ -131,7 +131,7 @@ class _Work:
             self.rows[-1:],
             *turning_limits(self.world.robot, self.rows),
             level.proving.motion_valid_batch,
-            seed=self.seed,
+            budget=self.budget,
             costs=self.rules.joint_costs,
             frozen=[*self.rules.frozen_joints, *self.rules.last_joints],
             smallest_move=self.rules.smallest_move,
@@ -140,16 +140,17 @@ class _Work:
         )
         if _free(level, offered):
             search.offer(offered)
-        search.try_corner_routes(self.stop)
-        search.improve(rounds_before(self.rounds, self.joints), self.stop)
+        search.try_corner_routes()
+        search.improve(rounds_before(self.rounds, self.joints))
         return search
 
     def finer(self, levels: list[Level], best: Matrix, bound: int) -> tuple[Matrix, int]:
         """A better bound of the best route, and what fine grids add to it."""
-        ends, limits = (self.rows[0], self.rows[-1]), turning_limits(self.world.robot, self.rows)
-        bound = max(bound, reach_bound(self.world, self.joints, *ends, transitions(best), self.stop))
-        grids = FineGrids(self.joints, *limits, self.rules.joint_costs, self.rules.smallest_move, levels)
-        found = grids.route([ends], merge_moves(best, tolerance=0.0), bound, self.seed, self.stop)
+        ends = self.rows[0], self.rows[-1]
+        limits = turning_limits(self.world.robot, self.rows)
+        bound = max(bound, reach_bound(self.world, self.joints, *ends, transitions(best), self.budget.over))
+        grids = FineGrids(self.joints, *limits, self.rules.joint_costs, self.rules.smallest_move, levels, self.budget)
+        found = grids.route([ends], merge_moves(best, tolerance=0.0), bound)
         if found is None:
             return best, bound
         search = self.improved(levels[found[1]], found[0])

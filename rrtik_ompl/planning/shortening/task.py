@@ -1,19 +1,38 @@
-"""What a method of shortening is given: a check of motions, its time, its seed, and a listener."""
+"""What a method of shortening is given: a check of motions, its budget, what is wished for, and a listener."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.base.budget import Stop
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS
 from rrtik_ompl.model.transitions import edge_keys, length_of, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_moves
 from rrtik_ompl.planning.moves.rules import MoveRules
 from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, has_kernels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wishes:
+    """How a route is to be shortened.
+
+    Attributes:
+        budget: Time, the seed of all random choices, and as its iterations the motions that are checked at most.
+        one_joint: Whether every edge of the result must move one joint, as the edges of the given route do.
+        rules: What single-joint moves have to keep to, or None.
+        clearance: What new motions keep from obstacles [m], or None.
+        on_better: Called with every better route, shape (k, n).
+    """
+
+    budget: Budget = field(default_factory=Budget)
+    one_joint: bool = False
+    rules: MoveRules | None = None
+    clearance: float | None = None
+    on_better: Callable[[Matrix], object] | None = None
 
 
 class Task:
@@ -24,59 +43,48 @@ class Task:
 
     Attributes:
         motions: As given.
-        seed: Of all random choices.
-        one_joint: Whether every edge of the result must move one joint, as the edges of the given route do.
-        rules: What single-joint moves have to keep to, or None.
-        clearance: What was asked for [m], for methods that leave room themselves; or None.
-        bounded: Whether there is an end to the time, or to the checks.
+        wishes: As given.
         asked: How many straight motions have been checked, or tried in kernels.
         confirmed_again: How many motions of a result have been checked on top of that, as parts of free ones.
 
     Args:
         motions: A world, or anything else that checks straight motions.
-        seconds: Limit of wall time [s].
-        checks: Most motions that are checked; then the time is up.
-        seed: See above.
-        one_joint: See above.
-        rules: See above.
-        clearance: See above.
-        on_better: Called with every better route, shape (k, n).
-        stop: Called between two checks; True ends the time.
+        wishes: What is asked for; none in particular if None.
     """
 
-    def __init__(
-        self,
-        motions: MotionQueries,
-        *,
-        seconds: float = np.inf,
-        checks: float = np.inf,
-        seed: int = 0,
-        one_joint: bool = False,
-        rules: MoveRules | None = None,
-        clearance: float | None = None,
-        on_better: Callable[[Matrix], object] | None = None,
-        stop: Stop | None = None,
-    ) -> None:
+    def __init__(self, motions: MotionQueries, wishes: Wishes | None = None) -> None:
         self.motions = motions
-        self.seed, self.one_joint, self.rules, self.clearance = seed, one_joint, rules, clearance
-        self.asked = self.confirmed_again = 0
-        self.bounded = bool(np.isfinite(min(seconds, checks)))
-        self._checks = checks
-        self._deadline = time.monotonic() + seconds
+        self.wishes = Wishes() if wishes is None else wishes
+        self.asked = 0
+        self.confirmed_again = 0
+        self._stopped = False
         self._known: set[tuple[bytes, bytes]] = set()
-        self._on_better, self._stop, self._reported = on_better, stop, (np.inf, np.inf)
+        self._reported = (np.inf, np.inf)
+
+    @property
+    def seed(self) -> int:
+        """Of all random choices."""
+        return self.wishes.budget.seed
+
+    @property
+    def one_joint(self) -> bool:
+        """Whether every edge of the result must move one joint."""
+        return self.wishes.one_joint
+
+    @property
+    def bounded(self) -> bool:
+        """Whether there is an end to the time, or to the checks."""
+        return self.wishes.budget.limited
 
     @property
     def listened(self) -> bool:
         """Whether anybody is told of better routes."""
-        return self._on_better is not None
+        return self.wishes.on_better is not None
 
     @property
-    def seconds_left(self) -> float:
-        """Time that is left [s], at least 0; +inf without a limit."""
-        if self._stop is not None and self._stop():
-            self._deadline = -np.inf
-        return max(self._deadline - time.monotonic(), 0.0)
+    def rest(self) -> Budget:
+        """The budget of a search that knows no task: it ends with this one."""
+        return Budget(self.seed, stop=self.expired)
 
     @property
     def kernel_world(self) -> KernelWorld | None:
@@ -87,11 +95,15 @@ class Task:
     @property
     def checks_left(self) -> float:
         """Motions that may still be checked; +inf without a limit."""
-        return max(self._checks - self.asked, 0.0)
+        checks = self.wishes.budget.iterations
+        return np.inf if checks is None else max(checks - self.asked, 0)
 
     def expired(self) -> bool:
         """Whether the time is up, or the checks are spent."""
-        return self.checks_left <= 0.0 or self.seconds_left <= 0.0
+        if self.checks_left <= 0:
+            return True
+        self._stopped = self._stopped or self.wishes.budget.over()
+        return self._stopped
 
     def free_batch(self, A: Matrix, B: Matrix) -> Mask:
         """Which straight motions are free, shapes (m, n) and (m,); none when the time is up."""
@@ -158,6 +170,6 @@ class Task:
 
     def report(self, route: Matrix) -> None:
         """Pass a route to the listener if it is better than those before."""
-        if self._on_better is not None and self.rank(route) < self._reported:
+        if self.wishes.on_better is not None and self.rank(route) < self._reported:
             self._reported = self.rank(route)
-            self._on_better(route)
+            self.wishes.on_better(route)

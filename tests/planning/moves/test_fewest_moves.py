@@ -9,6 +9,7 @@ from itertools import count, pairwise
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError, PathWarning
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.path import JointPath
@@ -131,7 +132,7 @@ def test_time_that_runs_out_ends_the_search_soon_with_the_best_so_far() -> None:
             left[0] -= 1
             return left[0] < 0
 
-        found = fewest_moves(raw.waypoints, problem.world, stop=stop)
+        found = fewest_moves(raw.waypoints, problem.world, budget=Budget(stop=stop))
         assert left[0] >= -20  # a few looks at the clock after it struck, each without a question
         assert found.moves <= raw.transitions
         assert found.bound <= found.moves
@@ -179,10 +180,10 @@ def test_a_long_route_is_cut_before_anything_takes_long() -> None:
 
     cut = double_axis_cut(route, free)
     most, looks = 6 * next(asked) + 100, count()  # looks at the clock: some for every question of the cut
-    found = fewest_moves(route, problem.world, stop=lambda: next(looks) > most)
+    found = fewest_moves(route, problem.world, budget=Budget(stop=lambda: next(looks) > most))
     assert found.moves <= transitions(cut) < 0.5 * transitions(route)
     half = count()
-    found = fewest_moves(route, problem.world, stop=lambda: next(half) > most // 2)
+    found = fewest_moves(route, problem.world, budget=Budget(stop=lambda: next(half) > most // 2))
     assert found.moves < transitions(route)  # a cut that is broken off is kept as far as it has come
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.model.transitions import lower_bound, route_length, single_joint, transitions
 from rrtik_ompl.planning.moves.lattice import MoveLattice
 from rrtik_ompl.planning.moves.search import MoveSearch
@@ -95,7 +96,9 @@ def test_a_search_is_never_worse_than_what_it_was_offered_and_repeats_with_its_s
     found = []
     for _ in range(2):
         limits = np.zeros(len(start)), np.full(len(start), GRID - 1.0)
-        search = MoveSearch(start[None], goal[None], *limits, world.motion_valid_batch, seed=seed, most_nodes=64)
+        search = MoveSearch(
+            start[None], goal[None], *limits, world.motion_valid_batch, budget=Budget(seed), most_nodes=64
+        )
         if offered is not None:
             search.offer(offered)
         search.try_corner_routes()

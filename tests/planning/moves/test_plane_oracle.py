@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bench.moves.fewest_moves_oracle import drawn_case
 from rrtik_bench.shortening.plane_arms import PlaneArm, PlaneGrid
-from rrtik_ompl.base.budget import no_stop
+from rrtik_ompl.base.budget import Budget, no_stop
 from rrtik_ompl.planning.moves.clearance_levels import clearance_levels
 from rrtik_ompl.planning.moves.fine_grids import FineGrids
 from rrtik_ompl.planning.moves.reach_bound import reach_bound
@@ -67,13 +69,14 @@ def test_a_grid_has_nothing_to_add_to_a_route_that_is_proven_or_when_time_is_up(
     ends = np.array([problem.start, problem.goal.q])
     robot = problem.world.robot
     levels = clearance_levels(problem.world, ends, None)
-    grids = FineGrids(range(2), robot.lower, robot.upper, np.ones(2), np.zeros(2), levels)
+    grids = FineGrids(range(2), robot.lower, robot.upper, np.ones(2), np.zeros(2), levels, Budget(seed=1))
     known = np.zeros((11, 2))  # as if ten moves were known
-    found = grids.route([(ends[0], ends[1])], known, 4, 1, no_stop)
+    found = grids.route([(ends[0], ends[1])], known, 4)
     assert found is not None
     assert len(found[0]) == 5
-    assert grids.route([(ends[0], ends[1])], known, 10, 1, no_stop) is None
-    assert grids.route([(ends[0], ends[1])], known, 4, 1, lambda: True) is None
+    assert grids.route([(ends[0], ends[1])], known, 10) is None
+    late = replace(grids, budget=Budget(seed=1, stop=lambda: True))
+    assert late.route([(ends[0], ends[1])], known, 4) is None
 
 
 def test_the_bound_by_reach_is_for_two_joints_with_time() -> None:

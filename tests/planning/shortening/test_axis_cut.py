@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, route_length, single_joint, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_cut, axis_moves, cut_parts, double_axis_cut
@@ -170,7 +171,7 @@ def test_further_rounds_are_never_worse_and_repeat_with_their_seed(
     case: tuple[GridWorld, np.ndarray], seed: int
 ) -> None:
     world, route = case
-    results = [axis_cut_rounds(route, world.motion_valid_batch, rounds=4, seed=seed) for _ in range(2)]
+    results = [axis_cut_rounds(route, world.motion_valid_batch, rounds=4, budget=Budget(seed)) for _ in range(2)]
     np.testing.assert_array_equal(results[0], results[1])
     double = double_axis_cut(route, world.motion_valid_batch)
     assert (transitions(results[0]), route_length(results[0])) <= (transitions(double), route_length(double) + 1e-12)

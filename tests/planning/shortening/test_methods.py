@@ -8,11 +8,12 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_bench.shortening import plane_worlds
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError, PathWarning
 from rrtik_ompl.cli.plan import SHORTEN
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import route_length, single_joint, transitions
-from rrtik_ompl.planning.shortening import METHODS, Task
+from rrtik_ompl.planning.shortening import METHODS, Task, Wishes
 from rrtik_ompl.planning.shortening.acceptance import Acceptance
 from rrtik_ompl.planning.shortening.corners import snap_corners
 from rrtik_ompl.planning.shortening.random_cut import random_cut
@@ -83,7 +84,7 @@ def test_a_shortened_route_is_free_and_shorter_with_the_same_ends(name, one_join
     gains = []
     for seed in range(10):
         route, plane = wandering(seed, one_joint=one_joint), Plane()
-        task = Task(plane, seed=seed, one_joint=one_joint)
+        task = Task(plane, Wishes(Budget(seed), one_joint))
         found = METHODS_ON_ARRAYS[name](route, task)
         assert all(plane.free(a, b) for a, b in pairwise(found))
         assert (found[[0, -1]] == route[[0, -1]]).all()
@@ -97,13 +98,13 @@ def test_a_shortened_route_is_free_and_shorter_with_the_same_ends(name, one_join
 @pytest.mark.parametrize("name", ["sequential", "retraction", "corners"])
 def test_methods_without_chance_give_the_same_route_again(name):
     route = wandering(3)
-    first, second = (METHODS_ON_ARRAYS[name](route, Task(Plane(), seed=seed)) for seed in (1, 2))
+    first, second = (METHODS_ON_ARRAYS[name](route, Task(Plane(), Wishes(Budget(seed)))) for seed in (1, 2))
     np.testing.assert_array_equal(first, second)
 
 
 def test_a_seed_gives_one_random_cut():
     route = wandering(3)
-    routes = [random_cut(route, Task(Plane(), seed=seed)) for seed in (1, 1, 2)]
+    routes = [random_cut(route, Task(Plane(), Wishes(Budget(seed)))) for seed in (1, 1, 2)]
     np.testing.assert_array_equal(routes[0], routes[1])
     assert not np.array_equal(routes[0], routes[2])
 
@@ -141,7 +142,7 @@ def test_retraction_asks_less_than_a_random_cut_of_the_same_quality():
     ratios, asked = [], []
     for seed in range(10):
         route = wandering(seed)
-        tasks = [Task(Plane(), seed=seed) for _ in range(2)]
+        tasks = [Task(Plane(), Wishes(Budget(seed))) for _ in range(2)]
         ratios.append(route_length(retract(route, tasks[0])) / route_length(random_cut(route, tasks[1])))
         asked.append(tasks[0].asked / tasks[1].asked)
     assert np.mean(ratios) < 1.01
@@ -153,7 +154,7 @@ def test_when_the_time_is_up_the_best_so_far_is_free(name):
     lengths = []
     for questions in (1, 5, 20, 80, 10**9):
         plane, route = Plane(), wandering(5)
-        task = Task(plane, stop=lambda plane=plane, questions=questions: plane.questions >= questions)
+        task = Task(plane, Wishes(Budget(stop=lambda plane=plane, questions=questions: plane.questions >= questions)))
         found = METHODS_ON_ARRAYS[name](route, task)
         assert all(plane.free(a, b) for a, b in pairwise(found))
         assert (found[[0, -1]] == route[[0, -1]]).all()
@@ -165,7 +166,7 @@ def test_when_the_time_is_up_the_best_so_far_is_free(name):
 @pytest.mark.parametrize("name", METHODS_ON_ARRAYS)
 def test_better_routes_are_told_in_order(name):
     told, route = [], wandering(5)
-    found = METHODS_ON_ARRAYS[name](route, Task(Plane(), on_better=told.append))
+    found = METHODS_ON_ARRAYS[name](route, Task(Plane(), Wishes(on_better=told.append)))
     lengths = [route_length(rows) for rows in told]
     assert lengths == sorted(lengths, reverse=True)
     assert len(told) > 1
@@ -277,7 +278,7 @@ def test_a_path_that_plan_has_proven_is_not_proven_again(problem, raw, monkeypat
     proofs = []
     monkeypatch.setattr(type(problem.world), "prove", lambda *_, **__: proofs.append(1))
     monkeypatch.setattr(JointPath, "violations", lambda *_, **__: pytest.fail("it is proven"))
-    chosen = Acceptance(raw[0], problem, None, one_joint=False, seed=0)
+    chosen = Acceptance(raw[0], problem, Wishes(), one_joint=False)
     assert chosen.input is raw[0]
     assert not proofs
 
