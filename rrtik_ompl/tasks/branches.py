@@ -212,7 +212,7 @@ class Expander:
         if touching := world.explain(branch.q):
             self.failures.append((branch, step, f"it cannot begin: {touching}; move it or allow the pair"))
             return
-        way = _way(branch, stage)
+        way = _way(branch, stage, self.seed)
         if way.leads_nowhere(world.robot):
             still = JointPath.of(world.robot, branch.q[None]).proved(world)
             yield _next(branch, step, branch.after, branch.q, still)
@@ -257,7 +257,7 @@ class Expander:
 
     def _followed(self, branch: Branch, way: Way, world: World) -> Attempt:
         if branch.effort >= THOROUGH:
-            return farthest(world, way, branch.q[None], self.seed)
+            return farthest(world, way, branch.q[None])
         return attempt(world, way, branch.q, centred(world.robot))
 
 
@@ -266,10 +266,10 @@ def way_of(robot: Robot, a: Vector, b: Vector) -> float:
     return float(np.linalg.norm(weighted_difference(robot, b, a)))
 
 
-def _way(branch: Branch, stage: Straight) -> Way:
+def _way(branch: Branch, stage: Straight, seed: int) -> Way:
     """Of the tip on a straight line that begins where a branch has come to."""
     tip = branch.after.robot.fk(branch.q)
-    return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, None)
+    return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, None, seed)
 
 
 def again(branch: Branch, effort: int) -> Branch:

@@ -247,11 +247,12 @@ def _moved(
     number = whole_number(seed, "seed")
     require(world, World, "world", "use World(robot, scene)")
     room = None if clearance is None else max(not_negative(clearance, "clearance"), world.settings.kept)
+
     begin, starts = _begin(world, q, number)
-    way = Way(tuple(rails(begin)), tolerance, room)
+    way = Way(tuple(rails(begin)), tolerance, room, number)
     if way.leads_nowhere(world.robot):
         raise InputError("the tip is at the goal already: there is no line to follow")
-    made = farthest(world, way, starts, number)
+    made = farthest(world, way, starts)
     return StraightResult(path_of(world, made), made.fraction, made.reason)
 
 

@@ -33,14 +33,19 @@ IK_SECONDS = 1e9  # no limit: the rounds of inverse kinematics are counted, some
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Way:
-    """Rails one after the other, how exactly to follow them, and what to keep from obstacles [m].
+    """Where the tip is to go, and how.
 
-    The clearance is None for what the world keeps.
+    Attributes:
+        rails: One after the other.
+        tolerance: How exactly to follow them.
+        clearance: To be kept from obstacles [m]; None for what the world keeps.
+        seed: Of the ways that a redundant arm tries.
     """
 
     rails: tuple[Rail, ...]
     tolerance: Tolerance
     clearance: float | None
+    seed: int = 0
 
     def leads_nowhere(self, robot: Robot) -> bool:
         """Whether its end is where it begins."""
@@ -67,14 +72,14 @@ class Attempt:
         return route_length(self.rows)
 
 
-def farthest(world: World, way: Way, starts: Matrix, seed: int) -> Attempt:
+def farthest(world: World, way: Way, starts: Matrix) -> Attempt:
     """The attempt that comes farthest from any of some configurations, shape (k, dof); of several the shortest.
 
     A redundant arm that is stopped tries other ways to use its freedom.
     """
     best: Attempt | None = None
     for q in starts:
-        for leaning in _leanings(world, way, q, seed):
+        for leaning in leanings(world, way, q):
             made = attempt(world, way, q, leaning)
             if best is None or (made.fraction, -made.length) > (best.fraction, -best.length):
                 best = made
@@ -86,29 +91,32 @@ def farthest(world: World, way: Way, starts: Matrix, seed: int) -> Attempt:
     return best
 
 
-def _leanings(world: World, way: Way, q: Vector, seed: int) -> Iterator[Leaning]:
-    """Ways to use the freedom that rails leave, the best first."""
+def leanings(world: World, way: Way, q: Vector) -> Iterator[Leaning]:
+    """Ways to use the freedom that rails leave an arm at q, shape (dof,), the best first."""
     robot = world.robot
     usual = centred(robot)
     yield usual
     if not redundant(robot):
         return
+
     yield Leaning(usual.reference, np.zeros(robot.dof))
     free = (usual.pull > 0.0).astype(np.float64)
     if len(way.rails) == 1:
         goal = PoseGoal(way.rails[0].poses(1.0)[0])
-        ends = solve_ik(robot, goal, near=q, all=True, world=world, seconds=IK_SECONDS, seed=seed).solutions[:ENDS]
-        for end in ends:
+        found = solve_ik(robot, goal, near=q, all=True, world=world, seconds=IK_SECONDS, seed=way.seed)
+        for end in found.solutions[:ENDS]:
             yield Leaning(end, free, homing=True)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(way.seed)
     for _ in range(RANDOM_REFERENCES):
         yield Leaning(rng.uniform(*robot.finite_range()), STRONG * free)
 
 
 def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
     """Follow the rails from a configuration, shape (dof,), and keep what is proven free."""
-    robot, reason = world.robot, ""
-    parts, places = [robot.clamp(q)[None]], [np.zeros(1)]
+    robot = world.robot
+    reason = ""
+    parts = [robot.clamp(q)[None]]
+    places = [np.zeros(1)]
     measures = way.measures(robot)
     whole = measures.sum()
     for number, rail in enumerate(way.rails):
@@ -118,7 +126,9 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
         if not followed.complete:
             reason = why_stopped(robot, rail, followed)
             break
-    rows, shares = np.concatenate(parts), np.concatenate(places)
+
+    rows = np.concatenate(parts)
+    shares = np.concatenate(places)
     proof = world.prove(rows, clearance=way.clearance) if len(rows) > 1 else None
     if proof is not None and not proof.proven:
         return _cut(world, way, rows, shares, proof)
@@ -132,7 +142,8 @@ def _cut(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> 
     """The part before the first place that is not proven, which is found by halving the motion."""
     gap = proof.unproven[0]
     a, b = rows[gap.motion], rows[gap.motion + 1]
-    good, bad = 0.0, 1.0
+    good = 0.0
+    bad = 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (good + bad)
         part = np.stack([a, a + middle * (b - a)])
@@ -140,8 +151,10 @@ def _cut(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> 
             good = middle
         else:
             bad = middle
+
     reason = why_blocked(world, a + good * (b - a), b, (gap.first, gap.second))
-    kept, fraction = rows[: gap.motion + 1], float(shares[gap.motion])
+    kept = rows[: gap.motion + 1]
+    fraction = float(shares[gap.motion])
     if good > 0.0:
         kept = np.vstack([kept, a + good * (b - a)])
         fraction += good * float(shares[gap.motion + 1] - shares[gap.motion])

@@ -10,7 +10,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.model.goal import PoseGoal
-from rrtik_ompl.planning.tip_motion.attempts import ENDS, RANDOM_REFERENCES, Way, _leanings, attempt
+from rrtik_ompl.planning.tip_motion.attempts import ENDS, RANDOM_REFERENCES, Way, attempt, leanings
 from rrtik_ompl.planning.tip_motion.freedom import centred
 from rrtik_ompl.planning.tip_motion.rails import arc_rail, screw_rail, straight_rail
 from rrtik_ompl.planning.tip_motion.values import Tolerance
@@ -300,11 +300,11 @@ def test_the_clock_does_not_decide_which_ways_a_redundant_arm_tries(monkeypatch)
     world, q = rrtik.World(panda), panda.posture("ready")
     begin = panda.fk(q)
     end = pin.SE3(begin.rotation, beside(begin, 0.1, 0.1, 0.0))
-    way = Way((straight_rail(begin, end),), Tolerance(1e-4, 1e-3), 0.0)
-    usual = [leaning.reference for leaning in _leanings(world, way, q, 3)]
+    way = Way((straight_rail(begin, end),), Tolerance(1e-4, 1e-3), 0.0, seed=3)
+    usual = [leaning.reference for leaning in leanings(world, way, q)]
     real = time.monotonic
     monkeypatch.setattr(time, "monotonic", lambda: 1e5 * real())
-    hurried = [leaning.reference for leaning in _leanings(world, way, q, 3)]
+    hurried = [leaning.reference for leaning in leanings(world, way, q)]
     assert len(usual) == 2 + ENDS + RANDOM_REFERENCES
     assert np.array_equal(usual, hurried)
 
