@@ -59,15 +59,15 @@ class Budget:
 
     def over(self) -> bool:
         """Whether it is time to stop: a :data:`Stop` for searches that are given nothing else."""
-        return self.left <= 0.0 or bool(self.stop())
+        return time.monotonic() - self.begun >= self.seconds or bool(self.stop())
 
     def begun_now(self) -> Budget:
         """The same budget, whose time begins now."""
         return replace(self, begun=time.monotonic())
 
-    def part(self, share: float, least: float = 0.0) -> Budget:
-        """A share of the time that is left, from now on; at least ``least`` seconds."""
-        return replace(self, seconds=max(share * self.left, least), begun=time.monotonic())
+    def part(self, share: float) -> Budget:
+        """A share of the time that is left, from now on."""
+        return replace(self, seconds=max(share * self.left, 0.0), begun=time.monotonic())
 
     def put_off(self, seconds: float) -> Budget:
         """The budget after some seconds that do not count."""

@@ -18,11 +18,9 @@ other could follow which aims elsewhere has no bound but time.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from types import MappingProxyType
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
@@ -51,6 +49,7 @@ IN_KERNELS = 5  # of them, without proofs while searching, for planners that run
 SEPARATED = 2  # attempts with further goal configurations, once none that is known can be reached
 
 Kind: TypeAlias = Literal["quick", "plain", "strict"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 class Row(NamedTuple):
@@ -153,8 +152,8 @@ class Turn:
             seconds_left=lambda: self.budget.left,
         )
         self._check = SecondCheck(problem, planner, request, seed=seeds[0])
-        self._made: Counter[Kind] = Counter()
-        self._spent: Counter[Kind] = Counter()  # checked motions, and what an attempt costs beside
+        self._made: dict[Kind, int] = dict.fromkeys(KINDS, 0)
+        self._spent: dict[Kind, int] = dict.fromkeys(KINDS, 0)  # checked motions, and what an attempt costs beside
         self._forms: dict[bool, Problem] = {}  # for strict attempts, by whether motions have to be proven
 
     def rows(self) -> Iterator[Row]:
@@ -191,7 +190,8 @@ class Turn:
 
     def take(self, row: Row, outcome: Attempt) -> None:
         """Count what has come of an attempt, and keep its path if the second check accepts it."""
-        self.budget = self.budget.put_off(outcome.counting)
+        if outcome.counting:
+            self.budget = self.budget.put_off(outcome.counting)
         for key, value in outcome.statistics.items():
             self.totals[key] = value if key in self._traits.path_statistics else self.totals.get(key, 0) + value
         self._made[row.kind] += 1
@@ -288,8 +288,8 @@ class Turn:
             most = max(int(-(-self._share(number) * left // EFFORT_ITERATIONS)), 1)
             effort = most if effort is None else min(effort, most)
         iterations = None if effort is None else effort * EFFORT_ITERATIONS
-        budget = self.budget.part(share, least=SHORTEST)
-        return replace(budget, iterations=iterations, seed=self._seeds[number])
+        seconds = max(share * self.budget.left, SHORTEST)
+        return Budget(self._seeds[number], seconds, iterations, self.budget.stop)
 
     def _iterations_left(self) -> int | None:
         """Of all attempts together; None without a limit, or where the planner knows none."""

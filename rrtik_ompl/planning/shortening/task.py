@@ -100,9 +100,10 @@ class Task:
 
     def expired(self) -> bool:
         """Whether the time is up, or the checks are spent."""
-        if self.checks_left <= 0:
+        budget = self.wishes.budget
+        if budget.iterations is not None and self.asked >= budget.iterations:
             return True
-        self._stopped = self._stopped or self.wishes.budget.over()
+        self._stopped = self._stopped or budget.over()
         return self._stopped
 
     def free_batch(self, A: Matrix, B: Matrix) -> Mask:
