@@ -120,6 +120,7 @@ def plan(
     request = Request(Budget(drawn, limit), restarts, parameters or {}, proof, clearance)
     alone = _named(planner)
     found = run_portfolio(problem, request) if alone is None else run_planner(problem, alone, request)
+
     if found.found and how.seconds > 0.0:
         finder = alone or NamedPlanner(found.planner, find_planner(found.planner))
         found = improved(problem, found, finder, request, how)
@@ -128,16 +129,9 @@ def plan(
     return replace(found, member=problem.goal.member_at(problem.robot, found.path.end))
 
 
-def plan_counted(problem: Problem, iterations: int, *, seconds: float, seed: int) -> Plan:
-    """A plan by "auto" that ends after a number of iterations of each planner, about, so that no clock decides.
-
-    Args:
-        problem: What to solve.
-        iterations: Of each planner.
-        seconds: Limit of wall time on top of that [s].
-        seed: Of everything random.
-    """
-    return run_portfolio(problem, Request(Budget(seed, seconds, iterations)))
+def plan_counted(problem: Problem, budget: Budget) -> Plan:
+    """A plan by "auto" that ends after the iterations of a budget, of each planner, about: no clock decides."""
+    return run_portfolio(problem, Request(budget))
 
 
 def _named(planner: str | PlannerFactory) -> NamedPlanner | None:

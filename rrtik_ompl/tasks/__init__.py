@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import positive, whole_number
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import require
 from rrtik_ompl.model.judgement import Violation
@@ -190,7 +190,9 @@ class Task:
         q = usable_configuration(begun.world, given, "start")
         if never := never_set_down(steps, begun.world, np.array(q)):
             return TaskPlan(False, (), (), (), (), never)
-        search = TaskSearch(time.monotonic() + positive(seconds, "seconds"), whole_number(seed, "seed"))
+
+        limit = positive(seconds, "seconds")
+        search = TaskSearch(Budget(whole_number(seed, "seed"), limit))
         done = search.run(Branch(begun, np.array(q), steps))
         if done is None:
             return TaskPlan(False, (), (), (), (), search.reason())

@@ -6,7 +6,6 @@ Straight lines are followed at once, for they decide most; motions between postu
 from __future__ import annotations
 
 import heapq
-import time
 from collections import Counter
 from dataclasses import dataclass
 from itertools import count
@@ -14,6 +13,7 @@ from itertools import count
 import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Vector
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import ProblemError
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.planning.plan import plan_counted
@@ -28,6 +28,7 @@ from rrtik_ompl.world.world import World
 
 FIRST_ITERATIONS = 4_000  # of each planner for a motion between postures; four times as much in each further round
 GROWTH = 4
+LEAST_SECONDS = 1e-3  # for one of them
 ROUNDS = 8
 NAMED = 6  # stages whose failures a reason names
 MOST_WORDS = 300  # letters of one failure
@@ -46,13 +47,13 @@ class TaskSearch:
     """One search.
 
     Args:
-        deadline: Of ``time.monotonic``.
-        seed: Of everything random.
+        budget: Time, and the seed of everything random.
     """
 
-    def __init__(self, deadline: float, seed: int) -> None:
-        self._deadline, self._seed, self._out_of_time = deadline, seed, False
-        self._expander = Expander(np.random.default_rng(seed), seed)
+    def __init__(self, budget: Budget) -> None:
+        self._budget = budget
+        self._out_of_time = False
+        self._expander = Expander(np.random.default_rng(budget.seed), budget.seed)
         self._open: list[tuple[int, float, int, Branch]] = []  # a heap: what is popped is the smallest
         self._numbers = count()
         self._ways: dict[int, JointPath] = {}  # of motions between postures, by their branches
@@ -95,7 +96,7 @@ class TaskSearch:
 
     def _round(self, effort: int) -> Done | None:
         while self._open:
-            if time.monotonic() > self._deadline:
+            if self._budget.over():
                 self._out_of_time = True
                 return None
             branch = heapq.heappop(self._open)[-1]
@@ -149,8 +150,8 @@ class TaskSearch:
         """A path of a problem that a motion poses; why there is none is noted."""
         assert link.before is not None, "it comes after another"
         assert link.step is not None, "it has done one"
-        left = max(self._deadline - time.monotonic(), 1e-3)
-        made = plan_counted(problem, FIRST_ITERATIONS * GROWTH**effort, seconds=left, seed=self._seed)
+        left = max(self._budget.left, LEAST_SECONDS)
+        made = plan_counted(problem, Budget(self._budget.seed, left, FIRST_ITERATIONS * GROWTH**effort))
         if made.path is None:
             self._expander.failures.append((link.before, link.step, made.reason))
         return made.path

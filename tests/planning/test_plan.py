@@ -10,6 +10,7 @@ import pytest
 from ompl import base as ob
 from ompl import control as oc
 
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
@@ -206,7 +207,7 @@ def test_where_the_short_way_round_is_blocked_the_long_one_does_not_wait_for_hal
         assert one.seconds < 30.0
         assert one.path.end == pytest.approx([0.1, 2.8 - 2 * np.pi])
         assert one.statistics == other.statistics
-    assert plan_counted(problem, 4000, seconds=120.0, seed=1).found  # as tasks do at first
+    assert plan_counted(problem, Budget(seed=1, seconds=120.0, iterations=4000)).found  # as tasks do at first
 
 
 @pytest.mark.parametrize(

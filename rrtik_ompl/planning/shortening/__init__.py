@@ -169,7 +169,19 @@ def shorten(
     if stop is not None:
         called(stop, "stop")
     single = _single(path, method, one_joint) or rules is not None
-    _refuse(path, problem, method, seconds, checks, seed, single, clearance)
+    require(problem, Problem, "problem of a path to shorten")
+    one_of(METHODS, method, "shortening method")
+    if seconds is not None:
+        positive(seconds, "seconds")
+    if checks is not None and whole_number(checks, "checks") < 1:
+        raise InputError("checks must be 1 or more, got 0")
+    whole_number(seed, "seed")
+    _refuse(path, problem)
+    check_route_clearance(problem.world, clearance, path.waypoints)
+    if single and not path.one_joint_at_a_time:
+        raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
+    if single and not METHODS[method].can_keep_moves:
+        raise InputError(f"shortening method '{method}' cannot keep one joint at a time; use axis or auto")
     if METHODS[method].keeps_moves and not path.one_joint_at_a_time:
         remedy = "use auto, or one_joint_moves(path, problem) first"
         message = f"shortening method '{method}' is for single-joint moves, so the path stays as it is: {remedy}"
@@ -260,35 +272,13 @@ def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
 
 def _method(name: ShorteningMethod, problem: Problem, one_joint: bool) -> Method:
     """The method of a name, or what takes its place under path constraints."""
-    chosen = METHODS[one_of(METHODS, name, "shortening method")]
-    return _HELD if problem.constraints and name in _CUTS and not one_joint else chosen
+    return _HELD if problem.constraints and name in _CUTS and not one_joint else METHODS[name]
 
 
-def _refuse(
-    path: JointPath,
-    problem: Problem,
-    method: ShorteningMethod,
-    seconds: float | None,
-    checks: int | None,
-    seed: int,
-    one_joint: bool,
-    clearance: float | None,
-) -> None:
-    """Refuse a request that makes no sense."""
-    require(problem, Problem, "problem of a path to shorten")
-    chosen = _method(method, problem, one_joint)
-    if seconds is not None:
-        positive(seconds, "seconds")
-    if checks is not None and whole_number(checks, "checks") < 1:
-        raise InputError("checks must be 1 or more, got 0")
-    whole_number(seed, "seed")
+def _refuse(path: JointPath, problem: Problem) -> None:
+    """Refuse a path that cannot be shortened."""
     if len(path.waypoints) < 2:
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
     faults = () if path.proven_in(problem.world) else path.violations(problem.world)
     if faults:
         raise InputError(f"path to shorten: motion {faults[0].edge + 1} is not valid: {faults[0].reason}")
-    check_route_clearance(problem.world, clearance, path.waypoints)
-    if one_joint and not path.one_joint_at_a_time:
-        raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
-    if one_joint and not chosen.can_keep_moves:
-        raise InputError(f"shortening method '{method}' cannot keep one joint at a time; use axis or auto")
