@@ -149,7 +149,8 @@ def _moved_joints(a: list[float], b: list[float], tolerance: float) -> list[int]
 
 
 def _rows(waypoints: ArrayLike) -> Matrix:
-    rows = finite_array(waypoints, (None, None), "waypoints")
+    """Waypoints, which are trusted to be numbers, as an array."""
+    rows = np.asarray(waypoints, dtype=np.float64)
     if len(rows) == 0:
         raise InputError("waypoints: a route needs at least one configuration")
     return rows

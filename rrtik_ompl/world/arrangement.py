@@ -10,8 +10,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.base.copies import Items, Once
+from rrtik_ompl.base.copies import Items, Once, changed
 from rrtik_ompl.base.errors import UnknownNameError
+from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.geometry.collision.bodies import (
     Body,
     Pairs,
@@ -89,7 +90,7 @@ class Arrangement:
         if name not in numbers.obstacles:
             raise UnknownNameError("obstacle", name, numbers.obstacles)
         place = numbers.obstacles[name]
-        obstacle = replace(self.scene.obstacles[place], pose=pose)
+        obstacle = changed(self.scene.obstacles[place], pose=rigid(pose, f"pose of '{name}'"))
         placements = numbers.placements(obstacle)
 
         bodies = self.bodies

@@ -10,9 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Mask, Vector, finite_array, not_negative
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, not_negative
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs, far_apart
@@ -140,53 +139,49 @@ class MovingWorld:
         self._fast.update_obstacles(self._bodies, self._inflation)
         self._prover.place(self._bodies, self._inflation, always_colliding=bool(self.blocked))
 
-    def clearance(self, Q: ArrayLike) -> Vector:
+    def clearance(self, Q: Matrix) -> Vector:
         """Lower bounds of the distance to contact of rows of Q, less margins and inflation [m]. (m, dof) -> (m,)."""
-        return self._fast.clearance(self.robot.joint_values(Q)).lower
+        return self._fast.clearance(self.robot.chain.joint_values(Q)).lower
 
-    def valid(self, q: ArrayLike) -> bool:
+    def valid(self, q: Vector) -> bool:
         """Whether q, shape (dof,), is free."""
-        return bool(self.valid_batch(np.atleast_2d(np.asarray(q, dtype=np.float64)))[0])
+        return bool(self.valid_batch(q[None])[0])
 
-    def valid_batch(self, Q: ArrayLike) -> Mask:
+    def valid_batch(self, Q: Matrix) -> Mask:
         """Which rows of Q, shape (m, dof), are free. Shape (m,)."""
-        rows = finite_array(Q, (None, self.robot.dof), "configurations")
-        self.checked += len(rows)
-        free: Mask = self._fast.classify(self.robot.chain.joint_values(rows), resolve=False) == FREE
-        return free & inside_limits(self.robot, rows) & (not self.blocked)
+        self.checked += len(Q)
+        free: Mask = self._fast.classify(self.robot.chain.joint_values(Q), resolve=False) == FREE
+        return free & inside_limits(self.robot, Q) & (not self.blocked)
 
-    def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
+    def motion_valid(self, a: Vector, b: Vector) -> bool:
         """Whether the straight motion from a to b, shapes (dof,), is free."""
-        ends = (np.atleast_2d(np.asarray(q, dtype=np.float64)) for q in (a, b))
-        return bool(self.motion_valid_batch(*ends)[0])
+        return bool(self.motion_valid_batch(a[None], b[None])[0])
 
-    def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
+    def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
         """Which straight motions A[k] -> B[k], shapes (m, dof), are free. Shape (m,)."""
-        starts, ends = (finite_array(Q, (None, self.robot.dof), "ends of motions") for Q in (A, B))
-        steps = step_counts(starts, ends, self.weights, self.motion_resolution)
+        steps = step_counts(A, B, self.weights, self.motion_resolution)
         self.checked += int(steps.sum()) + len(steps)
-        sides = self.robot.chain.joint_values(starts), self.robot.chain.joint_values(ends)
+        sides = self.robot.chain.joint_values(A), self.robot.chain.joint_values(B)
         free: Mask = self._fast.classify_edges(*sides, steps, resolve=False) == FREE
-        free &= inside_limits(self.robot, starts) & inside_limits(self.robot, ends) & (not self.blocked)
+        free &= inside_limits(self.robot, A) & inside_limits(self.robot, B) & (not self.blocked)
         if self._proving is not None:  # beyond the clearance, which the margins of the bodies hold already
-            free[free] = self._prover.proven(starts[free], ends[free], clearance=self._proving - self._room)
+            free[free] = self._prover.proven(A[free], B[free], clearance=self._proving - self._room)
         return free
 
     def motions_proven(
-        self, A: ArrayLike, B: ArrayLike, *, less: float = 0.0, inflation: Mapping[str, float] | None = None
+        self, A: Matrix, B: Matrix, *, less: float = 0.0, inflation: Mapping[str, float] | None = None
     ) -> Mask:
         """Which straight motions A[k] -> B[k], shapes (m, dof), are proven free as a whole. Shape (m,).
 
         They keep margins and ``inflation``, ``less`` [m] less of these, from where obstacles are now. Copies, which
         stand where obstacles will be, do not count. ``inflation`` [m] stands for that of :meth:`move` here alone.
         """
-        starts, ends = (finite_array(Q, (None, self.robot.dof), "ends of motions") for Q in (A, B))
         if inflation is None:
-            return self._prover.proven(starts, ends, clearance=-less)
+            return self._prover.proven(A, B, clearance=-less)
         room = [inflation.get(b.name, own) for b, own in zip(self._bodies, self._inflation, strict=True)]
         blocked = bool(self.blocked)
         self._prover.place(self._bodies, room, always_colliding=blocked)
-        proven = self._prover.proven(starts, ends, clearance=-less)
+        proven = self._prover.proven(A, B, clearance=-less)
         self._prover.place(self._bodies, self._inflation, always_colliding=blocked)
         return proven
 

@@ -90,11 +90,12 @@ def test_a_plan_in_a_world_with_a_clearance_keeps_it():
 
 
 def test_a_moving_world_keeps_what_its_world_keeps_or_refuses_it(world):
-    assert MovingWorld(world).valid(Q)
+    q = np.array(Q, dtype=np.float64)
+    assert MovingWorld(world).valid(q)
     wide = MovingWorld(world.with_clearance(0.5))
-    assert not wide.valid(Q)
+    assert not wide.valid(q)
     wide.move(world.scene)
-    assert not wide.valid(Q)
+    assert not wide.valid(q)
     region = rrtik.TaskRegion(rrtik.pose([0.0, 0.0, 0.0]), np.tile([-9.0, 9.0], (6, 1)))
     with pytest.raises(InputError, match="path constraints"):
         MovingWorld(world.with_settings(constraints=[region]))

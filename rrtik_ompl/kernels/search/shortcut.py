@@ -6,9 +6,8 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search import shortcut_layout
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions
@@ -39,28 +38,26 @@ class ShortcutSearch:
         asking: Whether shortcuts that the kernels cannot decide are asked about, or count as colliding.
 
     Raises:
-        InputError: If the route is none, a weight is negative, or the kernels cannot check the route.
+        InputError: If the route has no motion, or the kernels cannot check it.
     """
 
     def __init__(
         self,
         motions: FastMotions,
-        waypoints: ArrayLike,
+        waypoints: Matrix,
         *,
         seed: int = 0,
         share: float = 0.5,
         pull: float = 0.3,
-        metric: ArrayLike | None = None,
+        metric: Vector | None = None,
         asking: bool = True,
     ) -> None:
         dof = motions.dof
-        rows = finite_array(waypoints, (None, dof), "waypoints to shorten")
-        lengths = finite_array(np.ones(dof) if metric is None else metric, (dof,), "metric of a shortcut search")
+        rows = waypoints
+        lengths = np.ones(dof) if metric is None else metric
         kernels = library(shortcut_layout.KERNELS)
         if kernels is None or len(rows) < 2 or not motions.fast.covered(motions.joint_values(rows)):
             raise InputError("waypoints to shorten: expected a route of two or more that kernels can check")
-        if lengths.min(initial=0.0) < 0.0:
-            raise InputError("shortcut search: weights of the length must not be negative")
         self._kernels = kernels
         self._motions, self._dof = motions, dof  # its tables live as long as this search
         plan = _plan(len(rows) + SPARE_WAYPOINTS, dof)

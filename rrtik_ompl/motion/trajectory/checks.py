@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.motion.trajectory.motion import Trajectory
 
 
-def proof_of_pieces(motion: Trajectory, world: World, clearance: float | None, first: int, end: int) -> Proof:
+def proof_of_pieces(motion: Trajectory, world: World, clearance: float, first: int, end: int) -> Proof:
     """A proof of the pieces from ``first`` up to ``end``; see :meth:`Trajectory.prove`."""
     h, begin = np.diff(motion.times)[first:end], motion.accelerations[first:end]
     pushes = np.maximum(np.abs(begin), np.abs(begin + h[:, None] * motion.jerks[first:end]))
@@ -47,7 +47,7 @@ def bad_moments(motion: Trajectory, world: World) -> Vector:
     counts = np.ceil(ways * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
     pieces, shares = even_parts(counts)
     clock = np.append(motion.times[pieces] + shares * h[pieces], motion.duration)
-    bad = np.flatnonzero(~world.certify(motion(clock).positions))
+    bad = np.flatnonzero(~world.checks.certified(motion(clock).positions))
     touching, where = np.unique(np.append(pieces, len(h) - 1)[bad], return_index=True)
     moments = np.asarray(clock[bad[where]])
     if world.settings.proving is None:

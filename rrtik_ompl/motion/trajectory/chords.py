@@ -59,7 +59,7 @@ def proof_by_chords(
     pushes: Vector,
     places: Callable[[Vector], Matrix],
     world: World,
-    clearance: float | None,
+    clearance: float,
     finer: int = 0,
 ) -> Proof:
     """Prove the pieces of a motion, m of them; those that are not proven by chords are tried again with finer ones.
@@ -69,18 +69,18 @@ def proof_by_chords(
         pushes: See :func:`chords_of`.
         places: Configurations at times, shape (k,) to (k, dof).
         world: The world.
-        clearance: To be kept from every obstacle [m]; what the world keeps if None.
+        clearance: To be kept from every obstacle [m].
         finer: How many of ``SLACKS`` have been tried.
     """
     h, slack = np.diff(times), SLACKS[finer]
     chords = chords_of(h, pushes, slack)
     clock = times[chords.pieces] + chords.shares * h[chords.pieces]
-    found = chords.joined(world.prove(places(np.append(clock, times[-1])), clearance=clearance, slack=slack))
+    found = chords.joined(world.prover.route(places(np.append(clock, times[-1])), clearance=clearance, slack=slack))
     if found.proven or finer + 1 == len(SLACKS):
         return found
     unproven = np.array([gap.motion for gap in found.unproven])
     q = places(times[unproven] + np.nan_to_num([gap.share for gap in found.unproven]) * h[unproven])
-    hopeful = world.motions_proven(q, q, clearance=clearance)  # where the motion itself is as near, no chord helps
+    hopeful = world.prover.proven(q, q, clearance=clearance)  # where the motion itself is as near, no chord helps
     gaps = [gap for gap, hope in zip(found.unproven, hopeful, strict=True) if not hope]
     near = unproven[hopeful]
     for stretch in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else ():

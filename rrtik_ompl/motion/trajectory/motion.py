@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, positive
+from rrtik_ompl.base.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, not_negative, positive
 from rrtik_ompl.base.copies import as_value, changed, in_notebook
 from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.base.units import joint_units
@@ -228,7 +228,8 @@ class Trajectory:
         """
         require(world, World, "world of a trajectory's proof")
         require_joints(world.robot, self.joint_names, "trajectory")
-        return proof_of_pieces(self, world, clearance, 0, len(self.times) - 1)
+        kept = world.settings.kept if clearance is None else not_negative(clearance, "clearance")
+        return proof_of_pieces(self, world, kept, 0, len(self.times) - 1)
 
     def played(self, world: World | None) -> Played:
         """The motion as a picture plays it, and what is said of it there: by :meth:`prove` and :meth:`faults`.

@@ -14,7 +14,7 @@ from rrtik_ompl.base.budget import Budget, no_stop
 from rrtik_ompl.base.choices import ShorteningMethod, one_of
 from rrtik_ompl.base.errors import InputError, PathWarning, called, require
 from rrtik_ompl.description.joint_weights import weights_of
-from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.ompl_bridge.simplify import simplified
 from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
 from rrtik_ompl.planning.moves.axis_cut import double_axis_cut
@@ -28,7 +28,7 @@ from rrtik_ompl.planning.shortening.random_cut import random_cut, shortcut
 from rrtik_ompl.planning.shortening.retraction import retract
 from rrtik_ompl.planning.shortening.sequential import sequential_cut
 from rrtik_ompl.planning.shortening.task import Task, Wishes
-from rrtik_ompl.world.kept_clearance import check_route_clearance
+from rrtik_ompl.world.kept_clearance import check_route_clearance, proved
 from rrtik_ompl.world.problem import Problem
 
 __all__ = ["METHODS", "Method", "MoveRules", "Task", "Wishes", "shorten", "shortened"]
@@ -205,7 +205,7 @@ def shortened(
     if len(head) < 2:
         return path
     if on_better is not None:
-        wishes = replace(wishes, on_better=lambda rows: on_better(path.with_waypoints(np.vstack([rows, tail]))))
+        wishes = replace(wishes, on_better=lambda rows: on_better(path_through(path, np.vstack([rows, tail]))))
 
     for each in _SINGLE_JOINT if chosen.chooses and wishes.one_joint else (chosen,):
         found = _in_forms(path, problem, each, (head, tail), wishes)
@@ -216,7 +216,7 @@ def shortened(
 
 def _with_proof(path: JointPath, problem: Problem) -> JointPath:
     """The path with what is proven of it."""
-    return path if path.proven_in(problem.world) else path.proved(problem.world)
+    return path if path.proven_in(problem.world) else proved(path, problem.world)
 
 
 def _in_forms(
@@ -233,7 +233,7 @@ def _in_forms(
         rows = np.vstack([found, tail])
         if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
             continue
-        shorter = acceptance.accepted(path.with_waypoints(rows))
+        shorter = acceptance.accepted(path_through(path, rows))
         if shorter is None:
             continue
         counted = 1.0 if single else weights_of(problem.robot)

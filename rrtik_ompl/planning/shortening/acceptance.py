@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.planning.moves.clearance_levels import roomiest
 from rrtik_ompl.planning.shortening.task import Wishes
 from rrtik_ompl.world.detours import with_detours
@@ -14,6 +14,7 @@ from rrtik_ompl.world.kept_clearance import keeping, proved_as_clear, room_betwe
 from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.proven_motions import proven_motions
+from rrtik_ompl.world.route_check import violations_of
 from rrtik_ompl.world.world import World
 
 SPARE = 2.5e-4  # [m] beyond the clearance that searches keep if the ends have it: chords of timed motions need 0.1 mm
@@ -109,12 +110,12 @@ class Acceptance:
             rng = np.random.default_rng(self._seed)
             rows = with_detours(self._problem.world, shorter.waypoints, clearance=self._room.kept, rng=rng)
             if rows is not None:
-                return self._proved(shorter.with_waypoints(rows))
+                return self._proved(path_through(shorter, rows))
         if self._leaves_room and proved.proven:
             return proved
         if self._input_keeps or (self.input.proven and not proved.proven):
             return None
-        return None if shorter.violations(self._problem.world) else proved
+        return None if violations_of(self._problem.world, shorter.waypoints) else proved
 
     def _proved(self, path: JointPath) -> JointPath:
         """The path with a proof of the clearance, or of less."""

@@ -47,6 +47,10 @@ class Way:
     clearance: float | None
     seed: int = 0
 
+    def kept(self, world: World) -> float:
+        """What it keeps from obstacles in a world [m]."""
+        return world.settings.kept if self.clearance is None else self.clearance
+
     def leads_nowhere(self, robot: Robot) -> bool:
         """Whether its end is where it begins."""
         return bool(self.measures(robot).sum() <= NO_LENGTH)
@@ -129,7 +133,7 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
 
     rows = np.concatenate(parts)
     shares = np.concatenate(places)
-    proof = world.prove(rows, clearance=way.clearance) if len(rows) > 1 else None
+    proof = world.prover.route(rows, clearance=way.kept(world)) if len(rows) > 1 else None
     if proof is not None and not proof.proven:
         return _cut(world, way, rows, shares, proof)
     fraction = float(shares[-1])
@@ -142,12 +146,13 @@ def _cut(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> 
     """The part before the first place that is not proven, which is found by halving the motion."""
     gap = proof.unproven[0]
     a, b = rows[gap.motion], rows[gap.motion + 1]
+    room = way.kept(world)
     good = 0.0
     bad = 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (good + bad)
         part = np.stack([a, a + middle * (b - a)])
-        if world.prove(part, clearance=way.clearance, slack=LEFT).proven:
+        if world.prover.route(part, clearance=room, slack=LEFT).proven:
             good = middle
         else:
             bad = middle
@@ -158,7 +163,7 @@ def _cut(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> 
     if good > 0.0:
         kept = np.vstack([kept, a + good * (b - a)])
         fraction += good * float(shares[gap.motion + 1] - shares[gap.motion])
-    known = world.prove(kept, clearance=way.clearance) if len(kept) > 1 else None
+    known = world.prover.route(kept, clearance=room) if len(kept) > 1 else None
     return Attempt(kept, known, fraction, reason)
 
 

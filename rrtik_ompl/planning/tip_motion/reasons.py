@@ -41,7 +41,7 @@ def why_blocked(world: World, a: Vector, b: Vector, pair: tuple[str, str]) -> st
     """Why a motion that is not proven free cannot be taken: the pair in contact, or the pair too near for a proof."""
     for share in np.linspace(0.0, 1.0, LOOKS):
         q = a + share * (b - a)
-        if not world.valid(q):
+        if not world.checks.free(q[None])[0]:
             return f"contact: {world.explain(q)}"
     first, second = pair
     if not first:
