@@ -25,7 +25,7 @@ from rrtik_ompl.model.goal import (
     has_continuous,
     joint_difference,
 )
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, poses
 from rrtik_ompl.world.problem import Problem
 
 STARTS = 48  # of inverse kinematics in one round
@@ -194,7 +194,7 @@ def _miss(problem: Problem, goal: TipGoal) -> str:
     starts = np.random.default_rng(0).uniform(*robot.finite_range(), (STARTS, robot.dof))
     if len(regions) > PARTS:  # to walk to each of thousands would take minutes
         places = np.array([(region.T_world_w * region.T_w_tip).translation for region in regions])
-        away = np.linalg.norm(places[:, None] - robot.fk_batch(starts)[:, :3, 3], axis=2).min(axis=1)
+        away = np.linalg.norm(places[:, None] - poses(robot, starts)[:, :3, 3], axis=2).min(axis=1)
         regions = [regions[k] for k in np.argsort(away, kind="stable")[:PARTS]]
         goal = GoalSet(regions)
     starts = starts[: STARTS // len(regions)]

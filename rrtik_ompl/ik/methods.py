@@ -18,7 +18,7 @@ from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric
 from rrtik_ompl.ik.numeric.projection import projection
 from rrtik_ompl.kernels.ik import branch_layout, ik_layout
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, inside_limits
 
 
 def load_kernels(robot: Robot) -> None:
@@ -50,7 +50,7 @@ def _closed_form(request: IkRequest) -> IkResponse:
     residuals = np.asarray(found.residuals).reshape(-1, 2)
     near_enough = residuals <= np.array([target.tolerances for target in targets])[owner]
     reaching = near_enough.all(axis=1)
-    q = rows[robot.within_limits(rows) & reaching]
+    q = rows[inside_limits(robot, rows) & reaching]
     if not request.accept(q).any():
         q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
     outside = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)

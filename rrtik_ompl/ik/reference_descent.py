@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.kernels.ik.ik_layout import ANY_TURN, BOX, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, jacobians, poses
 from rrtik_ompl.model.tip_distance import reach_of
 
 PER_CHORD = 0.3  # weight of a turn (its chord 2 sin(angle / 2)) where the position counts in reaches
@@ -36,7 +36,7 @@ def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: in
     mark, before, share = np.full(len(Q), np.inf), np.full(len(Q), np.inf), np.full(len(Q), DAMPING_SHARE)
     weights = np.repeat([1.0 / reach_of(robot), PER_CHORD], 3)
     for step in range(steps + 1):
-        error, felt, there = residuals(aims[going], robot.fk_batch(Q[going]))
+        error, felt, there = residuals(aims[going], poses(robot, Q[going]))
         reached[going] = there
         error = error * weights
         square = (error * error).sum(axis=1)
@@ -100,7 +100,7 @@ def farness(robot: Robot, aims: Matrix, tips: NDArray[np.float64]) -> Matrix:
 
 def _jacobians(robot: Robot, aims: Matrix, felt: NDArray[np.float64], Q: Matrix) -> NDArray[np.float64]:
     """Jacobians in the axes of the goals, turns as far as they are felt, shape (m, 6, dof)."""
-    turned, J = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1), robot.jacobian_batch(Q)
+    turned, J = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1), jacobians(robot, Q)
     return np.concatenate([turned @ J[:, :3], felt @ turned @ J[:, 3:]], axis=1)
 
 

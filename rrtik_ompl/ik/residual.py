@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.ik.method_interface import Target
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, pinocchio_rows
 
 SHARE = 0.01  # of the tolerance: a solution on the rim would not survive rounding
 NEAR_HALF_TURN = 1e-4  # [rad] from pi, where the skew part of a rotation no longer determines its axis
@@ -34,7 +34,7 @@ def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
     By Pinocchio and in numbers of Python's own: as `tip_errors`, up to rounding, in a quarter of its time.
     """
     model, data, frame, plain = _tip_of(robot, get_ident())
-    pin.forwardKinematics(model, data, q if plain else robot.pinocchio_configuration(q)[0])
+    pin.forwardKinematics(model, data, q if plain else pinocchio_rows(robot, q[None])[0])
     tip = pin.updateFramePlacement(model, data, frame)
     away = math.dist(tip.translation.tolist(), goal.point.tolist())
     if not goal.oriented:

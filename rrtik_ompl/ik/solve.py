@@ -29,7 +29,7 @@ from rrtik_ompl.model.goal import (
     has_continuous,
     joint_difference,
 )
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.check_world import check_world
 from rrtik_ompl.world.world import World
@@ -177,8 +177,8 @@ def free_of_collision(world: World | None, Q: Matrix) -> Mask:
     """
     if world is None or len(Q) == 0:
         return ~np.zeros(len(Q), dtype=bool)  # in a third of the time of numpy's own ones
-    free = np.array(world.valid_batch(Q))
-    free[free] = world.certify(Q[free])
+    free = np.array(world.checks.free(Q))
+    free[free] = world.checks.certified(Q[free])
     return free
 
 
@@ -190,7 +190,7 @@ def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
     robot, goal = request.robot, request.goal
     inside = q  # most often all are, and to clamp them takes twice as long as to see that
     if not ((q >= robot.lower) & (q <= robot.upper)).all():
-        inside = robot.clamp(q[robot.within_limits(q)])
+        inside = robot.clamp(q[inside_limits(robot, q)])
     if len(inside) > 1:
         away = weighted_difference(robot, inside, request.near)
         nearest = int(np.vecdot(away, away).argmin())
@@ -210,7 +210,7 @@ def _reaching(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
     The accepted ones, of which the nearest are enough unless all are wanted; if there is none, some of the others.
     """
     robot, goal = request.robot, request.goal
-    rows = robot.clamp(q[robot.within_limits(q)])
+    rows = robot.clamp(q[inside_limits(robot, q)])
     free, some = request.accept(rows), _block(goal)
     chosen = rows[free]
     if not request.all and len(chosen) > some:

@@ -25,7 +25,7 @@ from rrtik_ompl.ik.numeric.track import Tracker
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.solve import free_of_collision, solve_ik
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.check_world import check_world
 from rrtik_ompl.world.world import World
 
@@ -246,7 +246,7 @@ def _keep_only_checked(task: Task, q: Matrix) -> Matrix:
     residuals = np.full((len(q), 2), np.nan)
     for k in np.flatnonzero(~np.isnan(q[:, 0])):
         residuals[k] = np.ravel(task.goals[k].errors(task.robot, q[k : k + 1]))
-    good = (residuals <= task.targets[0].tolerances).all(axis=1) & task.robot.within_limits(q)
+    good = (residuals <= task.targets[0].tolerances).all(axis=1) & inside_limits(task.robot, q)
     good[good] = task.accept(q[good])
     q[~good], residuals[~good] = np.nan, np.nan
     q[:] = task.robot.clamp(q)

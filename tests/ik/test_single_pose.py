@@ -18,6 +18,7 @@ from rrtik_ompl.ik.serial_chain import seeded_limb_of
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.world.row_checks import RowChecks
 
 ARMS = ("ur5", "panda", "titan4")
 ROUNDING = 1e-12  # [m] and [rad]
@@ -108,8 +109,8 @@ def test_a_pose_is_solved_while_another_is_being_accepted(name, monkeypatch):
         inner.append(solve_ik(robot, second).solutions)
         return np.ones(len(Q), dtype=bool)
 
-    monkeypatch.setattr(rrtik.World, "valid_batch", judged)
-    monkeypatch.setattr(rrtik.World, "certify", lambda self, Q: np.ones(len(Q), dtype=bool))
+    monkeypatch.setattr(RowChecks, "free", judged)
+    monkeypatch.setattr(RowChecks, "certified", lambda self, Q: np.ones(len(Q), dtype=bool))
     np.testing.assert_array_equal(solve_ik(robot, first, world=world).solutions, expected[0])
     assert len(inner) > 0
     for found in inner:

@@ -12,7 +12,7 @@ from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector, finite_array, froz
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.analytic.closed_form import SWEEP, ClosedForm, form_of, solutions
 from rrtik_ompl.model.goal import joint_difference
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, inside_limits
 
 JUMP = 0.2  # [rad] or [m] of any joint between two points of a trajectory: more is another branch, not motion
 JUMP_COST = 1e3  # more than any motion can cost
@@ -187,7 +187,7 @@ def _in_every_turn(robot: Robot, q: Matrix, tags: NDArray[np.int64]) -> tuple[Ma
         for turn in (*range(-most, 0), *range(1, most + 1)):
             other = q.copy()
             other[:, joint] += turn * TAU
-            fits = robot.within_limits(other)
+            fits = inside_limits(robot, other)
             rows.append(other[fits])
             owners.append(tags[fits])
         if sum(map(len, rows)) > MOST_TURNED:

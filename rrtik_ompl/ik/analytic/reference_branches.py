@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import TAU, Matrix
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, wrapped
 from rrtik_ompl.ik.tip_columns import tip_columns
-from rrtik_ompl.model.robot import FEW, LIMIT_TOLERANCE, Robot
+from rrtik_ompl.model.robot import FEW, LIMIT_TOLERANCE, Robot, poses
 
 BLOCK = 2048  # targets at a time: their arrays stay in the cache
 
@@ -107,7 +107,7 @@ def _tips(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
     rows = q.reshape(robot.dof, -1).T
     if len(rows) > FEW:
         return tip_columns(robot).poses(q)
-    return robot.fk_batch(rows)[:, :3].T.reshape(4, 3, *q.shape[1:])
+    return poses(robot, rows)[:, :3].T.reshape(4, 3, *q.shape[1:])
 
 
 def tip_residuals(

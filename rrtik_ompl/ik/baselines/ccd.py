@@ -13,7 +13,7 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.baselines.joint_axes import Joint, Swing, joints_to_tip, room
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import walked
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, poses
 from rrtik_ompl.model.tip_distance import reach_of
 
 SWEEPS = 300
@@ -41,8 +41,8 @@ def ccd(
 
 def _sweep(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...], length: float) -> Matrix:
     """Every joint once; the frames before a joint stay where they were, so that one forward kinematics is enough."""
-    frames = robot.joint_frames(Q)
-    tips = robot.fk_batch(Q)
+    frames = robot.chain.joint_frames(Q)
+    tips = poses(robot, Q)
     wanted = np.zeros((1, 4 if goal.oriented else 1, 3))
     wanted[0, 0] = goal.point
     points = tips[:, None, :3, 3]

@@ -13,7 +13,7 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import shortened, twist, walked
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, jacobians, pinocchio_rows, poses
 
 ITERATIONS = 200
 DAMPING = 0.05  # [m] or [rad]; constant, squared where it is used
@@ -39,8 +39,8 @@ def damped_least_squares(
     rows = slice(0, 6 if goal.oriented else 3)
 
     def step(Q: Matrix) -> Matrix:
-        e = twist(goal, robot.fk_batch(Q))[:, rows, None]
-        J = robot.jacobian_batch(Q)[:, rows]
+        e = twist(goal, poses(robot, Q))[:, rows, None]
+        J = jacobians(robot, Q)[:, rows]
         square = J @ J.transpose(0, 2, 1) + DAMPING**2 * np.eye(J.shape[1])
         dq = (J.transpose(0, 2, 1) @ np.linalg.solve(square, e))[..., 0]
         return robot.clamp(Q + shortened(dq, LARGEST_STEP))
@@ -63,7 +63,7 @@ def _one_start(robot: Robot, goal: Target, q: Vector) -> tuple[Vector, int]:
     frame = model.getFrameId(robot.tip)
     steps = 0
     while steps < STEPS:
-        full = robot.pinocchio_configuration(q)[0]
+        full = pinocchio_rows(robot, q[None])[0]
         pin.framesForwardKinematics(model, data, full)
         J = np.reshape(pin.computeFrameJacobian(model, data, full, frame, pin.ReferenceFrame.LOCAL), (6, -1))
         J = J @ robot.chain.gain

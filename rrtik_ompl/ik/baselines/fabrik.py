@@ -14,7 +14,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.baselines.joint_axes import Joint, Swing, coupled_fault, joints_to_tip, room
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import walked
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, poses
 
 ITERATIONS = 200
 TIP_WEIGHT = 3.0  # in space, beside the other points; the next point alone never led spatial arms to the goal
@@ -49,9 +49,9 @@ def fabrik(
 
 
 def _pass(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...]) -> Matrix:
-    frames = robot.joint_frames(Q)
+    frames = robot.chain.joint_frames(Q)
     rows = [joint.row + 1 for joint in joints]
-    tips = robot.fk_batch(Q)
+    tips = poses(robot, Q)
     points = np.concatenate([frames[:, rows][..., :3, 3], tips[:, None, :3, 3]], axis=1)
     axes = np.einsum("mkij,kj->mki", frames[:, rows][..., :3, :3], robot.chain.axis[[joint.row for joint in joints]])
     pulled = _pulled(points, goal)

@@ -12,6 +12,7 @@ from rrtik_ompl.ik.genetic.options import REFINED
 from rrtik_ompl.ik.genetic.search import follow_targets
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.numeric.restarts import nearest_posture
+from rrtik_ompl.model.robot import inside_limits
 
 MAX_ROUNDS = 64  # populations, after which it gives up
 GENERATIONS = 40  # of each; most that reach the goal do so in ten
@@ -44,5 +45,5 @@ def _given_up(request: IkRequest, found: Matrix, generations: int, *, timed_out:
     """What there is, and a posture for the reason: if it is at the goal and will not do, that is the reason."""
     robot, nearest = request.robot, nearest_posture(request)
     row = nearest[None]
-    at_goal = row[request.goal.satisfied(robot, row) & robot.within_limits(row)]
+    at_goal = row[request.goal.satisfied(robot, row) & inside_limits(robot, row)]
     return IkResponse(np.vstack([found, at_goal[~request.accept(at_goal)]]), nearest, generations, timed_out)

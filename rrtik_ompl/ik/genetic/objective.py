@@ -11,7 +11,7 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.genetic.options import GeneticOptions
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.model.goal import joint_difference
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, jacobians, poses
 from rrtik_ompl.model.tip_distance import reach_of
 
 
@@ -45,7 +45,7 @@ def score(
         options: The weights.
         accept: Which configurations will do; the others cost as much as the arm's reach more.
     """
-    tips = robot.fk_batch(Q)
+    tips = poses(robot, Q)
     near, turned = target.tolerances
     distance, angle = target.tip_errors(tips)
     reached = distance < near
@@ -74,7 +74,7 @@ def manipulability(robot: Robot, Q: Matrix, position_only: bool) -> Vector:
     Returns:
         Shape (m,).
     """
-    J = robot.jacobian_batch(Q)
+    J = jacobians(robot, Q)
     J[:, :3] /= reach_of(robot)
     if position_only:
         J = J[:, :3]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.residual import shortened
+from rrtik_ompl.model.robot import poses_and_jacobians
 
 ITERATIONS = 24
 DAMPING = 1e-6  # the constant part, in units of the squared residual
@@ -42,7 +43,7 @@ def descend(metric: TipMetric, Q: Matrix, lower: Vector, upper: Vector, *, itera
     rows, q = np.arange(len(Q)), Q
     for step in range(iterations):
         metric.evaluations += len(rows)
-        tips, J = metric.robot.fk_jacobian_batch(q)
+        tips, J = poses_and_jacobians(metric.robot, q)
         e, distance = metric.pull(tips)
         better = distance < best_distance[rows]
         best[rows[better]], best_distance[rows[better]] = q[better], distance[better]

@@ -15,7 +15,7 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import twist
 from rrtik_ompl.ik.tip_columns import tip_columns
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, poses
 
 REACH_PER_TURN = 1.0  # a full turn of the tip counts as far as so many times the reach, unless given
 JOINT_RADIUS = 1e-3  # [rad] from a goal configuration, which is then reached exactly
@@ -71,7 +71,7 @@ class TipMetric:
         if not any(target.oriented for target in targets):
             return cls(robot, targets, metres_per_radian=0.0)
         if mu is None:
-            tip = robot.fk_batch(start[None])
+            tip = poses(robot, start[None])
             away = min(float(target.tip_errors(tip)[0][0]) for target in targets)
             mu = 0.5 * np.pi / max(away, NEAREST_START * reach(robot))
         return cls(robot, targets, metres_per_radian=0.5 / mu, unit=mu)
@@ -79,7 +79,7 @@ class TipMetric:
     def distance(self, Q: Matrix) -> Vector:
         """Of the tip at each row of Q, shape (m, n), from the nearest target; shape (m,)."""
         self.evaluations += len(Q)
-        return self._each(self.robot.fk_batch(Q)).min(axis=0)  # type: ignore[no-any-return]
+        return self._each(poses(self.robot, Q)).min(axis=0)  # type: ignore[no-any-return]
 
     def pull(self, tips: NDArray[np.float64]) -> tuple[Matrix, Vector]:
         """Where tips, shape (m, 4, 4), would have to go, and how far.
@@ -95,7 +95,7 @@ class TipMetric:
 
     def errors(self, q: Vector) -> Vector:
         """Distance [m] and angle [rad] of the tip at q, shape (n,), from the nearest target; shape (2,)."""
-        tip = self.robot.fk_batch(q[None])
+        tip = poses(self.robot, q[None])
         nearest = self.targets[int(self._each(tip)[:, 0].argmin())]
         return np.array(nearest.tip_errors(tip))[:, 0]
 

@@ -19,7 +19,7 @@ from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
 from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.model.goal import Target
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, inside_limits, poses
 from rrtik_ompl.world.world import World
 
 WIDTH = 16  # passes at a time
@@ -114,7 +114,7 @@ def polished(robot: Robot, axes: Axes, target: Target, ends: Matrix, *, all: boo
     if target.oriented:
         ends = _last_turned(robot, axes, target, ends)
     if axes.exact:
-        return ends[target.satisfied(robot, ends) & robot.within_limits(ends)]
+        return ends[target.satisfied(robot, ends) & inside_limits(robot, ends)]
     if not all:
         ends, _ = descend(robot, target, ends, iterations=FIRST_STEPS)
         there = target.tightened(POLISHED).satisfied(robot, ends)
@@ -128,7 +128,7 @@ def _last_turned(robot: Robot, axes: Axes, target: Target, ends: Matrix) -> Matr
     """The last joint, which leaves the aimed point where it is, turned as near to the orientation as it gets."""
     joint, angles = int(axes.joints[-1]), np.array(ends)
     angles[:, joint] = -axes.offset[-1]
-    frames = robot.fk_batch(angles)[:, :3, :3] @ axes.fixed[-1][:3, :3].T
+    frames = poses(robot, angles)[:, :3, :3] @ axes.fixed[-1][:3, :3].T
     wanted = target.pose.rotation @ axes.fixed[-1][:3, :3].T
     off = np.swapaxes(frames, 1, 2) @ wanted  # the turn about z nearest to it
     turn = np.arctan2(off[:, 1, 0] - off[:, 0, 1], off[:, 0, 0] + off[:, 1, 1])

@@ -17,7 +17,7 @@ from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.base.poses import rpy_matrices
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.residual import SHARE, shortened, twist_between
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, jacobians, poses
 from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
 
@@ -46,12 +46,12 @@ def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix 
     scale = np.repeat([1.0 / reach_of(robot), PER_RADIAN], 3)[:, None]
     mark = np.full(len(Q), np.inf)
     for step in range(ITERATIONS):
-        tips = robot.fk_batch(Q[left])
+        tips = poses(robot, Q[left])
         aims = region.nearest(tips)
         slides = np.isnan(places[left, 0])
         aims[:, :3] = np.where(slides[:, None], aims[:, :3], places[left])
-        poses = region.poses(aims)
-        twist = twist_between(tips, poses[:, :3, :3], poses[:, :3, 3])
+        ends = region.poses(aims)
+        twist = twist_between(tips, ends[:, :3, :3], ends[:, :3, 3])
         square = ((twist * scale[:, 0]) ** 2).sum(axis=1)
         kept = ~_arrived(region, twist)
         if step % PATIENCE == 0:
@@ -61,7 +61,7 @@ def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix 
         if len(left) == 0:
             break
         held = _held(region, aims, scale, slides[kept])
-        J = held @ (robot.jacobian_batch(Q[left]) * scale)
+        J = held @ (jacobians(robot, Q[left]) * scale)
         Q[left] = robot.clamp(Q[left] + _step(J, held @ (twist[:, :, None] * scale), square))
     return Q
 

@@ -14,7 +14,7 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target
 from rrtik_ompl.ik.numeric.descent import Search, walk
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, inside_limits
 
 STARTS = 32  # in one round
 MAX_ROUNDS = 16  # after which it gives up
@@ -41,7 +41,7 @@ def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds:
         if number < len(request.targets):
             Q[0] = request.near
         Q, taken = method(robot, target, Q)
-        good = target.satisfied(robot, Q) & robot.within_limits(Q)
+        good = target.satisfied(robot, Q) & inside_limits(robot, Q)
         found, steps = np.vstack([found, Q[good]]), steps + taken
         if request.accept(found).any() and not request.all:
             break

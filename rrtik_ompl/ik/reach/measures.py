@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, jacobians
 
 DIRECTIONS = 64  # one bit each of a 64-bit number
 FINE = 16  # the nearest of them is looked up in a cube of 33 cells a side
@@ -68,7 +68,7 @@ class Manipulability(Counter):
 
     def quality(self, robot: Robot, Q: Matrix) -> Vector:
         """Product of the singular values of the Jacobian [31], as many as there are joints, at most six."""
-        jacobian = robot.jacobian_batch(Q)
+        jacobian = jacobians(robot, Q)
         flipped = jacobian.transpose(0, 2, 1)
         gram = flipped @ jacobian if robot.dof < 6 else jacobian @ flipped  # the smaller of the two
         root: Vector = np.sqrt(np.maximum(np.linalg.det(gram), 0.0))

@@ -14,7 +14,7 @@ from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, at_most
 from rrtik_ompl.ik.reach.grid_map import ReachMap
 from rrtik_ompl.ik.reach.measures import MEASURES
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, poses
 from rrtik_ompl.world.check_world import check_world
 from rrtik_ompl.world.world import World
 
@@ -70,7 +70,7 @@ def reach_map(
     count = whole_number(samples, "samples", 1)
     at_most(count, MOST_SAMPLES, "samples")
     rng = np.random.default_rng(whole_number(seed, "seed"))
-    base = robot.fk_batch(np.zeros((1, robot.dof)), robot.link_names[0])[0, :3, 3]
+    base = poses(robot, np.zeros((1, robot.dof)), robot.link_names[0])[0, :3, 3]
     corner, size, shape = _grid(robot, base, cell)
     counter = MEASURES[measure](int(np.prod(shape)), robot.planar)
     counted = 0
@@ -80,7 +80,7 @@ def reach_map(
         Q = rng.uniform(low, high, (min(BLOCK, count - begin), robot.dof))
         if world is not None:
             Q = Q[world.valid_batch(Q)]
-        tips, quality = robot.fk_batch(Q), counter.quality(robot, Q)
+        tips, quality = poses(robot, Q), counter.quality(robot, Q)
         points, pointing = tips[:, :3, 3], tips[:, :3, "xyz".index(axis)]
         for number in range(1 if turn is None else TURNS):
             if turn is not None and number:
@@ -104,7 +104,7 @@ def _first_turn(robot: Robot) -> Callable[[Matrix, Matrix, Vector], tuple[Matrix
     alone = np.count_nonzero(chain.gain[:, 0]) == 1 and chain.gain[0, 0] == 1.0
     if robot.prismatic[0] or not alone or np.count_nonzero(chain.parent == -1) != 1:
         return None
-    frame = robot.joint_frames(np.zeros((1, robot.dof)))[0, 1]
+    frame = robot.chain.joint_frames(np.zeros((1, robot.dof)))[0, 1]
     axis, origin = frame[:3, :3] @ chain.axis[0], frame[:3, 3]
 
     def turn(points: Matrix, pointing: Matrix, angles: Vector) -> tuple[Matrix, Matrix]:
@@ -122,7 +122,7 @@ def _first_turn(robot: Robot) -> Callable[[Matrix, Matrix, Vector], tuple[Matrix
 def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float, tuple[int, int, int]]:
     """Corner, cell size and numbers of cells of a grid that holds all tips; the base is on a cell's corner."""
     rng = np.random.default_rng(0)
-    tips = robot.fk_batch(rng.uniform(*robot.finite_range(), (PROBE, robot.dof)))[:, :3, 3] - base
+    tips = poses(robot, rng.uniform(*robot.finite_range(), (PROBE, robot.dof)))[:, :3, 3] - base
     reach = PROBE_MARGIN * float(np.linalg.norm(tips, axis=1).max())
     if reach == 0.0:
         raise InputError(f"robot '{robot.name}': no joint moves its tip, so there is nothing to map; name another tip")

@@ -276,8 +276,7 @@ def test_single_joint_moves_are_kept_whenever_the_work_ends(method, problem, raw
 
 def test_a_path_that_plan_has_proven_is_not_proven_again(problem, raw, monkeypatch):
     proofs = []
-    monkeypatch.setattr(type(problem.world), "prove", lambda *_, **__: proofs.append(1))
-    monkeypatch.setattr(JointPath, "violations", lambda *_, **__: pytest.fail("it is proven"))
+    monkeypatch.setattr(type(problem.world.prover), "route", lambda *_, **__: proofs.append(1))
     chosen = Acceptance(raw[0], problem, Wishes(), one_joint=False)
     assert chosen.input is raw[0]
     assert not proofs
