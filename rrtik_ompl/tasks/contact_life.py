@@ -23,12 +23,14 @@ from rrtik_ompl.geometry.collision.contacts import measured
 from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, usually_apart
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.solids import is_mesh
-from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
 from rrtik_ompl.world.exact_checks import distance
+from rrtik_ompl.world.kept_clearance import proved
 from rrtik_ompl.world.proof import Prover
-from rrtik_ompl.world.world import World
+from rrtik_ompl.world.route_check import violations_of
+from rrtik_ompl.world.world import World, form_of
 
 NEAR = 1e-4  # [m] of a gap up to which two touch: straight lines deviate by as much
 DEEPER = 1e-3  # [m] that two in contact may come nearer than they were
@@ -208,12 +210,12 @@ def lived(path: JointPath, world: World, named: frozenset[frozenset[str]], arriv
             contacts.append(MotionContact(contact, numbers[place], later, contact.pair in named))
     for until in sorted(set(numbers.values())):
         strict = world_from(world, contacts, until)
-        if wrong := path.with_waypoints(rows[until:]).violations(strict):
+        if wrong := violations_of(strict, rows[until:]):
             fault = f"what has parted touches again: {wrong[0].reason}"
-            return Lived(path.with_waypoints(rows[: until + 1]), (), (), fault, strict)
+            return Lived(path_through(path, rows[: until + 1]), (), (), fault, strict)
     made = path
     if len(rows) > len(path.waypoints):
-        made = path.with_waypoints(rows).proved(world, clearance=None if path.proof is None else path.proof.clearance)
+        made = proved(path_through(path, rows), world, clearance=None if path.proof is None else path.proof.clearance)
     left = contacts_from(contacts, len(rows))
     lasting = tuple(contact for contact in left if at_end.get(contact.pair) != contact)
     return Lived(made, tuple(each for each in contacts if each.until != 0), lasting)
@@ -232,7 +234,7 @@ def world_from(world: World, contacts: Iterable[MotionContact], number: int) -> 
     stood_on = tuple(contacts)
     own = {each.touching.pair for each in stood_on}
     others = tuple(contact for contact in world.scene.contacts if contact.pair not in own)
-    return world.with_scene(replace(world.scene, contacts=(*others, *contacts_from(stood_on, number))))
+    return form_of(world, scene=replace(world.scene, contacts=(*others, *contacts_from(stood_on, number))))
 
 
 def again(contact: Touching) -> Touching:

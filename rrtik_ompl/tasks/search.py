@@ -15,14 +15,14 @@ import numpy as np
 from rrtik_ompl.base.arrays import TAU, Vector
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import ProblemError
-from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.planning.plan import plan_counted
 from rrtik_ompl.tasks.branches import Branch, Expander, again
 from rrtik_ompl.tasks.contact_life import MotionContact, lived
 from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.stages import MoveTo
-from rrtik_ompl.world.kept_clearance import CLEARANCE, proved_as_clear
+from rrtik_ompl.world.kept_clearance import CLEARANCE, proved, proved_as_clear
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -178,7 +178,7 @@ class TaskSearch:
                 rest = self._from_parting(link, done.world, done.path.end, path.end, effort)
                 if rest is None:
                     return False
-                whole = path.with_waypoints(np.vstack([done.path.waypoints, rest.waypoints[1:]])).proved(world)
+                whole = proved(path_through(path, np.vstack([done.path.waypoints, rest.waypoints[1:]])), world)
                 done = lived(whole, world, setting.named, link.arriving)
             if done.fault:
                 self._expander.failures.append((link.before, link.step, done.fault))
@@ -197,6 +197,6 @@ def _begun_at(q: Vector, path: JointPath, link: Branch) -> JointPath:
     if not away.any():
         return path
     assert link.step is not None, "it has done one"
-    turned = path.with_waypoints(np.vstack([q, path.waypoints[1:] + TAU * np.round(away / TAU)]))
+    turned = path_through(path, np.vstack([q, path.waypoints[1:] + TAU * np.round(away / TAU)]))
     clearance = CLEARANCE if path.proof is None else path.proof.clearance
     return proved_as_clear(turned, world_of_motion(turned, link.setting.world, link.step.stage), clearance)

@@ -18,7 +18,7 @@ from rrtik_ompl.model.scene import Scene, Touching
 from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, allowed, left_inside, touching_at, with_contacts
 from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, MoveTo, Stage
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.world import World
+from rrtik_ompl.world.world import World, form_of
 
 
 class Setting:
@@ -51,7 +51,7 @@ class Setting:
     @cached_property
     def world(self) -> World:
         """The robot in the scene, with the other settings of the first world of the task."""
-        return self._like.with_settings(robot=self.robot, scene=self.scene)
+        return form_of(self._like, robot=self.robot, scene=self.scene)
 
     def with_contacts(self, contacts: Iterable[Touching]) -> Setting:
         """The same setting with further contacts; of a pair that has one already the new one counts."""

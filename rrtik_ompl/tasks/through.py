@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import dimensions
 from rrtik_ompl.base.errors import InputError, listed
-from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.tasks import SECONDS, MoveTo, Task
+from rrtik_ompl.world.kept_clearance import proved
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -99,6 +100,6 @@ def plan_through(
         return PlanThrough(False, None, (), plan.reason)
     rows = [plan.paths[0].waypoints, *(path.waypoints[1:] for path in plan.paths[1:])]
     reached = np.cumsum([len(part) for part in rows]) - 1
-    path = plan.paths[0].with_waypoints(np.vstack(rows))
+    path = path_through(plan.paths[0], np.vstack(rows))
     judge = Problem(world, path.start, path.end, constraints=placed).world if placed else world
-    return PlanThrough(True, path.proved(judge), tuple(reached.tolist()), "")
+    return PlanThrough(True, proved(path, judge), tuple(reached.tolist()), "")
