@@ -1,6 +1,5 @@
 """Films and stills: as many pictures as were asked for, bodies in collision red; what is missing is said in a line."""
 
-import shutil
 from itertools import pairwise
 
 import numpy as np
@@ -12,17 +11,18 @@ from rrtik_ompl.cli.app import run
 from rrtik_ompl.description.catalog import find_problem
 from rrtik_ompl.problem_files.problem_values import load_unchecked
 from rrtik_ompl.viewer import film as module
-from rrtik_ompl.viewer.film import BROWSERS, film
+from rrtik_ompl.viewer.film import film
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
 from rrtik_ompl.viewer.subject import Shown, subject_of
 from rrtik_ompl.world.path_contacts import contacts_along
+from rrtik_tests.programs import needs_chromium
 
 WAYPOINTS = [[0.0, 0.0, 0.0], [1.0, 0.5, 0.5]]
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="there is no browser")
+@needs_chromium
 def test_a_film_shows_the_arm_moving(tmp_path):
     robot = rrtik.load_robot("planar3")
     with Image.open(film(robot, WAYPOINTS, tmp_path / "film.gif", seconds=1.0, rate=2.0, size=(320, 200))) as moving:

@@ -19,8 +19,9 @@ from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import subject_of
-from rrtik_tests.browser import CHROMIUM, planning_page
+from rrtik_tests.browser import planning_page
 from rrtik_tests.crane import WAYPOINTS
+from rrtik_tests.programs import needs_chromium
 
 # Steps of paths, what escapes are written with, what JavaScript's objects have, words of the page, and markup.
 PIECES = ["", "/", "|", "%", "%2F", "%25", "\\", " ", ".", "..", ":", "a"]
@@ -97,7 +98,7 @@ def test_contacts_find_the_nodes_of_their_bodies(crane: rrtik.Robot) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
+@needs_chromium
 def test_a_browser_finds_each_obstacle_where_it_stands(crane: rrtik.Robot, tmp_path: Path) -> None:
     scene = rrtik.Scene(boxes(NAMES), held(["a/b", "a|b"]))
     text = page(SimpleNamespace(world=SimpleNamespace(robot=crane, scene=scene)))

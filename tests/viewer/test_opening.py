@@ -10,11 +10,12 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.viewer.page import page
-from rrtik_tests.browser import CHROMIUM, Browser, planning_page
+from rrtik_tests.browser import Browser, planning_page
+from rrtik_tests.programs import needs_chromium
 
 pytestmark = [
     pytest.mark.kernels,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at"),
+    needs_chromium,
 ]
 SAID = "document.getElementById('plan-state').textContent"
 REFUSED = "document.getElementById('plan-refusal').textContent"

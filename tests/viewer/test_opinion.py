@@ -17,7 +17,8 @@ from rrtik_ompl.viewer import play
 from rrtik_ompl.viewer.opinion import opinion
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.serve import PageServer
-from rrtik_tests.browser import CHROMIUM, DRAWING_3D, Browser
+from rrtik_tests.browser import DRAWING_3D, Browser
+from rrtik_tests.programs import needs_chromium
 
 pytestmark = pytest.mark.kernels
 START, GOAL = [0.0, -1.2, 1.0, 0.2, 0.0, 0.0], [1.6, -1.2, 1.0, 0.2, 0.0, 0.0]
@@ -99,7 +100,7 @@ def test_questions_of_the_page_itself_are_answered_and_no_others() -> None:
         assert post(server, "/opinion", b"", Origin=server.url.rstrip("/"))[0] == 404
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
+@needs_chromium
 def test_in_a_browser_each_dragged_path_is_marked(problem: rrtik.Problem, tmp_path: Path) -> None:
     with (
         PageServer(page(problem, asks=True), 0, lambda question: opinion(problem, question)) as server,

@@ -1,7 +1,6 @@
 """A page that plans: its answers in node are those of Python, its saved files those that the commands take."""
 
 import json
-import shutil
 import subprocess
 from dataclasses import replace
 from functools import partial
@@ -28,10 +27,10 @@ from rrtik_ompl.viewer.page_planner import SAMPLES, page_planner
 from rrtik_ompl.viewer.page_tables import VERTICES
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
 from rrtik_ompl.world.problem import Problem, densely_checked
-from rrtik_tests.browser import CHROMIUM, Browser, planning_page
+from rrtik_tests.browser import Browser, planning_page
+from rrtik_tests.programs import needs_chromium, node
 
 pytestmark = pytest.mark.kernels
-needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
 ASSETS = files("rrtik_ompl.viewer").joinpath("assets")
 RUN = """
 const fs = require("fs");
@@ -63,12 +62,10 @@ const result = (work) => {
 
 
 def in_node(plan, tmp_path, **work):
-    if shutil.which("node") is None:
-        pytest.skip("no node on PATH: the page's kernels cannot be run")
     script = tmp_path / "run.js"
     script.write_text(RUN, encoding="utf-8")
     given = json.dumps({"plan": plan, "seeds": [], "moves": [], "poses": [], **work})
-    done = subprocess.run(["node", script, str(ASSETS)], input=given, capture_output=True, text=True, check=True)
+    done = subprocess.run([node(), script, str(ASSETS)], input=given, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
 
 

@@ -9,7 +9,8 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.page_tips import dragged_tips
-from rrtik_tests.browser import CHROMIUM, planning_page
+from rrtik_tests.browser import planning_page
+from rrtik_tests.programs import needs_chromium
 
 RIGHT = slice(6, 12)  # joints of the right arm
 GRASP = """(() => {
@@ -46,7 +47,7 @@ def test_the_tips_of_a_goal_are_those_that_it_names() -> None:
 
 
 @pytest.mark.kernels
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
+@needs_chromium
 def test_in_a_browser_the_right_arm_is_dragged_and_the_left_one_stays(tmp_path: Path) -> None:
     problem = rrtik.load_problem("two_titan4")
     path = rrtik.plan(problem, "RRTConnect", seed=1).path
@@ -63,7 +64,7 @@ def test_in_a_browser_the_right_arm_is_dragged_and_the_left_one_stays(tmp_path: 
 
 
 @pytest.mark.kernels
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
+@needs_chromium
 def test_the_page_is_dark_where_the_system_prefers_that(tmp_path: Path) -> None:
     lightness = "getComputedStyle(document.body).%s.match(/[0-9]+/g).map(Number).reduce((a, b) => a + b, 0)"
     ground = "toned('background_top')"
@@ -79,7 +80,7 @@ def test_the_page_is_dark_where_the_system_prefers_that(tmp_path: Path) -> None:
 
 
 @pytest.mark.kernels
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on PATH: pages cannot be looked at")
+@needs_chromium
 def test_arm_and_obstacles_cast_shadows_on_the_ground_alone(tmp_path: Path) -> None:
     drawn = "key.castShadow = %s; viewer.set_dirty(); new Promise((done) => setTimeout(done, 1500))"
     with planning_page(page(rrtik.load_problem("titan4_sdu")), tmp_path) as browser:

@@ -3,7 +3,6 @@
 import asyncio
 import base64
 import json
-import shutil
 import subprocess
 import threading
 import time
@@ -18,8 +17,8 @@ import tornado.websocket
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import open_session
 from rrtik_ompl.pilot.web.server import PilotServer
+from rrtik_tests.programs import CHROMIUM
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--remote-debugging-port=0")
 FLAT, DRAWING_3D = ("--disable-gpu",), ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 WIDTH, HEIGHT = 1280, 720

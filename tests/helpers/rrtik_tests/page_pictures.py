@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rrtik_tests.browser import CHROMIUM, DRAWING_3D, Browser
+from rrtik_tests.browser import DRAWING_3D, Browser
+from rrtik_tests.programs import CHROMIUM, NO_CHROMIUM
 
 READY = "document.documentElement.dataset.ready === 'yes'"
 DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
@@ -22,7 +23,7 @@ PANE = np.s_[50:700, 0:860]  # of a window of that size: where the 3-D picture i
 def _ready_page(url: str) -> Iterator[Browser]:
     """A page that has built itself, which takes a busy machine longer than any fixed time."""
     if CHROMIUM is None:
-        pytest.skip("no chromium on PATH: pages cannot be looked at")
+        pytest.skip(NO_CHROMIUM)
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
         closing(Browser(folder, DRAWING_3D)) as browser,
