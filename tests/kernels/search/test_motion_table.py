@@ -8,8 +8,9 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.kernels import FREE
-from rrtik_ompl.kernels.search.motions.motion_kernels import check_motion, configuration_free, resolves, step_count
+from rrtik_ompl.kernels import COLLIDING, FREE, UNDECIDED
+from rrtik_ompl.kernels.search.connect import ConnectSearch
+from rrtik_ompl.kernels.search.motions.motion_kernels import step_count
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, step_counts
 from rrtik_ompl.kernels.search.motions.row_kernels import row_at
 from rrtik_ompl.kernels.simd.compiled import entry
@@ -31,26 +32,28 @@ def write_steps(motions: int, dof: int, starts: int, ends: int, count: int, sink
     return count
 
 
-@entry
-def write_answers(motions: int, dof: int, starts: int, ends: int, count: int, sink: int) -> int:
-    for k in range(count):
-        answer = check_motion(motions, row_at(starts, dof, k), row_at(ends, dof, k), resolves(motions))
-        set_int(sink, k, answer)
-    return count
-
-
-@entry
-def write_free(motions: int, dof: int, rows: int, count: int, sink: int) -> int:
-    for k in range(count):
-        set_int(sink, k, 1 if configuration_free(motions, row_at(rows, dof, k)) else 0)
-    return count
-
-
 def steps_in_kernels(motions: FastMotions, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     found = np.zeros(len(starts), dtype=np.int32)
     places = starts.ctypes.data, ends.ctypes.data, len(starts), found.ctypes.data
     write_steps(motions.address, motions.dof, *places)
     return found
+
+
+def answers_in_kernels(motions: FastMotions, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """FREE, UNDECIDED or COLLIDING for motions between free ends: a search without samples joins, asks or gives up."""
+    low, high = (side.min(axis=0) for side in (np.minimum(starts, ends), -np.maximum(starts, ends)))
+    search, asked = ConnectSearch(motions, low, -high), []
+
+    def ask(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+        asked.append((A, B))
+        return np.zeros(len(A), dtype=bool)
+
+    answers = []
+    for start, end in zip(starts, ends, strict=True):
+        asked.clear()
+        path = search.solve(start[None], end[None], 1, ask=ask if motions.resolve else None, max_iterations=0)
+        answers.append(UNDECIDED if asked else COLLIDING if path is None else FREE)
+    return np.array(answers)
 
 
 def ball(x: float) -> Obstacle:
@@ -65,6 +68,13 @@ def motions_within(world: World, count: int, share: float, seed: int = 0) -> tup
     rng, (low, high) = np.random.default_rng(seed), world.robot.finite_range()
     starts = rng.uniform(low, high, (count, len(low)))
     return starts, starts + share * rng.uniform(0.0, 1.0, (count, 1)) * (rng.uniform(low, high, starts.shape) - starts)
+
+
+def between_free_ends(
+    world: World | MovingWorld, starts: np.ndarray, ends: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    free = world.valid_batch(starts) & world.valid_batch(ends)
+    return starts[free], ends[free]
 
 
 def test_python_and_kernels_divide_a_million_motions_alike() -> None:
@@ -101,17 +111,16 @@ def test_steps_by_length_are_taken_where_they_are_more() -> None:
 
 @pytest.mark.parametrize("accuracy", ["exact", "conservative"])
 def test_a_motion_is_checked_in_kernels_as_by_the_world(accuracy: str) -> None:
-    world = arm_world("titan4").with_accuracy(accuracy)
-    starts, ends = motions_within(world, 400, 0.3)
-    found = np.zeros(len(starts), dtype=np.int32)
+    wall = Obstacle("wall", Box([0.1, 1.0, 1.0]), pin.SE3(np.eye(3), np.array([1.2, 0.0, 0.5])))
+    world = World(load_robot("titan4"), Scene((wall,))).with_accuracy(accuracy)
+    starts, ends = between_free_ends(world, *motions_within(world, 800, 1.0))
     for a, b in ((starts, ends), (ends, starts)):
-        write_answers(world.motions.address, 6, a.ctypes.data, b.ctypes.data, len(a), found.ctypes.data)
         sides = world.robot.joint_values(a), world.robot.joint_values(b)
         steps = step_counts(a, b, world.weights, world.motion_resolution)
         forward = np.array([tuple(p) <= tuple(q) for p, q in zip(a, b, strict=True)])
         first, second = (np.where(forward[:, None], *pair) for pair in (sides, sides[::-1]))
-        answers = world.fast.classify_edges(first, second, steps)
-        np.testing.assert_array_equal(found, answers)
+        found = answers_in_kernels(world.motions, a, b)
+        np.testing.assert_array_equal(found, world.fast.classify_edges(first, second, steps))
     assert 0 < (found == FREE).sum() < len(found)
     assert world.motions.resolve
 
@@ -119,10 +128,9 @@ def test_a_motion_is_checked_in_kernels_as_by_the_world(accuracy: str) -> None:
 def test_a_configuration_is_proven_free_in_kernels_as_by_the_world() -> None:
     world = arm_world("titan4")
     rows, _ = motions_within(world, 500, 0.0)
-    found = np.zeros(len(rows), dtype=np.int32)
-    write_free(world.motions.address, 6, rows.ctypes.data, len(rows), found.ctypes.data)
+    search = ConnectSearch(world.motions, *world.robot.finite_range())
     answers = world.fast.classify(world.robot.joint_values(rows), resolve=False)
-    np.testing.assert_array_equal(found != 0, answers == FREE)
+    assert [search.proven_free(row[None]) for row in rows] == (answers == FREE).tolist()
 
 
 def test_a_world_keeps_its_motion_table_and_makes_another_for_other_rules() -> None:
@@ -138,18 +146,18 @@ def test_a_world_keeps_its_motion_table_and_makes_another_for_other_rules() -> N
 
 def test_the_motion_table_of_a_moving_world_stays_when_obstacles_move() -> None:
     world = MovingWorld(arm_world())
-    motions, (starts, ends) = world.motions, motions_within(arm_world(), 300, 0.2)
-    found = []
+    motions, drawn = world.motions, motions_within(arm_world(), 400, 0.2)
+    asked = []
     for x in (0.5, -0.4):
         world.move(Scene((ball(x),)))
         assert world.motions is motions
         assert not motions.resolve
-        answers = np.zeros(len(starts), dtype=np.int32)
-        write_answers(motions.address, 6, starts.ctypes.data, ends.ctypes.data, len(starts), answers.ctypes.data)
-        within = world.robot.within_limits(starts) & world.robot.within_limits(ends)
-        found.append(answers == FREE)
-        np.testing.assert_array_equal(found[-1] & within, world.motion_valid_batch(starts, ends))
-    assert (found[0] != found[1]).any()
+        starts, ends = between_free_ends(world, *drawn)
+        free = answers_in_kernels(motions, starts, ends) == FREE
+        np.testing.assert_array_equal(free, world.motion_valid_batch(starts, ends))
+        assert 0 < free.sum() < len(free)
+        asked.append(starts)
+    assert len(asked[0]) != len(asked[1])
 
 
 def test_a_world_in_which_nothing_is_free_has_no_motion_table() -> None:
