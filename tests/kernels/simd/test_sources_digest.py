@@ -78,19 +78,30 @@ def holds_nothing(module):
     return len(statements) == 1 and isinstance(statements[0], ast.Expr)
 
 
+IMPORTED = """
+import sys
+import numba  # once: it takes longer than all that is measured
+for name in sys.argv[1:]:
+    for module in [m for m in sys.modules if m.startswith("rrtik_ompl")]:
+        del sys.modules[module]
+    __import__(f"rrtik_ompl.kernels.{name}")
+    print(*[m for m in sys.modules if m.startswith("rrtik_ompl.")])
+"""
+
+
 def test_the_sources_of_a_kernel_are_all_that_it_imports():
-    for name in code_files.kernel_modules():
-        code = f"import sys, rrtik_ompl.kernels.{name}; print(*sys.modules)"
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        outside = {m for m in done.stdout.split() if m.startswith("rrtik_ompl.") and m.split(".")[1] != "kernels"}
+    names = code_files.kernel_modules()
+    done = subprocess.run([sys.executable, "-c", IMPORTED, *names], capture_output=True, text=True, check=True)
+    kept_apart = {"simd.code_files", "simd.targets"}  # where code is kept, and for what machine, stands in its key
+    for name, line in zip(names, done.stdout.splitlines(), strict=True):
+        imported = line.split()
+        outside = {m for m in imported if m.split(".")[1] != "kernels"}
         assert outside <= {
             *("rrtik_ompl.base", "rrtik_ompl.base.version"),  # of the package itself
             "rrtik_ompl.files",
             *(f"rrtik_ompl.files.{name}" for name in ("cache", "digest", "notice")),
         }, "the digest sees kernels/ alone"
-        loaded = {
-            m.removeprefix("rrtik_ompl.kernels.") for m in done.stdout.split() if m.startswith("rrtik_ompl.kernels.")
-        }
-        kept_apart = {"simd.code_files", "simd.targets"}  # where code is kept, and for what machine, stands in its key
+        prefix = "rrtik_ompl.kernels."
+        loaded = {m.removeprefix(prefix) for m in imported if m.startswith(prefix)}
         others = loaded - set(code_files.kernel_sources(name)) - kept_apart
         assert [module for module in others if not holds_nothing(module)] == []
