@@ -59,9 +59,9 @@ def short_sweeps(world, rng, count):
 def test_on_many_configurations_the_world_says_what_coal_says(name, dented_cube):
     robot = load_robot(name)
     rng, free = np.random.default_rng(11), []
-    for _ in range(how_many(6, 3)):
+    for _ in range(how_many(6, 2)):
         world = World(robot, surroundings(robot, rng, dented_cube))
-        Q = short_sweeps(world, rng, how_many(800, 300))
+        Q = short_sweeps(world, rng, how_many(800, 150))
         ours, coals = world.valid_batch(Q), free_by_coal(world, Q)
         for q in Q[ours != coals]:
             assert abs(world.clearance(q)) < CONTACT
@@ -115,7 +115,7 @@ def test_what_kernels_are_sure_of_is_true_and_they_leave_little_open(name, dente
 def test_the_certificate_says_the_same_in_whatever_order_rows_come(name, dented_cube):
     robot, rng = load_robot(name), np.random.default_rng(13)
     world = World(robot, surroundings(robot, rng, dented_cube))
-    Q = short_sweeps(world, rng, how_many(150, 25))  # neighbours stand for each other; strangers do not
+    Q = short_sweeps(world, rng, how_many(150, 12))  # neighbours stand for each other; strangers do not
     order = rng.permutation(len(Q))
     in_line = free_by_coal(world, Q)
     assert 0.05 < in_line.mean() < 0.995

@@ -39,13 +39,11 @@ def test_points_on_the_links_go_and_all_others_stay(name):
     kept = {tuple(point) for point in left.points.tolist()}
     given = PointCloud(seen, 0.005).points
     assert not any(tuple(point) in kept for point in given[: len(own)].tolist())
-    bodies = World(robot)
-    for k, point in enumerate(given[len(own) :].tolist()):
-        alone = rrtik.Obstacle("p", PointCloud([point], 0.005), place, margin=0.01)
-        world = bodies.with_scene(rrtik.Scene([alone]))
-        touching = any("p" in (c.first, c.second) for c in world.contacts(q))
-        if touching:  # a base that stands still keeps no margin, so that this is no more than one way
-            assert tuple(point) not in kept, k
+    points = {f"p{k}": point for k, point in enumerate(given[len(own) :].tolist())}
+    alone = [rrtik.Obstacle(p, PointCloud([point], 0.005), place, margin=0.01) for p, point in points.items()]
+    touching = {name for c in World(robot, rrtik.Scene(alone)).contacts(q) for name in (c.first, c.second)}
+    for name in touching & set(points):  # one way only: a base that stands still keeps no margin
+        assert tuple(points[name]) not in kept, name
     assert len(left.points) > 200
 
 

@@ -5,8 +5,9 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_tests.sizes import how_many
 
-TOUCHES, WITHIN = 4, 5e-6  # how many, and [m] of what is said
+TOUCHES, WITHIN = how_many(4, 2), 5e-6  # how many, and [m] of what is said
 
 
 def ring(radius=0.12, tube=0.03, parts=24):

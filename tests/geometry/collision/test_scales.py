@@ -71,7 +71,7 @@ def lowest(first, second):
 @pytest.mark.parametrize("scale", SCALES)
 def test_the_distance_of_capsules_is_that_of_their_axes_less_their_radii(scale, angle):
     rng = np.random.default_rng(2)
-    for _ in range(how_many(100, 6)):
+    for _ in range(how_many(100, 2)):
         turn = pin.exp3(rng.normal(size=3)) @ pin.exp3(np.array([angle, 0.0, 0.0]))
         pose = pin.SE3(turn, rng.normal(size=3) * 0.3 * scale)
         solids = rrtik.Capsule(0.1 * scale, scale), rrtik.Capsule(0.02 * scale, 0.4 * scale)

@@ -30,14 +30,19 @@ def test_the_cache_gives_back_what_was_made(folder, monkeypatch):
 
 def test_other_geometry_or_parameters_have_another_file(folder):
     for solid in (coal.Box(1, 2, 3), coal.Box(1, 2, 3.0000001), coal.Cylinder(1, 2), mesh_solid("torus")):
-        cached_outer_cover(solid)
+        cached_outer_cover(solid, protrusion=1.0)
         cached_outer_cover(solid, protrusion=0.5)
     assert len(list(folder.iterdir())) == 8
 
 
+def coarse_cover(name):
+    """A cover that takes little time to make."""
+    return cached_outer_cover(SOLIDS[name], protrusion=0.5)
+
+
 @pytest.mark.parametrize("damage", ["empty", "noise", "cut", "shape", "nan", "other", "pickle", "flipped", "folder"])
 def test_a_damaged_file_is_made_anew(folder, damage):
-    true = cached_outer_cover(SOLIDS["box"])
+    true = coarse_cover("box")
     (file,) = folder.iterdir()
     whole = file.read_bytes()
     key = file.stem
@@ -52,7 +57,7 @@ def test_a_damaged_file_is_made_anew(folder, damage):
     elif damage == "nan":
         np.savez(file, spheres=true * np.nan, key=key, check=cover_cache._check(true * np.nan))
     elif damage == "other":
-        cached_outer_cover(SOLIDS["cylinder"])
+        coarse_cover("cylinder")
         (other,) = set(folder.iterdir()) - {file}
         os.replace(other, file)
     elif damage == "pickle":
@@ -62,8 +67,8 @@ def test_a_damaged_file_is_made_anew(folder, damage):
     else:
         file.unlink()
         file.mkdir()
-    assert np.array_equal(cached_outer_cover(SOLIDS["box"]), true)
-    assert np.array_equal(cached_outer_cover(SOLIDS["box"]), true)
+    assert np.array_equal(coarse_cover("box"), true)
+    assert np.array_equal(coarse_cover("box"), true)
 
 
 def test_every_cut_of_a_file_is_survived(folder):

@@ -6,10 +6,11 @@ import pytest
 
 from rrtik_ompl.geometry.covers.spheres import inner_spheres, outer_cover, protrusion_bound
 from rrtik_tests.covered_solids import SOLIDS, TOLERANCE, gap_outside, mesh_solid, points_of
+from rrtik_tests.sizes import how_many
 
 
 @pytest.mark.parametrize("name", ["box", "capsule", "cylinder", "disc", "thin box"])
-@pytest.mark.parametrize("protrusion", [0.1, 0.03, 0.02])
+@pytest.mark.parametrize("protrusion", [0.1, how_many(0.02, 0.04)])
 def test_the_protrusion_that_is_asked_for_holds(name, protrusion):
     cover = outer_cover(SOLIDS[name], protrusion=protrusion)
     assert gap_outside(points_of(SOLIDS[name], np.random.default_rng(2)), cover) <= TOLERANCE
@@ -51,6 +52,6 @@ def test_small_parts_get_few_balls():
 
 @pytest.mark.slow
 def test_the_same_solid_gets_the_same_balls():
-    for solid in (SOLIDS["box"], SOLIDS["cylinder"], mesh_solid("torus"), mesh_solid("hole")):
+    for solid in (SOLIDS["cylinder"], mesh_solid("torus")):
         assert np.array_equal(outer_cover(solid), outer_cover(solid))
         assert np.array_equal(inner_spheres(solid), inner_spheres(solid))

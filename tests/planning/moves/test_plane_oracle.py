@@ -17,6 +17,7 @@ from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_planners import FewestMoves
+from rrtik_tests.sizes import how_many
 
 WINDING = 26  # a case of two joints with 8 moves
 
@@ -28,7 +29,7 @@ def test_the_exact_geometry_agrees_with_a_world(number: int) -> None:
     rows = rng.uniform(-3.1, 3.1, (1000, world.robot.dof))
     room = case.arm.room(rows)
     np.testing.assert_array_equal((room > 0.0)[abs(room) > 1e-6], world.valid_batch(rows)[abs(room) > 1e-6])
-    tails = rows[room > 0.0][:300]
+    tails = rows[room > 0.0][: how_many(300, 100)]
     heads, joints = tails.copy(), rng.integers(world.robot.dof, size=len(tails))
     heads[np.arange(len(tails)), joints] = rng.uniform(-3.1, 3.1, len(tails))
     exact = np.array([case.arm.free(np.array(ends)) for ends in zip(tails, heads, strict=True)])
@@ -54,9 +55,6 @@ def test_a_winding_route_has_as_few_moves_as_the_oracle_and_a_bound_close_to_the
     assert case.arm.free(found.path.waypoints)
     assert found.path.transitions == case.moves == 8
     assert found.statistics["lower_bound"] == 7
-    again = plan(case.problem, FewestMoves, seed=WINDING, seconds=60.0)
-    assert again.path is not None
-    np.testing.assert_array_equal(found.path.waypoints, again.path.waypoints)
     raw = plan(case.problem, "bicrdt", seed=2).path
     assert raw is not None
     short = shorten(raw, case.problem, method="fewest-moves")

@@ -15,6 +15,7 @@ from rrtik_ompl.planning.tip_motion.freedom import centred, levers_of, redundant
 from rrtik_ompl.planning.tip_motion.rails import arc_rail, screw_rail, straight_rail
 from rrtik_ompl.planning.tip_motion.reference_follow import follow_plainly
 from rrtik_ompl.planning.tip_motion.values import Leaning, Tolerance
+from rrtik_tests.sizes import how_many
 
 TOLERANCE = Tolerance(1e-4, np.radians(0.1))
 ROBOTS = ["titan4", "ur5", "panda", "kinova", "ur3_gripper", "so100", "planar3"]
@@ -32,7 +33,7 @@ def random_rails(robot, rng):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_kernel_and_reference_come_equally_far_by_the_same_configurations(name):
     robot, rng = rrtik.load_robot(name), np.random.default_rng(2)
-    for _ in range(3):
+    for _ in range(how_many(3, 1)):
         q, rails = random_rails(robot, rng)
         homing = Leaning(rng.uniform(*robot.finite_range()), np.full(robot.dof, float(redundant(robot))), homing=True)
         for rail in rails:
