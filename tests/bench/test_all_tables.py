@@ -1,13 +1,15 @@
-"""Every table at its smallest size, and every figure that is drawn from one."""
+"""Tables at their smallest size, and every figure that is drawn from one."""
 
 import pytest
 
 from rrtik_bench.registry import COLLECTION
 from rrtik_bench.report.rows import Verdict
+from rrtik_tests.sizes import how_many
 
 FIGURES = [figure for table in COLLECTION.tables for figure in table.figures]
 SHORT = 2.0  # [s]; tables that take less are run by test_reproduce.py
-LONG = [table for table in COLLECTION.tables if table.quick_seconds > SHORT]
+LONGEST = how_many(1_000_000, 10)  # [s]; of the tables that take more, functions and figures are tested
+LONG = [table for table in COLLECTION.tables if SHORT < table.quick_seconds <= LONGEST]
 
 
 @pytest.mark.slow
