@@ -30,7 +30,7 @@ def test_the_files_that_peers_read_hold_the_same_arm_among_the_same_obstacles(tm
 def test_a_problem_that_not_every_peer_can_read_is_refused(tmp_path):
     from bench.peers.description import NoTask, task_of
 
-    with pytest.raises(NoTask, match="titan4_bar: peers take one goal configuration"):
+    with pytest.raises(NoTask, match=r"titan4_bar: .*one goal"):
         task_of(load_problem("titan4_bar"), tmp_path, 1.0)
 
 

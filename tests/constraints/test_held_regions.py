@@ -174,41 +174,41 @@ def test_any_angle_may_be_the_free_one(ur5, free):
 def test_a_start_or_goal_outside_is_refused_by_name_and_amount(ur5):
     world, T = rrtik.World(ur5), ur5.fk(START)
     level = rrtik.on_plane(T.translation - [0.0, 0.0, 0.05], [0.0, 0.0, 1.0])
-    with pytest.raises(ProblemError, match=r"start breaks path constraint 1 \(frame 'tool0'\): 49 mm outside"):
+    with pytest.raises(ProblemError, match=r"start.*constraint 1.*tool0.*49 mm"):
         rrtik.Problem(world, START, START, constraints=[level])
     goal = START + 0.3 * np.eye(6)[3]
     amount = np.degrees(tilt(ur5, goal[None], T.rotation[:, 2])[0]) - 5.0
-    with pytest.raises(ProblemError, match=rf"goal breaks path constraint 2 .*: {amount:.3g} degrees outside"):
+    with pytest.raises(ProblemError, match=rf"goal.*constraint 2.*{amount:.3g} degrees"):
         rrtik.Problem(world, START, goal, constraints=[rrtik.inside(T, [9, 9, 9]), rrtik.upright(ur5)])
 
 
 def test_constraints_that_contradict_each_other_or_are_out_of_reach_are_named(ur5):
     world, T = rrtik.World(ur5), ur5.fk(START)
     low, high = (rrtik.on_plane(T.act(np.array([0.0, 0.0, z])), T.rotation[:, 2]) for z in (0.0, 0.3))
-    with pytest.raises(ProblemError, match=r"keeps both path constraint 2 and path constraint 3: .* missed by 29\d mm"):
+    with pytest.raises(ProblemError, match=r"constraint 2.*constraint 3.*29\d mm"):
         rrtik.Problem(world, START, START, constraints=[rrtik.upright(ur5), low, high])
     far = rrtik.on_plane([0.0, 0.0, 5.0], [0.0, 0.0, 1.0])
-    with pytest.raises(ProblemError, match="no configuration was found that keeps path constraint 1: is its region in"):
+    with pytest.raises(ProblemError, match=r"constraint 1.*region"):
         rrtik.Problem(world, START, START, constraints=[far])
 
 
 def test_what_makes_no_sense_is_refused_in_a_line(ur5):
     world, T = rrtik.World(ur5), ur5.fk(START)
-    with pytest.raises(InputError, match="path constraints must be a list, got TaskRegion"):
+    with pytest.raises(InputError, match=r"path constraints.*list.*TaskRegion"):
         rrtik.Problem(world, START, START, constraints=rrtik.upright(ur5))
     with pytest.raises(UnknownNameError, match="frame of path constraint 1"):
         rrtik.Problem(world, START, START, constraints=[rrtik.upright(ur5, frame="mug")])
-    with pytest.raises(InputError, match="path constraint 1 must be a TaskRegion, got str"):
+    with pytest.raises(InputError, match=r"constraint 1.*TaskRegion.*str"):
         rrtik.Problem(world, START, START, constraints=["upright"])
     with pytest.raises(InputError, match="pitch may reach 80"):
         rrtik.Problem(world, START, START, constraints=[rrtik.orientation_of(T, [10.0, 80.0, 10.0])])
-    with pytest.raises(InputError, match="frame, from_start and allowances are for path constraints"):
+    with pytest.raises(InputError, match=r"frame, from_start.*path constraints"):
         rrtik.Problem(world, START, rrtik.upright(ur5))
     with pytest.raises(InputError, match="axis must be x, y or z"):
         rrtik.upright(ur5, "w")
     with pytest.raises(InputError, match="normal must have length 1"):
         rrtik.on_plane([0, 0, 0], [0, 0, 2])
-    with pytest.raises(InputError, match="tolerance_deg must be 80 or less"):
+    with pytest.raises(InputError, match=r"tolerance_deg.*80"):
         rrtik.upright(ur5, tolerance_deg=90.0)
 
 
@@ -238,7 +238,7 @@ def test_an_angle_that_cannot_be_held_is_refused_in_a_line():
     robot = rrtik.load_robot("ur5")
     bounds = np.outer([1000.0] * 3 + [0.0] * 3, [-1.0, 1.0])
     wide = rrtik.TaskRegion(robot.fk(np.zeros(6)), bounds, orientation_tolerance=np.radians(120.0))
-    with pytest.raises(InputError, match="path constraint 1: orientation_tolerance is 120 degrees, and more than 90"):
+    with pytest.raises(InputError, match=r"constraint 1.*orientation_tolerance.*120.*90"):
         rrtik.Problem(rrtik.World(robot), np.zeros(6), np.full(6, 0.1), constraints=[wide])
 
 
@@ -274,15 +274,15 @@ def test_more_between_waypoints_is_a_matter_of_words(ur5):
     wide = rrtik.on_line(T.translation, [0, 1, 0], tolerance=1e-9, allowance=5e-4)
     assert wide.position_allowance == 5e-4
     assert rrtik.upright(ur5, allowance_deg=0.2).orientation_allowance == np.radians(0.2)
-    with pytest.raises(InputError, match="position_allowance must not be negative"):
+    with pytest.raises(InputError, match=r"position_allowance.*negative"):
         rrtik.on_plane([0, 0, 0], [0, 0, 1], allowance=-1e-3)
-    with pytest.raises(InputError, match="allowances are for path constraints"):
+    with pytest.raises(InputError, match=r"allowances.*constraints"):
         rrtik.Problem(rrtik.World(ur5), START, wide)
 
 
 def test_a_tolerance_too_small_for_any_motion_is_refused_with_the_least_that_can_be_kept(ur5):
     world, T = rrtik.World(ur5), ur5.fk(START)
-    with pytest.raises(InputError, match=r"path constraint 1: .* (\d\.\de-08) m is the least") as caught:
+    with pytest.raises(InputError, match=r"constraint 1.* (\d\.\de-08) m") as caught:
         rrtik.Problem(world, START, START, constraints=[rrtik.on_line(T.translation, [0, 1, 0], tolerance=1e-12)])
     least = float(str(caught.value).split(" m is the least")[0].split()[-1])
     rrtik.Problem(world, START, START, constraints=[rrtik.on_line(T.translation, [0, 1, 0], tolerance=1.1 * least)])

@@ -68,7 +68,7 @@ def test_a_relative_path_follows_the_current_folder(tmp_path, monkeypatch):
 
 
 def test_an_unknown_name_lists_the_alternatives():
-    with pytest.raises(UnknownNameError, match=r"no robot 'titan5'; have .*did you mean 'titan4'") as caught:
+    with pytest.raises(UnknownNameError, match=r"titan5.*'titan4'") as caught:
         load_robot("titan5")
     assert caught.value.alternatives == list_robots()
 
@@ -76,7 +76,7 @@ def test_an_unknown_name_lists_the_alternatives():
 def test_an_option_that_does_not_apply_names_those_that_do():
     with pytest.raises(
         InputError,
-        match=r"'titan4' takes no option 'group'; it takes base_pose, joint_ranges, joint_weights, lengths, limits",
+        match=r"titan4.*'group'.*base_pose.*limits",
     ):
         load_robot("titan4", group="arm")
 

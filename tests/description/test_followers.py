@@ -60,7 +60,7 @@ def test_a_follower_cuts_the_range_of_what_it_follows(gain, offset, limits, expe
 
 @pytest.mark.parametrize(("gain", "offset", "limits"), [(1, 3, (-1, 1)), (0, 2, (-1, 1)), (-1, 0, (2.5, 3))])
 def test_a_range_that_no_value_is_in_is_refused_with_both_names(gain, offset, limits):
-    with pytest.raises(InputError, match=r"no value of joint 'a' within -2 \.\. 2 keeps joint 'b'.*correct") as error:
+    with pytest.raises(InputError, match=r"'a'.*-2 \.\. 2.*'b'.*correct") as error:
         robot_from_urdf_text(pair(gain, offset, *limits), where="pair.urdf")
     assert str(error.value).startswith("pair.urdf: ")
 
@@ -255,7 +255,7 @@ def test_what_the_library_calls_the_same_posture_is_the_same_for_all_that_follow
 
 @pytest.mark.parametrize(("gain", "turns"), [(0.5, 2), (1.5, 2), (-0.25, 4), (0.333333, 3), (0.001, 100), (np.pi, 7)])
 def test_a_leader_whose_whole_turns_are_other_postures_gets_limits_and_a_warning(gain, turns):
-    with pytest.warns(DescriptionWarning, match=f"'geared': joint 'a' turns without end, but 'b'.*up to {turns} turn"):
+    with pytest.warns(DescriptionWarning, match=f"'geared': joint 'a'.*'b'.*{turns} turn"):
         robot = robot_from_urdf_text(geared(gain), tip="b_link")
     assert robot.upper[0] == -robot.lower[0] == turns * TAU
     assert not robot.continuous[0]
@@ -277,5 +277,5 @@ def test_a_slide_without_limits_is_refused_whatever_follows_it(tmp_path, gain):
         '<body name="v"><joint name="b" type="slide"/><geom size=".1"/></body></body></worldbody>'
         f'<equality><joint joint1="b" joint2="a" polycoef="0 {gain} 0 0 0"/></equality></mujoco>'
     )
-    with pytest.raises(InputError, match="prismatic joint 'a' needs finite limits"):
+    with pytest.raises(InputError, match=r"joint 'a'.*finite limits"):
         load_robot(file)

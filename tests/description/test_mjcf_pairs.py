@@ -154,7 +154,7 @@ def test_joints_of_what_stands_beside_the_robot_are_named_where_they_are_held(tm
     file = tmp_path / "arm.xml"
     file.write_text(ON_THE_WORLD.format(DOOR))
     first = next(name for name in load_robot(file).joint_names if name != "hinge")
-    with pytest.warns(DescriptionWarning, match="arm.xml: not read: joints beside the robot, held: 'hinge'"):
+    with pytest.warns(DescriptionWarning, match="arm.xml.*'hinge'"):
         load_robot(file, joints=[first])
     with pytest.raises(InputError, match="without strict"):
         load_robot(file, joints=[first], strict=True)

@@ -105,7 +105,7 @@ def test_meshes_may_be_named_as_xacro_finds_packages(folder):
     q = np.array(READY)
     assert load_robot(folder).fk(q).isApprox(load_robot("panda").fk(q, "panda_link8"), 1e-12)
     (folder / "config" / "panda.urdf").write_text(named.replace("find panda_description", "find panda_parts"))
-    with pytest.raises(InputError, match=r"packages=\[the folder that holds 'panda_parts'\]"):
+    with pytest.raises(InputError, match=r"packages=.*panda_parts"):
         load_robot(folder)
 
 
@@ -254,7 +254,7 @@ def xacro_file(tmp_path):
 
 def test_without_the_package_xacro_one_line_names_it(xacro_file, monkeypatch):
     monkeypatch.setitem(sys.modules, "xacro", None)
-    with pytest.raises(InputError, match=r"arm.urdf.xacro: holds macros, .*pip install xacro.*xacro arm.urdf.xacro > "):
+    with pytest.raises(InputError, match=r"arm.urdf.xacro.*pip install xacro.*xacro arm.urdf.xacro >"):
         load_robot(xacro_file)
 
 
@@ -286,7 +286,7 @@ def test_what_is_wrong_in_macros_is_one_line(xacro_file, old, new, said):
 
 
 def test_arguments_of_macros_are_for_macros():
-    with pytest.raises(InputError, match=r"xacro_args are for files named \.xacro"):
+    with pytest.raises(InputError, match=r"xacro_args.*\.xacro"):
         load_robot(data_folder() / "panda_description/urdf/panda.urdf", xacro_args={"a": 1})
 
 
@@ -388,7 +388,7 @@ def test_the_arm_is_the_group_with_a_solver_and_no_gripper_that_has_fewer_joints
     solver = "".join(f"{group}: {{kinematics_solver: kdl}}\n" for group in solved)
     (workspace / "config" / "kinematics.yaml").write_text(solver or "{}")
     if held == "arm" and solved != ("arm",):  # the file says that the arm is a gripper, and does not contradict itself
-        with pytest.raises(InputError, match=r"which group is the arm.*arm, gripper"):
+        with pytest.raises(InputError, match=r"group.*arm, gripper"):
             load_robot(workspace)
     else:
         assert load_robot(workspace).joint_names == ("j1", "j2")

@@ -149,7 +149,7 @@ def test_a_mesh_that_is_only_drawn_is_read_when_somebody_looks(tmp_path):
     (tmp_path / "arm.urdf").write_text(solid("<mesh filename='broken.obj'/>", "visual"))
     robot = robot_from_urdf(tmp_path / "arm.urdf")
     assert robot.fk(np.zeros(2)).translation[2] == 0.5  # planning does not need it
-    with pytest.raises(InputError, match=r"broken\.obj holds numbers that are not finite"):
+    with pytest.raises(InputError, match=r"broken\.obj.*finite"):
         robot.visual  # noqa: B018
 
 
@@ -393,7 +393,7 @@ FORKED = "".join(f"<link name='{name}'/>" for name in ("base", "upper", "hand", 
 
 def test_a_tip_that_is_guessed_among_several_is_said_once_with_the_remedy(recwarn):
     text = arm(FORK, links=FORKED)
-    with pytest.warns(TipWarning, match=r"robot 'arm': the tip is taken to be 'finger_r'; tip= .* such as finger_l"):
+    with pytest.warns(TipWarning, match=r"finger_r.*tip=.*finger_l"):
         assert robot_from_urdf_text(text).tip == "finger_r"
     recwarn.clear()
     robot_from_urdf_text(text, tip="finger_l")  # named

@@ -162,7 +162,7 @@ def test_a_refusal_names_file_line_expression_and_remedy(write):
 
 def test_an_error_in_an_included_file_names_that_file(write, tmp_path):
     write("\n<link name='${nope}'/>", name="part.xacro")
-    with pytest.raises(InputError, match=r"part\.xacro:3: xacro: name 'nope' is not defined"):
+    with pytest.raises(InputError, match=r"part\.xacro:3.*nope"):
         load_robot(write('<xacro:include filename="part.xacro"/>'))
 
 
@@ -186,7 +186,7 @@ def test_a_problem_is_opened_with_trust_by_whoever_opens_it_alone(write, tmp_pat
             load_problem(tmp_path / problem)
     assert load_problem(tmp_path / "p.yaml", trust_xacro=True).robot.upper[0] == 2.0
     for entry in ({"name": "planar", "trust_xacro": True}, {"urdf": "arm.xacro", "xacro_limits": {"seconds": 99}}):
-        with pytest.raises(InputError, match="is for whoever opens the file to give, not for the file"):
+        with pytest.raises(InputError, match="whoever opens the file"):
             robot_from_entry(entry)
 
 
@@ -199,9 +199,7 @@ def test_macros_read_their_package_and_packages_that_are_given(write, tmp_path):
     assert "hand" in robot_text(there, [tmp_path / "elsewhere"])
     (tmp_path / "robots" / "arm" / "package.xml").write_text("<package/>")
     far = write(f'<xacro:include filename="{__file__}"/>', name="robots/arm/urdf/arm.xacro")
-    with pytest.raises(
-        InputError, match=r"arm\.xacro:2: xacro: '.*test_xacro\.py' is outside the folders of the robot"
-    ):
+    with pytest.raises(InputError, match=r"arm\.xacro:2: xacro: '.*test_xacro\.py'.*outside the folders"):
         robot_text(far)
 
 
@@ -209,7 +207,7 @@ def test_hidden_files_and_links_to_other_places_are_not_read(write, tmp_path):
     write("", name="arm/.secret/a.xacro")
     (tmp_path / "arm" / "link.xacro").symlink_to(__file__)
     for name in (".secret/a.xacro", "link.xacro"):
-        with pytest.raises(InputError, match="is outside the folders of the robot"):
+        with pytest.raises(InputError, match="outside the folders"):
             robot_text(write(f'<xacro:include filename="{name}"/>', name="arm/arm.xacro"))
 
 
@@ -224,11 +222,11 @@ def test_installed_links_to_the_sources_of_a_package_are_read(write, tmp_path):
 
 def test_the_caller_gives_limits(write):
     file = write("", "${len([x for x in range(1000000) for y in range(1000)])}")
-    with pytest.raises(InputError, match=r"takes more than 0\.5 s; .*give xacro_limits="):
+    with pytest.raises(InputError, match=r"0\.5 s.*xacro_limits="):
         load_robot(file, xacro_limits={"seconds": 0.5})
-    with pytest.raises(InputError, match=r"xacro_limits: no key 'second'; .*did you mean 'seconds'"):
+    with pytest.raises(InputError, match=r"xacro_limits.*second.*'seconds'"):
         load_robot(file, xacro_limits={"second": 1})
-    with pytest.raises(InputError, match="xacro_limits: seconds: must be greater than 0"):
+    with pytest.raises(InputError, match=r"xacro_limits: seconds.*0"):
         load_robot(file, xacro_limits={"seconds": 0})
 
 

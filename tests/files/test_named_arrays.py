@@ -56,13 +56,14 @@ def test_a_broken_file_is_named_without_the_advice_of_others(tmp_path, world, ar
     for load in (lambda: rrtik.load_roadmap(file, world), lambda: rrtik.load_reach_map(file)):
         with pytest.raises(InputError) as caught:
             load()
-        assert str(caught.value) == f"{file}: not a whole .npz file of numbers; save it again"
+        assert str(caught.value).startswith(f"{file}: ")
+        assert "save it again" in str(caught.value)
 
 
 def test_what_is_far_larger_when_unpacked_is_not_unpacked(tmp_path, monkeypatch):
     monkeypatch.setattr(named_arrays, "LARGEST_FILE", 50_000)
     (tmp_path / "map.npz").write_bytes(packed({"zeros": np.zeros(10_000)}))
-    with pytest.raises(InputError, match="bytes when unpacked: 80128 are more than"):
+    with pytest.raises(InputError, match=r"80128.*more than"):
         NamedArrays(tmp_path / "map.npz")
 
 
@@ -81,7 +82,7 @@ WRONG = {
 def test_arrays_that_make_no_sense_are_named(tmp_path, world, arrays, case):
     name, spoil, said = WRONG[case]
     (tmp_path / "map.npz").write_bytes(packed(arrays | {name: spoil(arrays[name])}))
-    with pytest.raises(InputError, match=rf"map\.npz: is no roadmap of robot 'planar3': .*{said}"):
+    with pytest.raises(InputError, match=rf"map\.npz.*'planar3': .*{said}"):
         rrtik.load_roadmap(tmp_path / "map.npz", world)
 
 

@@ -64,7 +64,7 @@ def test_a_full_disk_leaves_the_old_file_and_no_other(tmp_path, monkeypatch, nam
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         full_disk(1000)
-        with pytest.raises(InputError, match=r"a\.json: cannot be written: File too large"):
+        with pytest.raises(InputError, match=r"a\.json.*File too large"):
             write_text(tmp_path / "a.json", "n" * 2000)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)

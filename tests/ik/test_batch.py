@@ -65,7 +65,7 @@ def test_something_that_is_no_pose_is_refused(changed, message):
 
 
 def test_a_goal_that_is_no_pose_is_refused_by_how_far_it_is_off():
-    with pytest.raises(InputError, match=r"no rotation: 0\.21 away from orthonormal"):
+    with pytest.raises(InputError, match=r"0\.21.*orthonormal"):
         rrtik.PoseGoal(np.diag([1.1, 1.1, 1.1, 1.0]))
     with pytest.raises(InputError, match="mirrors"):
         rrtik.PoseGoal(np.diag([1.0, 1.0, -1.0, 1.0]))

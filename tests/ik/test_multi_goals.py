@@ -62,9 +62,9 @@ def test_out_of_reach_names_the_tips(arms):
 
 
 def test_methods_for_one_tip_and_unknown_tips_are_refused(arms, goal):
-    with pytest.raises(InputError, match="'numeric' is for one tip; use projection"):
+    with pytest.raises(InputError, match=r"'numeric'.*use projection"):
         solve_ik(arms, goal, method="numeric")
-    with pytest.raises(UnknownNameError, match="no inverse kinematics method 'fast'"):
+    with pytest.raises(UnknownNameError, match="method 'fast'"):
         solve_ik(arms, goal, method="fast")
     with pytest.raises(UnknownNameError, match="left_grp"):
         solve_ik(arms, MultiGoal({"left_grp": PositionGoal([1.0, 0.0, 0.0])}))

@@ -1,5 +1,6 @@
 """One face of inverse kinematics."""
 
+import re
 import time
 
 import numpy as np
@@ -238,19 +239,19 @@ def test_the_same_seed_gives_the_same_solutions_and_another_seed_others(method):
 def test_bad_arguments_are_refused_in_one_line():
     titan, ur5 = rrtik.load_robot("titan4"), rrtik.load_robot("ur5")
     goal = pose_goal(titan, Q_TITAN)
-    with pytest.raises(UnknownNameError, match="no inverse kinematics method 'closed'; have auto, ccd, closed-form"):
+    with pytest.raises(UnknownNameError, match=r"'closed'.*auto, ccd, closed-form"):
         solve_ik(titan, goal, method="closed")
-    with pytest.raises(InputError, match=r"does not fit robot 'ur5' .* what fits: numeric"):
+    with pytest.raises(InputError, match=r"'ur5'.*numeric"):
         solve_ik(ur5, goal, method="closed-form")
-    with pytest.raises(InputError, match="needs a pose, and a position leaves a whole family"):
+    with pytest.raises(InputError, match=r"pose.*position"):
         solve_ik(titan, rrtik.PositionGoal([1, 0, 0]), method="closed-form")
     with pytest.raises(InputError, match="holds another robot"):
         solve_ik(titan, goal, world=rrtik.World(ur5))
-    with pytest.raises(InputError, match="near: robot 'titan4' has 6 joints"):
+    with pytest.raises(InputError, match=r"near.*6 joints"):
         solve_ik(titan, goal, near=[0.0])
     with pytest.raises(InputError, match="goal must be of type PoseGoal"):
         solve_ik(titan, rrtik.JointGoal(np.zeros(6)))
-    with pytest.raises(InputError, match=r"got NoneType; .* such as PoseGoal\(T_world_tip\)"):
+    with pytest.raises(InputError, match=r"NoneType.*PoseGoal\(T_world_tip\)"):
         solve_ik(titan, None)
 
 
@@ -268,19 +269,19 @@ def test_arguments_that_all_calls_have_are_refused_in_one_line(call):
     robot, twin = rrtik.load_robot("ur5"), rrtik.load_robot("ur10")  # as many joints, other lengths
     assert robot.dof == twin.dof
     for seed in (-1, 1.5, "a", None, True):
-        with pytest.raises(InputError, match=f"seed must be a whole number of at least 0, got {seed!r}"):
+        with pytest.raises(InputError, match=f"seed.*, got {seed!r}"):
             call(robot, seed=seed)
-    with pytest.raises(InputError, match="world: it holds another robot, 'ur10'"):
+    with pytest.raises(InputError, match=r"world.*'ur10'"):
         call(robot, world=rrtik.World(twin))
     for world, kind in ((rrtik.Scene(), "Scene"), ("empty", "str")):
-        with pytest.raises(InputError, match=f"world must be of type World, got {kind}; make it with World"):
+        with pytest.raises(InputError, match=f"world.*, got {kind}; make it with World"):
             call(robot, world=world)
-    with pytest.raises(InputError, match=r"robot must be of type Robot, got str; use load_robot\(name or file\)"):
+    with pytest.raises(InputError, match=r"robot.*str.*load_robot"):
         call("ur5")
     if call is not CALLS["map"]:
-        with pytest.raises(InputError, match="seconds must not be negative, got -1"):
+        with pytest.raises(InputError, match=r"seconds.*-1"):
             call(robot, seconds=-1)
-        with pytest.raises(InputError, match="seconds: must be a finite number, got inf"):
+        with pytest.raises(InputError, match=r"seconds.*finite.*inf"):
             call(robot, seconds=np.inf)
 
 
@@ -288,16 +289,14 @@ def test_the_joint_that_forbids_a_pose_is_of_the_branch_that_breaks_the_limits_l
     titan = rrtik.load_robot("titan4")
     q = np.radians([30.0, 80.0, -130.0, -20.0, 40.0, 124.0])
     result = solve_ik(titan, pose_goal(titan, q), method="closed-form")
-    assert result.detail == (
-        "the arm could reach the goal, but joint 'wrist_rotate' is at 124 deg, outside its limits -120 .. 120 deg"
-    )
+    assert re.search(r"'wrist_rotate'.*124 deg.*-120 \.\. 120 deg", result.detail)
 
 
 def test_with_a_tip_that_the_last_joint_does_not_carry_auto_is_numeric():
     robot = rrtik.load_robot("titan4", tip="wrist")
     goal = rrtik.PoseGoal(robot.fk(Q_TITAN))
     assert solve_ik(robot, goal).method == "numeric"
-    with pytest.raises(InputError, match="the tip 'wrist' does not move with that frame"):
+    with pytest.raises(InputError, match="tip 'wrist'"):
         solve_ik(robot, goal, method="closed-form")
 
 

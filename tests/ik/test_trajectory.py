@@ -172,7 +172,7 @@ def test_bad_input_is_refused_in_a_line():
     with pytest.raises(InputError, match="orthonormal"):
         rrtik.solve_ik_trajectory(robot, 2.0 * poses)
     for method in ("closed-form", "genetic"):
-        with pytest.raises(InputError, match=r"knows no free axis; .* what fits: numeric"):
+        with pytest.raises(InputError, match=r"free axis.*numeric"):
             rrtik.solve_ik_trajectory(rrtik.load_robot("titan4"), poses, method=method, free_rotation_axis="z")
     with pytest.raises(InputError, match="points leave every turn free"):
         rrtik.solve_ik_trajectory(robot, poses[:, :3, 3], free_rotation_axis="z")

@@ -91,7 +91,7 @@ def test_the_table_names_all_that_takes_a_motion_and_a_robot():
 @pytest.mark.parametrize("taker", TAKERS)
 @pytest.mark.parametrize("names", [NAMES[::-1], ("first", "second", "other")])
 def test_other_names_of_joints_are_refused_in_one_line(taker, names, tmp_path):
-    with pytest.raises(InputError, match=f"moves {', '.join(names)}, but robot 'arm' has the joints first") as error:
+    with pytest.raises(InputError, match=f"moves {', '.join(names)}, .*'arm'.*first") as error:
         TAKERS[taker](names, problem(), tmp_path / "motion.json")
     assert "\n" not in str(error.value)
 

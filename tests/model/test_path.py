@@ -101,7 +101,7 @@ def test_a_path_knows_which_joints_turn_without_limits_from_its_robot_and_from_i
         np.testing.assert_array_equal(same.continuous, robot.continuous)
         assert same.moves()[0].continuous == robot.continuous[0]
     (tmp_path / "odd.json").write_text('{"waypoints": [[0]], "joint_names": ["a"], "continuous": 3}')
-    with pytest.raises(InputError, match="continuous: expected a list of names of joints"):
+    with pytest.raises(InputError, match=r"continuous.*names of joints"):
         load_path(tmp_path / "odd.json")
 
 

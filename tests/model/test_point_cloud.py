@@ -59,7 +59,7 @@ def test_cropping_keeps_what_is_inside():
     part = cloud.cropped([-0.5, -0.5, -0.5], [0.5, 0.5, 0.5])
     assert rows(part.points) == rows(cloud.points[(np.abs(cloud.points) <= 0.5).all(axis=1)])
     assert part.radius == cloud.radius
-    with pytest.raises(InputError, match="none of the 1000 points is left"):
+    with pytest.raises(InputError, match="none of the 1000"):
         cloud.cropped([5.0, 5.0, 5.0], [6.0, 6.0, 6.0])
 
 
@@ -94,7 +94,7 @@ def test_points_that_are_not_finite_can_be_dropped_and_are_counted():
 
 
 def test_millimetres_are_noticed():
-    with pytest.warns(CloudWarning, match=r"2000 x .* m wide; if that is millimetres, scale it by 0.001"):
+    with pytest.warns(CloudWarning, match=r"2000 x.*0.001"):
         PointCloud(1000.0 * np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]), 0.01)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -128,7 +128,7 @@ def test_options_are_set_by_texts_and_refused_as_by_the_constructor() -> None:
 
 def test_notes_are_taken_of_a_benchmark_of_ompl_only() -> None:
     for wrong in ("log.txt", None, [[1, 2]]):
-        with pytest.raises(InputError, match=r"benchmark: expected an ompl\.tools\.Benchmark"):
+        with pytest.raises(InputError, match=r"benchmark.*ompl\.tools\.Benchmark"):
             rrtik.BenchmarkNotes(wrong)
 
 

@@ -91,10 +91,10 @@ def test_wrong_arguments_get_one_line(problem):
         rrtik.space_information("titan4")
     with pytest.raises(InputError, match="expected a Problem, got World"):
         rrtik.simple_setup(problem.world)
-    with pytest.raises(InputError, match="path constraints has no space with SO"):
+    with pytest.raises(InputError, match=r"path constraints.*SO"):
         rrtik.simple_setup(rrtik.load_problem("ur5_upright"), so2=True)
     si = ob.SpaceInformation(ob.RealVectorStateSpace(3))
-    with pytest.raises(InputError, match="3 coordinates, the robot 6 joints"):
+    with pytest.raises(InputError, match=r"3 coordinates.*6 joints"):
         rrtik.objectives.tip_travel(si, problem.world.robot)
     with pytest.raises(InputError, match="weight"):
         rrtik.objectives.clearance(rrtik.space_information(problem), problem.world, weight=0.0)

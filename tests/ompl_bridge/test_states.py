@@ -72,5 +72,5 @@ def test_other_spaces_are_refused_by_name() -> None:
 
 
 def test_something_that_is_no_space_information_is_refused() -> None:
-    with pytest.raises(InputError, match=r"SpaceInformation, got RealVectorStateSpace"):
+    with pytest.raises(InputError, match=r"SpaceInformation.*RealVectorStateSpace"):
         StateIO(ob.RealVectorStateSpace(2))

@@ -62,7 +62,7 @@ class Straight(SafePlanner):
 
 
 def test_check_planner_names_the_broken_clause() -> None:
-    with pytest.raises(PlannerError, match="an edge of the path is not free"):
+    with pytest.raises(PlannerError, match=r"edge.*not free"):
         check_planner(Straight)
 
 

@@ -69,5 +69,5 @@ def test_what_cannot_be_reached_is_a_timeout() -> None:
 
 @pytest.mark.parametrize("patience", [-1, 1.5, True])
 def test_a_patience_that_is_no_count_is_refused(patience: Any) -> None:
-    with pytest.raises(InputError, match=f"patience must be a whole number of at least 0, got {patience}"):
+    with pytest.raises(InputError, match=f"patience.*, got {patience}"):
         RestartShorten(small_problem().getSpaceInformation(), patience=patience)

@@ -106,7 +106,7 @@ def test_what_is_out_of_reach_and_what_is_no_goal_is_said_in_a_line(pair):
     plan = rrtik.plan(rrtik.Problem(world, "ready", far), seed=1, seconds=1.0)
     assert not plan.found
     assert "'right_grip_point'" in plan.reason
-    with pytest.raises(UnknownNameError, match="no tip of robot 'two_titan4' 'hand'"):
+    with pytest.raises(UnknownNameError, match=r"'two_titan4'.*'hand'"):
         rrtik.Problem(world, "ready", rrtik.MultiGoal({"hand": rrtik.PositionGoal([1.0, 0.0, 0.0])}))
     for wrong in (None, {}, [1], {"tip": None}, {3: rrtik.PositionGoal([1.0, 0.0, 0.0])}, {"tip": far}):
         with pytest.raises(InputError) as caught:

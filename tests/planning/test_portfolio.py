@@ -114,7 +114,7 @@ def test_what_a_planner_took_until_it_broke_counts(boxes, monkeypatch):
 
 
 def test_the_portfolio_takes_no_options(boxes):
-    with pytest.raises(InputError, match="'auto' takes no options, got range; name the planner"):
+    with pytest.raises(InputError, match=r"'auto'.*range.*planner"):
         plan(boxes, "auto", parameters={"range": 0.3})
 
 
@@ -150,7 +150,7 @@ def test_a_planner_that_there_is_not_is_named_with_its_line(boxes, tmp_path):
     text = file.read_text()
     line = 1 + text[: text.index("planner:")].count("\n")
     file.write_text(text.replace("planner: bicrdt", "planner: bicrtd"))
-    with pytest.raises(InputError, match=rf"typo.yaml:{line}: planner: no planner 'bicrtd'; .* did you mean 'bicrdt'"):
+    with pytest.raises(InputError, match=rf"typo.yaml:{line}: planner.*bicrtd.*'bicrdt'"):
         load_problem(file)
     with pytest.raises(UnknownNameError, match="no planner 'bicrtd'"):
         plan(Problem(boxes.world, boxes.start, boxes.goal, planner="bicrtd"))

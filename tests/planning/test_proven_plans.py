@@ -113,9 +113,7 @@ def test_a_clearance_that_makes_no_sense_is_refused(clearance):
 
 def test_a_clearance_that_the_start_cannot_keep_is_refused_with_what_is_possible():
     problem = rrtik.load_problem("titan4_sdu")
-    with pytest.raises(
-        InputError, match=r"clearance: (start|goal) cannot keep 900 mm: '.*' and '.*'; at most"
-    ) as caught:
+    with pytest.raises(InputError, match=r"clearance: (start|goal).*900 mm.*at most") as caught:
         plan(problem, clearance=0.9)
     most = float(str(caught.value).rsplit("at most ", 1)[1].split()[0])  # [mm]
     what = str(caught.value).split()[1]

@@ -151,9 +151,8 @@ def test_a_robot_of_the_caller_that_moves_other_joints_than_the_group_is_told(wr
     folder = written({}, {"group_name": "side"}, srdf=True)
     file, srdf = folder / "gantry.urdf", folder / "gantry.srdf"
     [line] = said(folder, rrtik.load_robot(file, srdf=srdf, group="arm"))
-    assert line == line_of(folder, "request0001.yaml", "group_name") + (
-        "group_name: group 'side' moves x, y, and the robot that was given x, y, z"
-    )
+    assert line.startswith(line_of(folder, "request0001.yaml", "group_name") + "group_name: ")
+    assert re.search("'side' .*x, y, .*x, y, z$", line)
     written({}, {"group_name": "amr"}, srdf=True)
     [line] = said(folder, rrtik.load_robot(file, srdf=srdf, group="arm"))
     assert "group_name: " in line

@@ -160,13 +160,13 @@ WALL = "scene: {obstacles: [{name: wall, box: [0.2, 0.2, 1], pose: {xyz: [X, Y, 
 
 
 def test_a_start_in_collision_names_file_line_and_pair(tmp_path):
-    with pytest.raises(ProblemError, match=r"task\.yaml:3: start is in collision: .*wall") as caught:
+    with pytest.raises(ProblemError, match=r"task\.yaml:3: start.*collision.*wall") as caught:
         load(tmp_path, text(rest=WALL.replace("X", "2.5").replace("Y", "0")))
     assert any("wall" in pair for pair in caught.value.contacts)
 
 
 def test_a_goal_in_collision_names_its_line(tmp_path):
-    with pytest.raises(ProblemError, match=r"task\.yaml:4: goal is in collision: .*wall"):
+    with pytest.raises(ProblemError, match=r"task\.yaml:4: goal.*collision.*wall"):
         load(tmp_path, text(rest=WALL.replace("X", "0").replace("Y", "2.5")))
 
 
@@ -249,7 +249,7 @@ def test_further_errors_are_counted(tmp_path):
 
 
 def test_an_unknown_name_lists_the_shipped_problems():
-    with pytest.raises(UnknownNameError, match=r"no problem 'titan4_sdv'; have .*did you mean 'titan4_sdu'"):
+    with pytest.raises(UnknownNameError, match=r"titan4_sdv.*'titan4_sdu'"):
         load_problem("titan4_sdv")
 
 

@@ -143,7 +143,7 @@ def test_what_comes_to_rest_out_of_sight_may_begin_to_move():
 
     run = replan(ball(), seen(), **OPTIONS, **KEPT)
     judged(run, ball(), truth)
-    assert any(tick.reason == "what was seen is too old to go on" for tick in run.ticks)
+    assert any(tick.reason is not None and "too old" in tick.reason for tick in run.ticks)
 
 
 def test_a_move_beside_what_has_never_moved_is_proven_only_with_room_for_a_first_move():
@@ -225,7 +225,7 @@ def test_what_is_held_otherwise_than_before_is_refused():
         return Scene((far,), (AttachedObject("tool", robot.tip, Sphere(0.05), place),))
 
     problem = Problem(World(robot, scene(0.0)), [0.0, 0.3], [1.0, 0.3])
-    with pytest.raises(InputError, match="'tool' is held otherwise than before"):
+    with pytest.raises(InputError, match="'tool' is held"):
         replan(problem, lambda time: scene(0.0 if time < 0.2 else 0.3), step=0.02, rate=20.0)
 
 
@@ -237,7 +237,7 @@ def test_a_half_space_that_turns_is_refused_before_the_start(tmp_path):
     ground = HalfSpace([0.0, 1.0, 0.0], -0.9)
     tilting = Obstacle("ground", ground, motion=TimedPoses([1.0, 2.0], [tilted(0.0), tilted(0.3)]))
     problem = Problem(World(ball().robot, Scene([tilting])), [-0.6, 0.0], [0.6, 0.0])
-    with pytest.raises(InputError, match="'ground' has no end and turns: no bound on its way") as caught:
+    with pytest.raises(InputError, match=r"'ground'.*turns") as caught:
         replan(problem, **OPTIONS, **KEPT, record=tmp_path / "run.json")
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []

@@ -50,7 +50,7 @@ def test_an_unknown_planner_is_answered_with_those_there_are():
 
 def test_times_that_go_backwards_are_refused():
     scene = crossing().world.scene
-    with pytest.raises(InputError, match=r"times go backwards: 0.3 s comes after 0.5 s"):
+    with pytest.raises(InputError, match=r"backwards.*0.3 s.*0.5 s"):
         replan(crossing(), [(0.0, scene), (0.5, scene), (0.3, scene)], **OPTIONS)
 
 
@@ -111,7 +111,7 @@ def test_an_obstacle_that_begins_inside_the_robot_is_refused_with_its_name():
 
 
 def test_a_start_within_the_margin_says_what_to_lower():
-    with pytest.raises(InputError, match="nearer to contact than the margin"):
+    with pytest.raises(InputError, match=r"contact.*margin"):
         replan(plane(box("near", 1.0, 12.2)), margin=0.5, **OPTIONS)
 
 
@@ -144,7 +144,7 @@ def test_a_feed_whose_scenes_forget_what_the_arm_holds_is_refused(seen):
     def feed(time):
         return Scene((far,), () if time >= seen else (held,))
 
-    with pytest.raises(InputError, match="the arm held tool, and now nothing; give scenes with"):
+    with pytest.raises(InputError, match=r"held tool.*nothing"):
         replan(problem, feed, step=0.02, rate=20.0)
 
 
@@ -152,7 +152,7 @@ def test_path_constraints_are_refused_for_they_would_not_be_kept():
     robot = load_robot("planar", lengths=[1.0, 1.0])
     bounds = [[-9, 9]] * 3 + [[-7, 7]] * 3
     held = Problem(World(robot), [0.0, 0.3], [1.0, 0.3], constraints=[TaskRegion(np.eye(4), bounds)])
-    with pytest.raises(InputError, match="replan: path constraints are not kept there"):
+    with pytest.raises(InputError, match="replan: path constraints"):
         replan(held, step=0.02, rate=20.0)
-    with pytest.raises(InputError, match="plan in time: path constraints are not kept there"):
+    with pytest.raises(InputError, match="plan in time: path constraints"):
         plan_in_time(held)

@@ -35,7 +35,7 @@ def hanging(answer, last, never):
 
 def test_a_feed_that_hangs_ends_the_run_and_the_record_has_what_was_before(problem, never, tmp_path):
     feed = hanging(problem.world.scene, 0.2, never)
-    with pytest.raises(InputError, match=r"scene feed: no answer for 0\.25 s within 0\.5 s.*feed_patience"):
+    with pytest.raises(InputError, match=r"scene feed.*0\.25 s.*0\.5 s.*feed_patience"):
         rrtik.replan(problem, feed, **SETTINGS, record=tmp_path / "run.json", feed_patience=0.5)
     run = rrtik.load_run(tmp_path / "run.json")
     assert (len(run.ticks), run.outcome) == (5, "interrupted")
@@ -46,12 +46,12 @@ def test_pairs_that_stop_coming_end_the_run(problem, never):
         yield 0.0, problem.world.scene
         never.wait()
 
-    with pytest.raises(InputError, match=r"scene feed: no answer for 0 s within 0\.5 s"):
+    with pytest.raises(InputError, match=r"scene feed.*0 s.*0\.5 s"):
         rrtik.replan(problem, pairs(), **SETTINGS, feed_patience=0.5)
 
 
 def test_a_goal_that_stops_coming_ends_the_run(problem, never):
-    with pytest.raises(InputError, match=r"goal feed: no answer for 0\.1 s"):
+    with pytest.raises(InputError, match=r"goal feed.*0\.1 s"):
         rrtik.replan(problem, goal_feed=hanging(problem.goal.q, 0.05, never), **SETTINGS, feed_patience=0.5)
 
 

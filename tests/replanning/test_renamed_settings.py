@@ -40,9 +40,7 @@ def test_an_old_key_of_a_file_is_answered_with_file_line_and_the_new_one(old, ne
     file = tmp_path / "old.yaml"
     file.write_text(TEXT % f"{old}: 1")
     for load in (load_problem, load_scenario):
-        with pytest.raises(
-            InputError, match=rf"old.yaml:5: run.{old}: '{old}' is now called '{new}'; rename the key"
-        ) as caught:
+        with pytest.raises(InputError, match=rf"old.yaml:5: run.{old}: .*'{new}'") as caught:
             load(file)
         assert "\n" not in str(caught.value)
 

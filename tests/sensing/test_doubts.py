@@ -136,5 +136,5 @@ def test_a_map_states_the_uncertainty_of_a_side(tmp_path):
     file.write_text(text + "  markers:\n  - {id: 1, side: 0.08, side_sigma: 0.0004}\n")
     assert load_marker_map(file).objects[0].markers[0].side_sigma == 0.0004
     file.write_text(text + "  markers:\n  - {id: 1, side: 0.08, side_sigma: 0.1}\n")
-    with pytest.raises(InputError, match="side_sigma must be 0 or more and below side"):
+    with pytest.raises(InputError, match=r"side_sigma.*below side"):
         load_marker_map(file)

@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import json
 import pickle
+import re
 import time
 
 import coal
@@ -129,9 +130,7 @@ def test_what_no_choice_can_set_down_is_refused_at_once(panda, deeper):
     begun = time.monotonic()
     plan = planned(panda, scene(), [*taken(), Straight(by=UP), *put(deeper)], seconds=20.0)
     assert time.monotonic() - begun < 5.0
-    assert plan.reason == (
-        f"stage 8 (Detach 'cup') failed: 'cup' would be left {1e3 * deeper:.3g} mm inside 'table'; 1 mm at most"
-    )
+    assert re.match(rf"stage 8 \(Detach 'cup'\).* {1e3 * deeper:.3g} mm .*'table'.* 1 mm", plan.reason)
 
 
 def test_the_look_ahead_lets_go_of_what_it_does_not_know(panda):
@@ -628,7 +627,7 @@ def test_a_contact_may_not_be_so_deep_that_two_could_pass_through_each_other(pan
     card = rrtik.Obstacle("card", rrtik.Box([0.06, 0.4, 0.0003]), [0.5, 0.35, 0.30015])
     for depth in (0.001, 0.00021):
         around = rrtik.Scene([SHEET, card], contacts=[rrtik.Touching("card", "sheet", -depth)])
-        with pytest.raises(rrtik.InputError, match=r"too thin for more than 0\.2 mm"):
+        with pytest.raises(rrtik.InputError, match=r"too thin.*0\.2 mm"):
             rrtik.World(panda, around)
     rrtik.World(panda, rrtik.Scene([SHEET, card], contacts=[rrtik.Touching("card", "sheet", -0.0002)]))
 

@@ -106,10 +106,10 @@ def test_what_is_no_constraint_is_refused(value):
 def test_a_frame_that_is_not_there_or_not_held_is_refused_before_the_search(serving):
     robot = serving.world.robot
     cup, mug = (rrtik.upright(robot, frame=name) for name in ("cup", "mug"))
-    with pytest.raises(InputError, match=r"stage 1 \(MoveTo\): no frame of a constraint 'mug'"):
+    with pytest.raises(InputError, match=r"stage 1 \(MoveTo\).*'mug'"):
         Task([MoveTo("ready", [mug])]).plan(serving.world, serving.start)
     taken = Attach("cup", "panda_hand")
-    with pytest.raises(InputError, match=r"stage 2 \(MoveTo\): the constraint's frame 'cup' is not held here"):
+    with pytest.raises(InputError, match=r"stage 2 \(MoveTo\).*'cup'"):
         Task([Alternatives([[taken], [Straight(by=[0, 0, 0.1])]]), MoveTo("ready", [cup])]).plan(
             serving.world, serving.start
         )

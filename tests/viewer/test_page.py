@@ -79,7 +79,7 @@ def test_a_page_is_made_without_an_import_of_meshcat_or_of_what_it_brings() -> N
 
 @pytest.mark.parametrize("shown", [None, 3, "titan4", SimpleNamespace(world=None)])
 def test_what_cannot_be_shown_is_refused(shown: Any) -> None:
-    with pytest.raises(InputError, match="give a problem, world, robot or scene"):
+    with pytest.raises(InputError, match="problem, world, robot or scene"):
         page(shown)
 
 

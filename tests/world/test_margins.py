@@ -111,7 +111,7 @@ def test_what_is_too_near_is_named_with_its_distance_and_the_margin():
     assert world.explain([3.3, 5.0]).endswith("are 200 mm apart, within the margin of 300 mm")
     assert "overlap by 200 mm" in world.explain([3.7, 5.0])
     assert world.explain([3.1, 5.0]) == ""
-    with pytest.raises(ProblemError, match=r"start is too near: .*within the margin of 300 mm; .*lower the margin"):
+    with pytest.raises(ProblemError, match=r"start is too near.*300 mm.*lower the margin"):
         Problem(world, [3.3, 5.0], [9.0, 5.0])
 
 
@@ -223,9 +223,7 @@ def test_a_base_that_stands_within_a_margin_is_free_by_every_check_and_proof(nam
 def test_a_base_that_touches_is_said_to_be_nothing_that_a_posture_can_mend(name):
     world, q = on_a_table(name, 0.01)
     assert not world.valid(q)
-    with pytest.raises(
-        ProblemError, match=r"'table' overlap by .* mm; no joint moves either; move the obstacle or the"
-    ):
+    with pytest.raises(ProblemError, match=r"'table'.*mm.*move the obstacle"):
         Problem(world, q, q)
 
 

@@ -59,7 +59,7 @@ def test_a_box_that_stands_on_a_table_is_said_to_touch_with_the_remedy(gap):
     box = AttachedObject("box", "panda_hand", Box([0.05, 0.05, 0.05]), [0.0, 0.0, 0.2])
     T = robot.fk(robot.posture("default"), "panda_hand").act(box.pose)
     table = Obstacle("table", Box([0.2, 0.2, 0.02]), T * pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.035 + gap])))
-    with pytest.raises(ProblemError, match=r"'table' touch; move it or allow the pair|'box' touch; move it or allow"):
+    with pytest.raises(ProblemError, match=r"'(table|box)' touch.*move it"):
         Problem(World(robot, Scene([table], [box])), "default", "default")
 
 
@@ -71,7 +71,7 @@ def test_a_goal_in_collision_is_refused_with_the_pair(world):
 def test_a_value_outside_its_limit_is_named_in_degrees(world):
     bad = FREE.copy()
     bad[1] = np.deg2rad(90)
-    with pytest.raises(ProblemError, match=r"goal: joint '.*' is at 90 deg, outside its limits -34.19 .. 85.81 deg"):
+    with pytest.raises(ProblemError, match=r"goal: joint.*90 deg.*-34.19 .. 85.81 deg"):
         Problem(world, FREE, bad)
 
 
@@ -168,7 +168,7 @@ def test_a_goal_pose_that_is_no_rigid_pose_is_refused(matrix):
 
 
 def test_a_region_takes_no_goal_in_joint_values():
-    with pytest.raises(InputError, match="of the tip; of configurations plan to each"):
+    with pytest.raises(InputError, match="plan to each"):
         GoalSet([JointGoal([0.0, 0.0])])
 
 
@@ -176,7 +176,7 @@ def test_start_and_goal_may_be_named_postures(titan):
     problem = Problem(World(titan), "stowed", "ready")
     assert np.array_equal(problem.start, titan.posture("stowed"))
     assert np.array_equal(problem.goal.q, titan.posture("ready"))
-    with pytest.raises(UnknownNameError, match="no posture of robot 'titan4' 'redy'"):
+    with pytest.raises(UnknownNameError, match=r"'titan4'.*'redy'"):
         Problem(World(titan), "stowed", "redy")
 
 

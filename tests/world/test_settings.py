@@ -49,7 +49,8 @@ def test_what_is_nearer_than_the_clearance_is_named_so(world):
     assert wide.contacts(Q) == ()
     with pytest.raises(ProblemError) as error:
         rrtik.Problem(wide, Q, [1.0, 0.0, 0.0])
-    assert str(error.value) == f"start is too near: {line}; move it, lower the clearance or allow the pair"
+    assert str(error.value).startswith(f"start is too near: {line}; ")
+    assert "lower the clearance" in str(error.value)
     assert error.value.contacts == (("link3", "ball"),)
 
 

@@ -122,7 +122,7 @@ def test_a_query_that_cannot_be_asked_is_a_plan_without_a_path():
 
 
 def test_starts_and_goals_that_do_not_fit_are_refused(world):
-    with pytest.raises(InputError, match=r"as many starts as goals are needed, got 2 and 3"):
+    with pytest.raises(InputError, match=r"starts.*goals.*2 and 3"):
         rrtik.plan_many(world, np.zeros((2, 6)), np.zeros((3, 6)))
     with pytest.raises(InputError, match="threads must be"):
         rrtik.plan_many(world, np.zeros((2, 6)), np.zeros((2, 6)), threads=0)
@@ -130,7 +130,7 @@ def test_starts_and_goals_that_do_not_fit_are_refused(world):
         rrtik.plan_many(world, np.zeros((2, 6)), np.zeros((2, 5)))
     some = [rrtik.JointGoal(np.zeros(6)), rrtik.JointGoal(np.zeros(5))]
     for planner in (None, "fastrrtconnect"):
-        with pytest.raises(InputError, match=r"goals\[1\]: robot 'ur5' has 6 joints .*, but 5 values were given"):
+        with pytest.raises(InputError, match=r"goals\[1\].*6 joints.*5 values"):
             rrtik.plan_many(world, np.zeros(6), some, planner)
 
 

@@ -111,9 +111,7 @@ def test_a_cloud_of_a_map_with_too_many_cells_is_refused(tmp_path):
 
 def test_ground_made_in_memory_cannot_be_written(tmp_path):
     scene = rrtik.Scene((rrtik.Obstacle("ground", rrtik.HeightField(HEIGHTS, 0.5)),))
-    with pytest.raises(
-        InputError, match="'ground': a height field made in memory cannot be written; load it from a file"
-    ):
+    with pytest.raises(InputError, match=r"ground.*load.*file"):
         rrtik.save_scene(scene, tmp_path / "scene.yaml")
 
 
@@ -186,12 +184,12 @@ def test_cells_without_data_are_refused_with_their_place_and_left_out_on_a_word(
         pytest.importorskip("cv2")
     data = {"npy": npy, "csv": written, "tif": tiff}[kind](holed(value))
     file = saved(tmp_path, f"a.{kind}", data)
-    with pytest.raises(InputError, match=r"1 of 25 heights .*first in row 1, column 3 .*invalid='drop'") as told:
+    with pytest.raises(InputError, match=r"1 of 25.*row 1, column 3.*invalid='drop'") as told:
         rrtik.load_height_field(file, 0.5)
     assert str(file) in str(told.value)
     stated = {"nodata": value} if np.isfinite(value) else {}
     if stated:
-        with pytest.raises(InputError, match=rf"{value:g}, which stands for no data.*nodata="):
+        with pytest.raises(InputError, match=rf"{value:g}.*no data.*nodata="):
             rrtik.load_height_field(file, 0.5, invalid="drop")
     field = rrtik.load_height_field(file, 0.5, -1.0, invalid="drop", **stated)
     assert np.isnan(field.heights).sum() == 1
@@ -203,7 +201,7 @@ def test_cells_without_data_are_refused_with_their_place_and_left_out_on_a_word(
 def test_the_number_that_a_tiff_names_stands_for_no_data(order, tmp_path):
     pytest.importorskip("cv2")
     file = saved(tmp_path, "a.tif", tiff(holed(7.5), (42113, "7.5"), order=order))
-    with pytest.raises(InputError, match=r"or 7\.5, which stands for no data, the first in row 1, column 3"):
+    with pytest.raises(InputError, match=r"7\.5.*row 1, column 3"):
         rrtik.load_height_field(file, 0.5)
     field = rrtik.load_height_field(file, 0.5, invalid="drop")
     assert np.isnan(field.heights).sum() == 1
@@ -220,7 +218,7 @@ def test_heights_among_the_others_are_heights_whatever_their_number(tmp_path):
 @pytest.mark.parametrize("value", [-500.0, 800.0])
 def test_a_height_far_beyond_the_rest_is_warned_of_with_its_place(value, tmp_path):
     file = saved(tmp_path, "a.npy", npy(holed(value)))
-    with pytest.warns(CloudWarning, match=rf"1 height lies .*: {value:g} m in row 1, column 3"):
+    with pytest.warns(CloudWarning, match=rf"1 height.*: {value:g} m in row 1, column 3"):
         rrtik.load_height_field(file, 0.5)
     rng = np.random.default_rng(1)
     with warnings.catch_warnings():

@@ -207,9 +207,7 @@ def test_a_cloud_with_the_arm_in_it_is_told_with_the_remedy():
     robot = rrtik.load_robot("panda")
     start = robot.posture("default")
     cloud = PointCloud(robot.fk(start).translation + np.zeros((1, 3)), 0.01)
-    with pytest.raises(
-        ProblemError, match=r"'scan' overlap.*; move it, take .* by without_robot\(\), or allow the pair"
-    ):
+    with pytest.raises(ProblemError, match=r"'scan'.*without_robot\(\)"):
         rrtik.Problem(World(robot, Scene([Obstacle("scan", cloud)])), start, start)
 
 
@@ -232,7 +230,7 @@ def test_a_cloud_that_is_moved_is_where_it_is_now():
 
 
 def test_a_link_cannot_hold_a_cloud():
-    with pytest.raises(InputError, match="point-cloud cannot be attached"):
+    with pytest.raises(InputError, match=r"point-cloud.*attached"):
         AttachedObject("c", "tool", PointCloud([[0.0, 0.0, 0.0]], 0.1))
 
 

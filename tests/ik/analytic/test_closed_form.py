@@ -41,7 +41,7 @@ def test_the_base_may_stand_anywhere_and_the_tip_be_any_frame_of_the_last_link(n
 
 def test_a_tip_that_the_last_joint_does_not_carry_is_refused():
     robot = load_robot("titan4", tip="wrist")
-    with pytest.raises(InputError, match="places 'grip_point', and the tip 'wrist' does not move with that frame"):
+    with pytest.raises(InputError, match=r"'grip_point'.*'wrist'"):
         solutions(robot, robot.fk_batch(np.zeros((1, 6))))
 
 
@@ -49,7 +49,7 @@ def test_a_tip_that_the_last_joint_does_not_carry_is_refused():
 def test_a_robot_without_a_closed_form_is_told_what_fits(name):
     robot = load_robot(name)
     assert not has_closed_form(robot)
-    with pytest.raises(InputError, match=f"robot '{name}' brings no closed-form .* is 'numeric'"):
+    with pytest.raises(InputError, match=f"'{name}'.*closed-form.*'numeric'"):
         solutions(robot, np.eye(4)[None])
 
 

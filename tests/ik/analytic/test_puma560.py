@@ -127,5 +127,5 @@ def test_a_point_leaves_five_joints_free_so_auto_is_numeric_and_the_closed_form_
     robot = load_robot("puma560_5dof")
     goal = PositionGoal(robot.fk(np.radians([40.0, -60.0, 20.0, 30.0, 40.0])).translation)
     assert solve_ik(robot, goal).method == "numeric"
-    with pytest.raises(InputError, match=r"needs a pose, and a position leaves a whole family .* numeric"):
+    with pytest.raises(InputError, match=r"pose.*position.*numeric"):
         solve_ik(robot, goal, method="closed-form")

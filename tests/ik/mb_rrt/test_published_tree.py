@@ -203,13 +203,13 @@ def test_goals_out_of_reach_are_refused_with_by_how_much(sizes, off, beyond):
 
 def test_bad_input_is_refused_in_one_line():
     rng = np.random.default_rng(0)
-    with pytest.raises(InputError, match="lengths must be one or more numbers greater than 0"):
+    with pytest.raises(InputError, match=r"lengths.*0"):
         Links([1.0, 0.0])
     with pytest.raises(InputError, match="dimension must be 2 or 3"):
         Links([1.0], 4)
-    with pytest.raises(UnknownNameError, match=r"no variant of MB-RRT 'surface'; have .*surface-a"):
+    with pytest.raises(UnknownNameError, match=r"'surface'.*surface-a"):
         grow(THREE, [1.0, 1.0], "surface", tolerance=0.1, rng=rng)
-    with pytest.raises(InputError, match="goal: every number must be finite"):
+    with pytest.raises(InputError, match=r"goal.*finite"):
         grow_on_arcs(THREE, [np.nan, 0.0], rng=rng)
     with pytest.raises(InputError, match="needs a planar chain"):
         grow_in_joint_space(Links([1.0], 3), [0.0, 0.0, 1.0], tolerance=0.1, rng=rng)

@@ -247,7 +247,7 @@ def test_a_kernel_that_needs_python_is_refused(monkeypatch):
     monkeypatch.setattr(compiled, "_entries", {})
     allocating.__module__ = name
     compiled.entry(allocating)
-    with pytest.raises(RuntimeError, match="allocating: kernels may not allocate, raise or use objects, but need NRT"):
+    with pytest.raises(RuntimeError, match=r"allocating.*NRT"):
         bitcode.compiled_module("allocating")
 
 

@@ -70,8 +70,6 @@ def test_why_pages_do_not_plan_is_said_once(monkeypatch):
     monkeypatch.setattr(page_kernels_module, "cache_folder", lambda kind: None)
     monkeypatch.setattr(page_kernels_module, "made_page_kernels", broken)
     fresh = cache(page_kernels.__wrapped__)
-    with pytest.warns(
-        RuntimeWarning, match=r"^pages do not plan by themselves: RuntimeError: no target wasm32$"
-    ) as said:
+    with pytest.warns(RuntimeWarning, match=r"^pages do not plan.*no target wasm32$") as said:
         assert (fresh(), fresh()) == (None, None)
     assert len(said) == 1

@@ -152,7 +152,7 @@ def test_limits_that_the_trajectory_exceeds_are_refused():
     """No change of pace would keep them, so a stop would never begin."""
     for share, what in ((0.3, "velocity"), (1.0 - 1e-5, "velocity")):
         low = RateLimits(share * LIMITS.velocity, LIMITS.acceleration, LIMITS.jerk)
-        with pytest.raises(InputError, match=f"joint '.*' has a {what} of .* its limit is .* slowed") as caught:
+        with pytest.raises(InputError, match=f"joint '.*' .*{what} .*limit.*slowed") as caught:
             Follower(MOTION, SimulatedLink(ROBOT, PATH.start), limits=low)
         assert "\n" not in str(caught.value)
     jumping = time_parameterize(PATH, RateLimits(LIMITS.velocity, LIMITS.acceleration))
@@ -250,7 +250,7 @@ def test_what_cannot_be_followed_is_refused_in_one_line():
         with pytest.raises(InputError, match="positions of the arm"):
             Follower(MOTION, PlainLink(here))
     moving = Trajectory([0.0, 1.0], [[0.0] * 3, [0.1] * 3], [[0.1] * 3, [0.1] * 3])
-    with pytest.raises(InputError, match=r"at its start joint .* must begin and end at rest"):
+    with pytest.raises(InputError, match=r"start.*at rest"):
         Follower(moving, PlainLink(np.zeros(3)))
     for rate in (0.0, np.nan):
         with pytest.raises(InputError, match="rate"):

@@ -112,5 +112,5 @@ def test_the_force_of_a_joint_that_slides_is_said_in_newtons():
     joint = '<joint name="lift" type="prismatic"><parent link="base"/><child link="car"/><axis xyz="0 0 1"/>'
     joint += '<limit lower="0" upper="1" effort="20" velocity="1"/></joint>'
     robot = robot_from_urdf_text(f'<robot name="r"><link name="base"/><link name="car">{mass}</link>{joint}</robot>')
-    with pytest.raises(InputError, match=r"'lift' needs 49\.\d N to hold .* its limit is 20 N;"):
+    with pytest.raises(InputError, match=r"'lift'.*49\.\d N.*20 N"):
         time_parameterize(JointPath.of(robot, [[0.0], [1.0]]), robot, torque=True)

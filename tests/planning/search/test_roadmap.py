@@ -151,21 +151,21 @@ def test_a_world_with_path_constraints_is_refused_for_a_roadmap_keeps_none(tmp_p
     made = rrtik.Roadmap(free, vertices=20)
     made.save(tmp_path / "free.npz")
     for use in (rrtik.Roadmap, made.moved_to, lambda world: rrtik.load_roadmap(tmp_path / "free.npz", world)):
-        with pytest.raises(InputError, match="world of a roadmap: it has path constraints"):
+        with pytest.raises(InputError, match=r"roadmap.*path constraints"):
             use(held)
 
 
 def test_a_roadmap_of_another_world_is_refused_in_one_line(tmp_path):
     file = tmp_path / "wall.npz"
     rrtik.Roadmap(wall(0.5), vertices=50).save(file)
-    with pytest.raises(InputError, match=r"wall\.npz: is the roadmap of another world; load it with moved=True"):
+    with pytest.raises(InputError, match=r"wall\.npz.*moved=True"):
         rrtik.load_roadmap(file, wall(1.8))
     assert len(rrtik.load_roadmap(file, wall(1.8), moved=True).vertices) == 50
     with pytest.raises(InputError, match="roadmap"):
         rrtik.load_roadmap(file, problem().world)
     with pytest.raises(InputError, match="another robot"):
         roadmap().moved_to(wall(0.5))
-    with pytest.raises(InputError, match=r"another world; use roadmap\.moved_to"):
+    with pytest.raises(InputError, match=r"roadmap\.moved_to"):
         rrtik.plan(problem(), "roadmap", parameters={"roadmap": rrtik.Roadmap(wall(0.5), vertices=10)})
 
 

@@ -285,7 +285,7 @@ def test_no_line_no_arc_no_turn():
         rrtik.linear(world, UR5_READY, [])
     with pytest.raises(InputError, match="lie on a line"):
         rrtik.arc(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), beside(begin, 0.0, 0.1, 0.0))
-    with pytest.raises(InputError, match="turns=1: the goal is not turned"):
+    with pytest.raises(InputError, match=r"turns=1.*goal"):
         rrtik.screw(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), turns=1)
     for turns in (1.5, "one", None, 2_000, 10**400):
         with pytest.raises(InputError, match="turns must be a whole number"):
