@@ -2,10 +2,11 @@
 
 import json
 import os
+import pty
 import signal
 import subprocess
 import sys
-import time
+from contextlib import suppress
 
 import pytest
 
@@ -296,15 +297,20 @@ def test_ctrl_c_exits_130_says_so_and_leaves_no_file(tmp_path):
         "start: {joints: [1, 1]}\ngoal: {joints: [9, 9]}\n"
     )
     out = tmp_path / "path.json"
-    process = subprocess.Popen(
-        command("plan", str(problem), "--seconds", "60", "--out", str(out)), stderr=subprocess.PIPE, text=True
-    )
-    time.sleep(4.0)
+    terminal, end = pty.openpty()  # on which the command shows that it plans
+    process = subprocess.Popen(command("plan", str(problem), "--seconds", "60", "--out", str(out)), stderr=end)
+    os.close(end)
+    shown = ""
+    while "planning" not in shown:
+        shown += os.read(terminal, 1000).decode()
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert err.startswith("rrtik: interrupted")
-    assert len(err.splitlines()) == 1
+    with suppress(OSError):  # Linux's word for the end of a terminal
+        while more := os.read(terminal, 1000):
+            shown += more.decode()
+    os.close(terminal)
+    assert process.wait(timeout=30) == 130
+    assert shown.count("rrtik: ") == 1
+    assert shown.splitlines()[-1].startswith("rrtik: interrupted")
     assert sorted(f.name for f in tmp_path.iterdir()) == ["closed.yaml"]
 
 

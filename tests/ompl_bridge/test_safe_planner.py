@@ -13,6 +13,7 @@ from ompl import base as ob
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.contract.problems import GOAL, START, outside_bar, small_problem, solution_rows
+from rrtik_tests.waiting import until
 
 pytestmark = pytest.mark.usefixtures("quiet_ompl")
 
@@ -130,8 +131,7 @@ def test_a_lazy_goal_is_waited_for() -> None:
     goal.startSampling()
     _, planner = solve(setup)
     stopped[0] = True
-    while goal.isSampling():
-        time.sleep(0.005)
+    until(lambda: not goal.isSampling())
     goal.stopSampling()
     assert planner.goals.tolist() == [list(GOAL)]
 

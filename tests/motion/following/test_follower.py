@@ -1,7 +1,5 @@
 """Trajectories followed: on their path, within limits whatever is asked, at rest when told."""
 
-import time
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -17,6 +15,7 @@ from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
 from rrtik_ompl.pilot.devices.links import ArmLink
 from rrtik_ompl.world.world import World
+from rrtik_tests.waiting import until
 
 TICK = 2e-3
 ROBOT = load_robot("planar3")
@@ -272,9 +271,6 @@ def test_the_arms_of_the_pilot_follow_too():
         client = LineArm(ROBOT, "127.0.0.1", server.port)
         link = ArmLink(client)
         link.command(PATH.end + 0.01, 0.0)
-        for _ in range(100):
-            if np.abs(link.positions() - PATH.end - 0.01).max() < 1e-9:
-                break
-            time.sleep(0.05)
+        until(lambda: np.abs(link.positions() - PATH.end - 0.01).max() < 1e-9)
         assert np.allclose(server.arm.read(), PATH.end + 0.01)
         client.close()
