@@ -2,13 +2,14 @@
 
 import pytest
 
-from rrtik_tests.browser import CHROMIUM, Browser
+from rrtik_tests.browser import Browser
+from rrtik_tests.programs import CHROMIUM, NO_CHROMIUM
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     if CHROMIUM is None:
-        pytest.skip("no chromium on PATH: pages cannot be looked at")
+        pytest.skip(NO_CHROMIUM)
     made = Browser(tmp_path_factory.mktemp("chromium"))
     yield made
     made.close()
