@@ -14,12 +14,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import date
 from email.parser import Parser
+from importlib.util import find_spec
 from pathlib import Path
 from zipfile import ZipFile
 
 from bench.shared.run import Run
 from rrtik_bench.report.machine import package_version
 from rrtik_bench.report.page import Report
+from rrtik_ompl.base.errors import InputError
 
 PYTHONS = ("3.10", "3.11", "3.12", "3.13")
 NEXT_PYTHON = "3.14"
@@ -125,6 +127,8 @@ def fill(page: Report, wheel: Path) -> None:
 
 def main(run: Run) -> Report:
     """Ask."""
+    if find_spec("uv") is None:
+        raise InputError("resolve: uv is not installed here; pip install uv")
     report = run.report("What the wheel needs, resolved for other machines")
     with tempfile.TemporaryDirectory() as folder:
         fill(report, built_wheel(Path(folder)))

@@ -16,7 +16,6 @@ from rrtik_ompl.viewer.drawing.tree_marks import tree_marks
 
 SEED = 1
 POINTS = 4_000  # of the cloud
-LARGEST = 1_500_000  # bytes of a page
 
 
 def planned(problem: rrtik.Problem, planner: str | None, file: Path) -> None:
@@ -62,13 +61,10 @@ def pages() -> Iterator[tuple[str, str, Callable[[Path], None]]]:
     yield "mb_rrt_tree", "the tree of MB-RRT", tree
 
 
-def main(folder: Path) -> int:
-    """Write all pages; exit code 1 if one is too large."""
+def main(folder: Path) -> None:
+    """Write all pages, and say how large each is."""
     folder.mkdir(parents=True, exist_ok=True)
-    sizes = []
     for name, text, write in pages():
         file = folder / f"{name}.html"
         write(file)
-        sizes.append(file.stat().st_size)
-        print(f"{file}: {sizes[-1] / 1e6:.2f} MB: {text}", flush=True)
-    return int(max(sizes) > LARGEST)
+        print(f"{file}: {file.stat().st_size / 1e6:.2f} MB: {text}", flush=True)

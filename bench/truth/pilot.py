@@ -40,6 +40,7 @@ NAMED = {
     "dead": "does not move",
     "runaway": "after the stop|too far|the wrong way",
 }
+REFUSED = "refused: line too slow for driving"
 LATE = ("the session", "the thread that reads the arm")
 LATE_SECONDS = 0.1, 0.2  # between these, each time
 REPEATS, REPLUGGED = 12, 8  # at full size
@@ -71,7 +72,7 @@ def section(parts: Parts, size: float) -> Report:
     for delay, cases in lines.items():
         worst, moved = max(case.after for case in cases), max(case.before for case in cases)
         slow = 2.0 * delay > 0.3
-        refused = all(case.said.startswith("refused: line too slow for driving") for case in cases)
+        refused = all(case.said.startswith(REFUSED) for case in cases)
         held = worst <= MOST and (moved == 0.0 and refused if slow else moved > 0.0)
         wanted = "0 deg, refused in one line" if slow else f"at most {MOST:g} deg"
         report.bar(f"after the release, line of {delay:g} s each way", wanted, f"{worst:.2f} deg", held)
@@ -124,9 +125,16 @@ def released(delay: float, seed: int) -> Case:
     with hostile.Pilot(delay=delay, line=True) as pilot:
         pilot.look(0.3 + 2.0 * delay)  # nobody drives before the page has shown picture and arm
         direction, begin = _ready(pilot, seed), pilot.arm._q.copy()
-        pilot.hold(1.0 + 2.0 * delay, direction=direction)
+        heard: list[str] = []
+
+        def listen(state: dict[str, Any]) -> bool:
+            """Hold on, whatever is said: a refusal may be followed by news before the key is let go."""
+            heard.append(state["message"])
+            return False
+
+        pilot.hold(1.0 + 2.0 * delay, until=listen, direction=direction)
         there, at = pilot.arm._q.copy(), time.monotonic()
-        said = pilot._state["message"]
+        said = next((message for message in heard if message.startswith(REFUSED)), heard[-1])
         pilot.release()
         pilot.look(1.0 + 2.0 * delay)
         before = float(np.degrees(np.abs(there - begin)).max())

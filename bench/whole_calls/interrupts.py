@@ -28,6 +28,7 @@ from rrtik_ompl import Roadmap, load_problem, plan, shorten
 WANTED = 50.0  # [ms]
 TIMES = 20  # that each call is interrupted
 TIMES_OF_COMMANDS = 6
+INTERRUPTED = 130  # exit code
 TRIES = 10  # to catch a call that ends by itself
 CLOSED = """version: 1
 robot: {point2d: {radius: 0.1, bounds: [[0, 10], [0, 10]]}}
@@ -96,23 +97,24 @@ def of_commands(report: Report, closed: Path, folder: Path) -> None:
     """Commands, from the signal to the end of the process; of `rrtik bench` the process that keeps the books."""
     commands = {
         "rrtik plan": ["plan", str(closed), "--seconds", "60"],
-        "rrtik bench": ["bench", "quick", "--out", str(folder / "runs"), "--runs", "1000"],
+        "rrtik bench": ["bench", "quick", "--runs", "1000"],
     }
     rng, rows = np.random.default_rng(2), []
     for name, words in commands.items():
         taken, codes = [], set()
-        for _ in range(TIMES_OF_COMMANDS):
-            script = [sys.executable, "-c", "from rrtik_ompl.cli.entry import main; main()", *words]
+        for number in range(TIMES_OF_COMMANDS):
+            own = words if name == "rrtik plan" else [*words, "--out", str(folder / f"runs{number}")]
+            script = [sys.executable, "-c", "from rrtik_ompl.cli.entry import main; main()", *own]
             process = subprocess.Popen(script, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             time.sleep(rng.uniform(3.0, 9.0))
             before = _spent(process.pid)
-            process.send_signal(signal.SIGINT)
-            _, status, used = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-            codes.add(process.returncode)
-            taken.append(1e3 * (used.ru_utime + used.ru_stime - before))
+            os.kill(process.pid, signal.SIGINT)  # send_signal would first take away one that ended by itself
+            os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+            taken.append(1e3 * (_spent(process.pid) - before))
+            codes.add(process.wait())
         rows.append([name, str(len(taken)), ", ".join(map(str, sorted(codes))), *(f"{f(taken):.1f}" for f in _BOTH)])
-        report.bar(f"Ctrl-C in {name}: most", f"{WANTED:g} ms", f"{max(taken):.1f} ms", max(taken) <= WANTED)
+        held = max(taken) <= WANTED and codes == {INTERRUPTED}
+        report.bar(f"Ctrl-C in {name}: most", f"{WANTED:g} ms", f"{max(taken):.1f} ms", held)
     report.table("Commands", ["", "interrupted", "exit code", "median [ms]", "most [ms]"], rows)
 
 
@@ -120,9 +122,10 @@ _BOTH = (np.median, max)
 
 
 def _spent(process: int) -> float:
-    """Processor time of a process so far [s]."""
-    tasks = Path(f"/proc/{process}/task").glob("*/schedstat")
-    return 1e-9 * sum(int(task.read_text().split()[0]) for task in tasks)
+    """Processor time of a process so far, its children's left out, to the tick of the system's clock [s]."""
+    after_the_name = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    user, system = after_the_name[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
 def main(run: Run) -> Report:
