@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Annotated
 
 import numpy as np
+import pinocchio as pin
 from typer import Option
 
 import rrtik_ompl as rrtik
-from bench.moves.crdt import WITH_ROOM, case_a_with_room
 from bench.shared.problems import goal_joints
 from bench.shared.run import Run
 from rrtik_bench.crdt.runs import histogram, joints_of, share, sound
@@ -21,6 +21,7 @@ from rrtik_ompl.planning.shortening.fewest_moves import grid_route, least_moves
 from rrtik_ompl.world.problem import Problem
 from rrtik_planners import FewestMoves
 
+WITH_ROOM = "planar3_a, 10 mm out"
 LIMITS = {"titan4_sdu": 2.0}  # [s] for a run
 LIMIT = 5.0  # [s] for a run of the other problems, as plan() has it
 GRIDS = {"env_e": 0.25, **{name: float(np.radians(6.0)) for name in ("planar3_a", WITH_ROOM, "planar3_b", "planar3_c")}}
@@ -113,8 +114,19 @@ class Measured:
         return ", ".join(late) or "none"
 
 
+def case_a_with_room(problem: Problem, outwards: float = 0.01) -> Problem:
+    """Case A with its squares moved away from axis 1 (see CASE_A)."""
+    world = problem.world
+    moved = []
+    for square in world.scene.obstacles:
+        shift = outwards * np.sign(square.pose.translation)
+        moved.append(replace(square, pose=pin.SE3(square.pose.rotation, square.pose.translation + shift)))
+    roomy = world.with_scene(replace(world.scene, obstacles=tuple(moved)))
+    return rrtik.Problem(roomy, problem.start, problem.goal, name=WITH_ROOM)
+
+
 def measured(name: str, count: int) -> Measured:
-    """FewestMovesRun one problem; the bound is found apart from the planner."""
+    """Plan one problem so often; the bound is found apart from the planner."""
     problem = case_a_with_room(rrtik.load_problem("planar3_a")) if name == WITH_ROOM else rrtik.load_problem(name)
     begin = perf_counter()
     bound = least_moves(problem)

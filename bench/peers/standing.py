@@ -1,7 +1,9 @@
 """The standing comparison: planners that pip installs on generated families and on MotionBenchMaker's problems.
 
 Each path, ours and theirs, is judged three times: its ends, our dense second check, and a certificate that a second
-program verifies. What is done is kept beside the page: the same command goes on from there.
+program verifies. A peer that cannot live with our versions of numpy and Pinocchio is given an interpreter of its own,
+for instance ``--python mplib=venv_mplib/bin/python``; one that is absent is a row that says why. What is done is kept
+beside the page: the same command goes on from there.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ from __future__ import annotations
 import atexit
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import groupby
@@ -23,18 +25,26 @@ from typer import Option
 import rrtik_ompl as rrtik
 from bench.peers.description import NoTask, task_of
 from bench.peers.host import Host
-from bench.peers.report import PEERS, interpreters, joins
 from bench.shared.parts import Parts
+from bench.shared.problems import goal_joints
 from bench.shared.run import Pythons, Run, SetsOrNone
 from bench.speed.machine import machine
 from bench.whole_calls.report import scene_files
 from bench.whole_calls.search_calls import problem_of, spent
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, Problem
-from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.arrays import TAU, Matrix
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.planning.generated_problems import FAMILIES, generated_problem
 
 OURS = "rrtik_ompl, plan()"
+PEERS = {
+    "OMPL, Pinocchio + coal": "ompl_callback",
+    "the same with a broadphase": "ompl_callback --broadphase",
+    "roboplan": "roboplan",
+    "MPlib": "mplib",
+    "pyroboplan": "pyroboplan",
+}
 GENERATED, SETS = ("titan4", "ur5", "panda"), ("panda", "ur5")
 PLANNER = "fastrrtconnect"
 
@@ -64,6 +74,29 @@ class Outcome:
     proven: bool
     length: float
     failed: str
+
+
+def joins(problem: Problem, rows: Matrix) -> bool:
+    """Whether a path leads from the start to the goal, whole turns of a joint aside."""
+    off = np.abs(rows[[0, -1]] - np.array([problem.start, goal_joints(problem)]))
+    turns = np.where(problem.robot.prismatic, 0.0, TAU * np.round(off / TAU))
+    return bool(np.allclose(off, turns, atol=1e-6))
+
+
+def interpreters(words: Iterable[str]) -> dict[str, str]:
+    """The interpreters of peers that have one of their own, from words such as ``mplib=venv/bin/python``.
+
+    Raises:
+        InputError: If a word is no such pair, or names no peer.
+    """
+    known = sorted({module.split()[0] for module in PEERS.values()})
+    found = {}
+    for word in words:
+        name, equals, path = word.partition("=")
+        if not equals or name not in known:
+            raise InputError(f"--python {word}: expected NAME=INTERPRETER, NAME being {', '.join(known)}")
+        found[name] = path
+    return found
 
 
 def judged(group: str, planner: str, problem: Problem, rows: Matrix | None, seconds: float, failed: str) -> Outcome:

@@ -1,6 +1,7 @@
 """Contract cases drawn by hypothesis over spaces, goals, checkers and conditions, for every planner of ours, no World.
 
-Cases come in blocks, one seed each; an interrupted run goes on where it was.
+With ``--turning`` all spaces have coordinates of SO(2). Cases come in blocks, one seed each; an
+interrupted run goes on where it was.
 """
 
 from __future__ import annotations
@@ -8,12 +9,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from time import monotonic, process_time
+from typing import Annotated
 
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
+from typer import Option
 
 from bench.planning.contract_questions import CHECKERS, CONDITIONS, GOALS, PLANNERS, Case, cases, goal_of, setup_of
 from bench.shared.parts import Parts
@@ -125,15 +128,17 @@ def fill(report: Report, done: Sequence[tuple[Counter[str], list[str]]], turning
     )
 
 
-def page(run: Run, parts: Parts, count: int, turning: bool) -> Report:
-    """At least so many cases, and the page that says what came out."""
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    cases: Annotated[int | None, Option(help="At least so many; 100,000, or 10,000 with --turning.")] = None,
+    turning: Annotated[bool, Option(help="In spaces with angles.")] = False,
+) -> Report:
+    """Ask."""
     ou.setLogLevel(ou.LogLevel.LOG_NONE)
+    count = cases or (ALL_TURNING if turning else ALL)
     done = parts(block, [(number, turning) for number in range(-(-count // BLOCK))])
     report = run.report("Contract cases with angles" if turning else "Contract cases")
     fill(report, done, turning)
     return report
-
-
-def main(run: Run, parts: Parts, *, cases: int = ALL) -> Report:
-    """Ask."""
-    return page(run, parts, cases, turning=False)

@@ -1,5 +1,6 @@
-"""Marker sensing and the overlay, on rendered pictures: published series, rendered scenes.
+"""Marker sensing and the overlay, on rendered pictures: range, jitter, grasps, rendered scenes, times of frames.
 
+The published series are measured by ``rrtik reproduce sensing``.
 All pictures are rendered: no camera, print or water was there. Times are processor time of one process alone, which is
 why the last section is measured when the others are done.
 """
@@ -12,9 +13,7 @@ from typing import Annotated
 import cv2
 from typer import Option
 
-from bench.sensing import overlay_frames, rendered_scenes
-from bench.sensing import rows as sensing_rows
-from bench.sensing import series as sensing_series
+from bench.sensing import overlay_frames, rendered_scenes, rows
 from bench.shared.parts import Parts
 from bench.shared.run import Run
 from rrtik_bench.report.page import Report
@@ -28,17 +27,9 @@ PICTURES = (
 )
 Section = Callable[..., None]
 SECTIONS: tuple[tuple[Section, int], ...] = (  # and how many observations, poses or sequences each has
-    (sensing_rows.algebra, 1000),
-    (sensing_rows.exactness, 1000),
-    (sensing_rows.simulated_sensor, 300),
-    (sensing_rows.statistics, 1),
-    (sensing_rows.simulated_accuracy, 1),
-    (sensing_series.precision, 100),
-    (sensing_series.gripper, 30),
-    (sensing_series.accuracy, 30),
-    (sensing_series.safe_range, 20),
-    (sensing_rows.jitter, 300),
-    (sensing_rows.end_to_end, 60),
+    (rows.safe_range, 20),
+    (rows.jitter, 300),
+    (rows.end_to_end, 60),
     (rendered_scenes.rendered_scenes, 14),
     (overlay_frames.silhouettes, 12),
     (overlay_frames.frame_times, 60),
