@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from ompl import geometric as og
 
-from rrtik_ompl import Obstacle, Problem, ProblemError, Scene, World, list_problems, load_problem, load_robot
+from bench.whole_calls.search_calls import problem_of
+from rrtik_ompl import Obstacle, Problem, Scene, World, list_problems, load_problem, load_robot
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import changed
 from rrtik_ompl.ik.goal_configurations import goal_configurations
-from rrtik_ompl.model.shapes import Box, Capsule, Cylinder
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.ompl_bridge.attempt import attempt
-from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
 BISECTIONS = 12
 NEAR = 0.1  # [rad] from contact
@@ -36,10 +34,9 @@ class Options:
     Attributes:
         folder: The unpacked MotionBenchMaker set of the Panda, or None.
         problems: At most so many problems of each of its families.
-        peer_problems: As many for the slow peers.
+        peer_problems: As many to see what OMPL costs.
         seed: Of everything that is drawn by lot.
         quick: Whether a fraction of the work is enough.
-        plans: Number of plans over which the memory is watched.
         limit: Time limit of one solve [s].
     """
 
@@ -48,7 +45,6 @@ class Options:
     peer_problems: int
     seed: int
     quick: bool
-    plans: int
     limit: float = 1.0
 
 
@@ -76,47 +72,16 @@ def family(file: Path) -> str:
     return file.parent.name.removesuffix("_panda")
 
 
-@cache
-def exact_panda(folder: Path) -> Any:
-    """The Panda with its collision meshes, fingers where the problems have them."""
-    return load_robot(folder / "panda.urdf", srdf=folder / "panda.srdf", group="panda_arm")
-
-
-@cache
-def sphere_panda(folder: Path) -> Any:
-    """The Panda of 59 spheres."""
-    return load_robot(folder / "panda_spherized.urdf", srdf=folder / "panda.srdf", group="panda_arm")
-
-
-def exact_problem(options: Options, file: Path) -> Problem:
+def exact_problem(file: Path) -> Problem:
     """A problem of the set on the meshes of the arm."""
-    assert options.folder is not None
-    return load_motion_bench_maker(file, robot=exact_panda(options.folder))
+    problem = problem_of(str(file), balls=False)
+    assert problem is not None
+    return problem
 
 
-def sphere_problem(options: Options, file: Path) -> Problem | None:
-    """A problem with the spheres and obstacles that VAMP uses; None if an end is in collision, as one of 700 is.
-
-    The spheres are all there is of the arm, as for VAMP: its world is conservative and never asks coal.
-    """
-    assert options.folder is not None
-    exact = exact_problem(options, file)
-    in_box = family(file) == "box"
-    obstacles = tuple(Obstacle(o.name, vamp_shape(o.shape, in_box), o.pose) for o in exact.world.scene.obstacles)
-    try:
-        world = World(sphere_panda(options.folder), Scene(obstacles), accuracy="conservative")
-        return Problem(world, exact.start, exact.goal, name=exact.name)
-    except ProblemError:
-        return None
-
-
-def vamp_shape(shape: Any, in_box: bool) -> Any:
-    """VAMP checks capsules for cylinders, except in the family ``box``, where it takes the boxes around them."""
-    if not isinstance(shape, Cylinder):
-        return shape
-    if in_box:
-        return Box((2.0 * shape.radius, 2.0 * shape.radius, shape.length))
-    return Capsule(shape.radius, shape.length)
+def sphere_problem(file: Path) -> Problem | None:
+    """A problem with the 59 spheres and obstacles that VAMP uses; None if an end is in collision, as one of 700 is."""
+    return problem_of(str(file), balls=True)
 
 
 def shipped_problems() -> list[Problem]:

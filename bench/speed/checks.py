@@ -58,20 +58,20 @@ def free_motions(options: Options, report: Report) -> None:
         bar = next((value for scene, value in FREE_BARS.items() if name.startswith(scene)), np.inf)
         report.bar(f"one configuration along free motions, {name}", f"{bar:g} ns (aim 35 ns)", rows[-1][1], cost <= bar)
     head = ["", "ns per configuration", "motions"]
-    report.table("5. Panda along free motions of 1 rad, 32 configurations each", head, rows)
+    report.table("4. Panda along free motions of 1 rad, 32 configurations each", head, rows)
 
 
 def _free_worlds(options: Options) -> Iterator[tuple[str, World]]:
     files = {family(file): file for file in reversed(panda_files(options, 1))}
     for kind in ("cage", "table_pick"):
         if kind in files:
-            problem = sphere_problem(options, files[kind])
+            problem = sphere_problem(files[kind])
             if problem is not None:
                 yield f"{kind}, 59 spheres", problem.world
-            yield f"{kind}, covers of the exact solids", exact_problem(options, files[kind]).world
+            yield f"{kind}, covers of the exact solids", exact_problem(files[kind]).world
     scene = clutter(MANY_BOXES, REACHES["panda"], np.random.default_rng(options.seed))
     if files:
-        spheres = sphere_problem(options, next(iter(files.values())))
+        spheres = sphere_problem(next(iter(files.values())))
         if spheres is not None:
             yield f"{MANY_BOXES} boxes, 59 spheres", World(spheres.world.robot, scene)
     yield f"{MANY_BOXES} boxes, covers of the exact solids", World(load_robot("panda"), scene)
@@ -112,7 +112,7 @@ def near_obstacles(options: Options, report: Report) -> None:
         found[kind].append((ratio, share))
     head = ["", "", "configurations", "free", "ours [us]", "pin + coal, our solids [us]", "pin + coal, meshes [us]"]
     head += ["ratio, our solids", "ours wrong", "pin + coal wrong", "undecided [%]"]
-    report.table("6, 7. Exact `valid_batch` near obstacles, per configuration", head, rows)
+    report.table("5. Exact `valid_batch` near obstacles, per configuration", head, rows)
     report.note("Wrong answers", WRONG)
     for kind, figures in found.items():
         ratios, shares = np.array(figures).T
@@ -168,7 +168,7 @@ def plain_checks(world: World, *, as_loaded: bool) -> Checker:
 def _near(options: Options) -> Iterator[tuple[str, str, World, Matrix]]:
     """Worlds and configurations in them, of all kinds."""
     rng, count = np.random.default_rng(options.seed), 1000 if options.quick else 5000
-    problems = [exact_problem(options, file) for file in panda_files(options, 1)] + shipped_problems()
+    problems = [exact_problem(file) for file in panda_files(options, 1)] + shipped_problems()
     for problem in problems[: 1 if options.quick else None]:
         yield problem.name, ASKED, problem.world, asked_configurations(problem, count, rng)
         yield (

@@ -18,40 +18,36 @@ from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.ompl_bridge.attempt import attempt
-from rrtik_ompl.ompl_bridge.planner_names import find_planner, list_planners
+from rrtik_ompl.ompl_bridge.planner_names import find_planner
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
 from rrtik_ompl.ompl_bridge.states import StateIO
 
 Search = Callable[[int], Matrix | None]  # from a seed to a path
 
-KERNEL_PLANNERS = ("fastrrtconnect",)
-PLANNER = next((name for name in KERNEL_PLANNERS if name in list_planners()), "RRTConnect")
+PLANNER = "fastrrtconnect"
 
 
-def our_search(problem: Problem, *, seconds: float, per_radian: float | None = None, planner: str = PLANNER) -> Search:
+def our_search(problem: Problem, *, seconds: float, per_radian: float | None = None) -> Search:
     """The bare search from Python: what a call costs when the world stands ready.
 
     Args:
         problem: What to solve.
         seconds: Time limit [s].
         per_radian: Checks per radian of the motion, as the peers count; the world's own, denser rule if None.
-        planner: Another one than the kernel planner.
     """
     goals = goal_configurations(problem, np.random.default_rng(0)).rows
-    if planner == PLANNER and problem.world.fast is not None:
+    if problem.world.fast is not None:
         return _kernel_search(problem, goals, seconds, per_radian)
-    factory = find_planner(planner)
+    factory = find_planner(PLANNER)
     return lambda seed: attempt(problem, factory, goals, Budget(seed, seconds)).rows
 
 
-def ompl_overhead(problem: Problem, *, seconds: float, seed: int) -> Callable[[], tuple[float, float]] | None:
-    """Calls of ``SimpleSetup.solve`` with the kernel planner, everything set up; None without the planner.
+def ompl_overhead(problem: Problem, *, seconds: float, seed: int) -> Callable[[], tuple[float, float]]:
+    """Calls of ``SimpleSetup.solve`` with the kernel planner, everything set up.
 
     Each call gives its own CPU seconds and those of the search inside of it: two separate searches would not be the
     same, for a planner goes on with its random numbers.
     """
-    if PLANNER not in KERNEL_PLANNERS:
-        return None
     goals = goal_configurations(problem, np.random.default_rng(0)).rows
     setup = og.SimpleSetup(unchecked_space(*planning_bounds(problem, goals)))  # the planner asks the world itself
     states, ends = StateIO(setup.getSpaceInformation()), []

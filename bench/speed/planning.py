@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bench.peers.description import task_of
-from bench.peers.libraries import ompl_callback, roboplan, vamp
+from bench.peers.libraries import roboplan, vamp
 from bench.peers.task import PER_RADIAN, Search, Task
 from bench.speed.cases import Options, exact_problem, family, panda_files, shipped_problems, sphere_problem
 from bench.speed.ours import PLANNER, ompl_overhead, our_search, timed, warm_up
@@ -29,12 +29,10 @@ NO_FOLDER = "Not run: give the folder of the MotionBenchMaker set."
 NO_ROBOPLAN = "roboplan is not installed (`pip install rrtik-ompl[peers]`): its figures are missing."
 STORED = "VAMP 0.6.4, stored, inner time, indicative"
 VAMP_STORED = (43.5, 108.9, 519.0)  # [us], on the Xeon of the project's first measurements
-CALLBACK_LIMIT = 10.0  # [s]
 SPHERE_PATHS = (
     "{found} found; by coal, {checked} of them are free at VAMP's own 32 configurations per radian, and {certified} in "
     "steps of 5 mm too, which are up to five times as fine: as VAMP's would, the others cut a corner in between."
 )
-TITAN_COLUMNS = ("ours", "plan()", "bicrdt")
 
 Times = dict[str, list[float]]
 
@@ -48,7 +46,7 @@ def spheres(options: Options, report: Report) -> None:
     times = _times("ours", "roboplan", "VAMP, call", "VAMP, inner")
     count = found = as_checked = as_certified = 0
     for number, file in enumerate(files):
-        problem = sphere_problem(options, file)
+        problem = sphere_problem(file)
         if problem is None:
             continue
         count += 1
@@ -96,7 +94,7 @@ def exact(options: Options, report: Report) -> None:
     times, verified, wall = _times(*names), dict.fromkeys(names, 0), []
     by_family: dict[str, Times] = {}
     for number, file in enumerate(files):
-        problem = exact_problem(options, file)
+        problem = exact_problem(file)
         if number == 0:
             warm_up(problem)
         for name, search in _exact_searches(problem, options).items():
@@ -109,7 +107,7 @@ def exact(options: Options, report: Report) -> None:
     head = ["", "problems", "median [us]", "mean [us]", "95 % [us]", "median ratio to the first", "solved and verified"]
     rows = [[*row, str(verified[row[0]])] for row in _rows(times, names[0])]
     report.table(title, head, rows)
-    cells = [[key, *(_ms(np.median(v[n])) if v[n] else "" for n in names)] for key, v in by_family.items()]
+    cells = [[key, *(f"{1e3 * np.median(v[n]):.3g}" if v[n] else "" for n in names)] for key, v in by_family.items()]
     report.table("Medians by family [ms]", ["", *names], cells)
     own, same = 1e3 * np.array(times["ours, own rule"]), np.array(times[names[0]])
     within, count = sum(w <= 1.0 for w in wall), len(files)
@@ -156,46 +154,14 @@ def _whole_plan(problem: Problem, options: Options) -> Callable[[int], Matrix | 
     return whole
 
 
-def callbacks(options: Options, report: Report) -> None:
-    """OMPL with a Python validity callback on the meshes; medians over one subset."""
-    title = "4. OMPL's RRT-Connect with a validity callback in Python"
-    files = panda_files(options, options.peer_problems)
-    if not files:
-        return report.note(title, NO_FOLDER)
-    names = ("ours", "with broadphase", "plain")
-    times, solved = _times(*names), dict.fromkeys(names, 0)
-    for number, file in enumerate(files):
-        problem = exact_problem(options, file)
-        if number == 0:
-            warm_up(problem)
-        searches = {
-            "ours": our_search(problem, seconds=CALLBACK_LIMIT, per_radian=PER_RADIAN),
-            "with broadphase": _peer(problem, CALLBACK_LIMIT, partial(ompl_callback.search, broadphase=True)),
-            "plain": _peer(problem, CALLBACK_LIMIT, ompl_callback.search),
-        }
-        for name, search in searches.items():
-            seconds, rows = timed(partial(search, options.seed))
-            times[name].append(seconds)
-            solved[name] += rows is not None
-    rows = [[*row, str(solved[row[0]])] for row in _rows(times, "ours")]
-    head = ["", "problems", "median [us]", "mean [us]", "95 % [us]", "median ratio to ours", "solved"]
-    report.table(f"{title}, at most {CALLBACK_LIMIT:g} s each", head, rows)
-    for name, bar, aim in (("plain", 500, 1500), ("with broadphase", 100, 250)):
-        ratio = float(np.median(times[name]) / np.median(times["ours"]))
-        what = f"{len(files)} exact problems, OMPL's RRT-Connect with a Python callback, {name}, median"
-        report.bar(what, f"{bar} x (aim {aim} x)", f"{ratio:.3g} x", ratio >= bar)
-
-
 def ompl_layer(options: Options, report: Report) -> None:
     """What OMPL around the kernel planner costs, call by call."""
-    title = "8. SimpleSetup.solve() against the bare search"
+    title = "6. SimpleSetup.solve() against the bare search"
     files = panda_files(options, options.peer_problems)
-    problems = [exact_problem(options, file) for file in files] or shipped_problems()
+    problems = [exact_problem(file) for file in files] or shipped_problems()
     bare, whole = [], []
     for problem in problems:
         solve = ompl_overhead(problem, seconds=1.0, seed=options.seed)
-        if solve is None:
-            return report.note(title, "Not run: the kernel planner is not there.")
         warm_up(problem)
         runs = [solve() for _ in range(4 * REPEATS)]
         bare += [inner for _, inner in runs]
@@ -208,34 +174,6 @@ def ompl_layer(options: Options, report: Report) -> None:
     )
     report.bar(
         "SimpleSetup.solve() against the bare search, medians", "+ 30 us (aim + 20)", f"+ {more:.1f} us", more <= 30
-    )
-
-
-def titan(options: Options, report: Report) -> None:
-    """TITAN-4, all shipped problems, exact."""
-    rows, medians = [], []
-    seeds = range(options.seed, options.seed + (3 if options.quick else 20))
-    for problem in shipped_problems():
-        warm_up(problem)
-        cells = [problem.name]
-        searches = {
-            "ours": our_search(problem, seconds=options.limit),
-            "plan()": _whole_plan(problem, options),
-            "bicrdt": our_search(problem, seconds=options.limit, planner="bicrdt"),
-        }
-        for name, search in searches.items():
-            runs = [timed(partial(search, seed)) for seed in seeds]
-            verified = sum(_verified(problem, rows) for _, rows in runs)
-            times = [seconds for seconds, _ in runs]
-            medians += [float(np.median(times))] if name == "ours" else []
-            cells += [_ms(np.median(times)), _ms(np.quantile(times, 0.95)), f"{verified} of {len(runs)}"]
-        rows.append(cells)
-    columns = ("median [ms]", "95 % [ms]", "verified")
-    head = ["", *(f"{name}, {column}" for name in TITAN_COLUMNS for column in columns)]
-    report.table("9. TITAN-4, shipped problems", head, rows)
-    worst, bar = 1e3 * max(medians), "2 ms (aim 0.5 ms)"
-    report.bar(
-        "TITAN-4, all shipped problems, exact: largest median of the search", bar, f"{worst:.3g} ms", worst <= 2.0
     )
 
 
@@ -280,7 +218,3 @@ def _three(values: ArrayLike) -> str:
     numbers = np.asarray(values, dtype=float)
     found = (np.median(numbers), np.mean(numbers), np.quantile(numbers, 0.95))
     return " / ".join(f"{v:.1f}" for v in found) + " us"
-
-
-def _ms(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g}"

@@ -20,21 +20,16 @@ from bench.shared.run import PandaSetOrNone, Run
 from bench.speed.cases import Options
 from bench.speed.checks import free_motions, near_obstacles
 from bench.speed.machine import machine
-from bench.speed.planning import callbacks, exact, ompl_layer, spheres, titan
-from bench.speed.process import memory, starts
+from bench.speed.planning import exact, ompl_layer, spheres
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.choices import one_of
 
 ROWS = {
     "spheres": spheres,
     "exact": exact,
-    "callbacks": callbacks,
     "free-motions": free_motions,
     "near-obstacles": near_obstacles,
     "ompl-layer": ompl_layer,
-    "titan4": titan,
-    "starts": starts,
-    "memory": memory,
 }
 
 
@@ -45,21 +40,20 @@ def main(
     quick: Annotated[bool, Option(help="A fraction of the work.")] = False,
     only: Annotated[list[str] | None, Option(help="This row; may be repeated.")] = None,
     problems: Annotated[int, Option(help="Problems of each family.")] = 100,
-    peer_problems: Annotated[int, Option(help="Of each family for the slow peers.")] = 3,
-    plans: Annotated[int, Option(help="Over which the memory is watched.")] = 2000,
+    peer_problems: Annotated[int, Option(help="Of each family, to see what OMPL costs.")] = 3,
     seed: int = 1,
 ) -> Report:
     """Measure the rows asked for."""
     wanted = [one_of(ROWS, name, "row") for name in only or ROWS]
     most = 1 if quick else problems
     slow = min(most, peer_problems)
-    options = Options(folder, most, slow, seed, quick, plans)
+    options = Options(folder, most, slow, seed, quick)
     ou.setLogLevel(ou.LogLevel.LOG_ERROR)
 
     report = run.report("Speed")
     report.note("Machine", machine())
-    work = f"At most {most} problems of each family, {slow} for the slow peers; {plans} plans; seed {seed}."
-    report.note("Work", work + (" Quick: a fraction of the configurations and plans." if quick else ""))
+    work = f"At most {most} problems of each family, {slow} to see what OMPL costs; seed {seed}."
+    report.note("Work", work + (" Quick: a fraction of the configurations." if quick else ""))
     for name in wanted:
         print(f"{name} ...", file=sys.stderr, flush=True)
         ROWS[name](options, report)
