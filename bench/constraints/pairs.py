@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from functools import cache
 
@@ -10,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
+from bench.shared.clocks import least
 from bench.tip_motion.judge import Judge
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.model.robot import Robot
@@ -45,19 +45,15 @@ def pair(name: str, number: int) -> Pair:
     """One scene of a robot."""
     problem, wanted = _problem(name, number)
     rrtik.plan(problem, seconds=LIMIT, seed=number)  # kernels and the tables of the world
-    spent = []
-    for _ in range(ROUNDS):
-        begin = time.process_time()
-        plan = rrtik.plan(problem, seconds=LIMIT, seed=number)
-        spent.append(time.process_time() - begin)
+    seconds, plan = least(lambda: rrtik.plan(problem, seconds=LIMIT, seed=number), ROUNDS)
     solvable = plan.found or rrtik.plan(problem, seconds=LONG, seed=number + 1).found
     if plan.path is None:
-        return Pair(False, solvable, min(spent), False, 0)
+        return Pair(False, solvable, seconds, False, 0)
     faults = int(Judge(problem.world).cuts(plan.path.waypoints) > 0.0)
     for tip, pose in wanted.items():
         away = pose.actInv(_place(problem.robot, plan.path.end, tip))
         faults += int(np.linalg.norm(away.translation) > NEAR or np.linalg.norm(pin.log3(away.rotation)) > TURNED)
-    return Pair(True, solvable, min(spent), bool(plan.proven), int(faults))
+    return Pair(True, solvable, seconds, bool(plan.proven), int(faults))
 
 
 @cache

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
+from functools import partial
 
 import rrtik_ompl as rrtik
 from bench.constraints.judge import judged
 from bench.constraints.problems import generated
+from bench.shared.clocks import spent
 from bench.shared.problems import goal_joints
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.ik.held_tables import held_tables
@@ -67,12 +68,11 @@ def measured(name: str, kind: str, seed: int) -> Outcome:
     times: dict[str, list[float]] = {"cbirrt": [], "auto": []}
     plans = {"cbirrt": first, "auto": first}
     for _ in range(ROUNDS if first.found else 0):
-        for planner, spent in times.items():
-            begin = time.process_time()
-            plans[planner] = rrtik.plan(problem, planner, seconds=WALL * LIMIT, seed=seed)
-            spent.append(time.process_time() - begin)
+        for planner, taken in times.items():
+            seconds, plans[planner] = spent(partial(rrtik.plan, problem, planner, seconds=WALL * LIMIT, seed=seed))
+            taken.append(seconds)
     search, whole = plans["cbirrt"], plans["auto"]
-    found = search.found and whole.found and max(min(spent) for spent in times.values()) <= LIMIT
+    found = search.found and whole.found and max(min(taken) for taken in times.values()) <= LIMIT
     apart = not search.found and "keeps start and goal apart" in search.reason
     solvable = search.found or rrtik.plan(problem, "cbirrt", seconds=LONG, seed=seed + 1).found
     seen = [judged(problem, plan.path.waypoints) for plan in (search, whole) if plan.path is not None]
@@ -119,11 +119,9 @@ def branches(name: str, kind: str, seed: int) -> Branches:
         return Branches(False, False, False, 0.0)
     world = rrtik.World(crowded.robot)
     problem = rrtik.Problem(world, crowded.start, crowded.goal, constraints=crowded.constraints)
-    begin = time.process_time()
-    plan = rrtik.plan(problem, "cbirrt", seconds=LIMIT, seed=seed)
-    spent = time.process_time() - begin
+    seconds, plan = spent(lambda: rrtik.plan(problem, "cbirrt", seconds=LIMIT, seed=seed))
     apart = not plan.found and "keeps start and goal apart" in plan.reason
-    return Branches(plan.found, apart, joined_without_obstacles(problem, seed, EXPLORED), spent)
+    return Branches(plan.found, apart, joined_without_obstacles(problem, seed, EXPLORED), seconds)
 
 
 def joined_without_obstacles(problem: rrtik.Problem, seed: int, samples: int) -> bool:

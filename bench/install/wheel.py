@@ -7,7 +7,6 @@ own cache: run it twice, and the second run is what the page should tell of.
 from __future__ import annotations
 
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -19,6 +18,7 @@ from zipfile import ZipFile
 
 from typer import Option
 
+from bench.shared.clocks import of_children
 from bench.shared.run import Run
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
@@ -153,12 +153,11 @@ def imports(report: Report, python: Path) -> None:
 
 def first_command(report: Report, python: Path, folder: Path) -> None:
     """README's first command, with an empty cache; whether it compiles a kernel, and how large its page is."""
-    cache, before = folder / "cache", resource.getrusage(resource.RUSAGE_CHILDREN)
     command = [str(python.with_name("rrtik")), *FIRST_COMMAND]
-    environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
-    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    environment = {**os.environ, "XDG_CACHE_HOME": str(folder / "cache")}
+    spent, done = of_children(
+        lambda: subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=True)
+    )
     compiled = [line for line in done.stderr.splitlines() if "compiling" in line]
     said = "; ".join(compiled) or f"none; {spent:.1f} s of processor time"
     report.bar("kernels that README's first command compiles", "none", said, not compiled)
@@ -175,7 +174,4 @@ def measured(python: Path, line: str) -> tuple[float, float]:
 
 def run(command: Sequence[str], **environment: str) -> float:
     """Run a command to its end; its processor time [s]."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(command, check=True, env={**os.environ, **environment})
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return of_children(lambda: subprocess.run(command, check=True, env={**os.environ, **environment}))[0]

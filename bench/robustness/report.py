@@ -18,6 +18,7 @@ from bench import fuzz
 from bench.robustness import bad_clients, bad_pages, faults
 from bench.robustness.bad_inputs import bad
 from bench.robustness.long_work import WORK
+from bench.shared.clocks import resident
 from bench.shared.parts import Parts
 from bench.shared.run import Run
 from rrtik_bench.report.page import Report
@@ -61,13 +62,8 @@ def memory(what: str, count: int) -> list[float]:
                 view(problem, path, html=Path(folder) / "page.html")
             if number % max(count // LOOKS, 1) == 0:
                 gc.collect()
-                sizes.append(_resident())
+                sizes.append(resident())
     return sizes
-
-
-def _resident() -> float:
-    words = Path("/proc/self/statm").read_text(encoding="ascii").split()
-    return int(words[1]) * 4096 / 1e6
 
 
 def main(

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
+from bench.shared.clocks import spent
 from rrtik_ompl import Box, Obstacle, Problem, Scene, World, load_robot, plan, pose
 
 PLANNER, BUSY = "fastrrtconnect", 20.0  # [s]: no clock ends a search on a busy machine
@@ -39,13 +37,6 @@ class Among:
     motions: list[int]
     found: int
     free: float
-
-
-def spent(call: Callable[[], Any]) -> tuple[float, Any]:
-    """Processor time of a call [s], and what it returns."""
-    begin = time.process_time()
-    returned = call()
-    return time.process_time() - begin, returned
 
 
 def scene_of(count: int) -> Scene:

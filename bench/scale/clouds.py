@@ -11,7 +11,8 @@ from pathlib import Path
 import coal
 import numpy as np
 
-from bench.scale.boxes import BUSY, PLANNER, spent
+from bench.scale.boxes import BUSY, PLANNER
+from bench.shared.clocks import spent
 from rrtik_ompl import Obstacle, PointCloud, Problem, ProblemError, Robot, Scene, World, load_robot, plan
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.geometry.collision.bodies import link_bodies

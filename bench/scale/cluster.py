@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-import os
 import socket
 import subprocess
 import sys
@@ -12,9 +11,10 @@ import time
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import numpy as np
+
+from bench.shared.clocks import of_process
 
 TASKS = 60
 PROBLEM = "planar3_boxes"
@@ -53,22 +53,16 @@ def on_workers(workers: int) -> Measured:
             with Client(address, timeout=120) as client:
                 client.wait_for_workers(workers, timeout=120)
             plan_batch([PROBLEM] * workers, "fastrrtconnect", seed=1, scheduler=address)  # kernels are loaded
-            before, begin = _spent(scheduler.pid), time.perf_counter()
+            before, begin = of_process(scheduler.pid), time.perf_counter()
             rows = plan_batch([PROBLEM] * TASKS, "fastrrtconnect", seed=1, scheduler=address)
             wall = time.perf_counter() - begin
-            booked = (_spent(scheduler.pid) - before) / TASKS
+            booked = (of_process(scheduler.pid) - before) / TASKS
         finally:
             for process in started:
                 process.kill()
                 process.wait()
     plain = float(np.mean([row.get("plan_seconds", 0.0) for row in rows]))
     return Measured(workers, wall, booked, plain, sum(row["status"] == "solved" for row in rows))
-
-
-def _spent(pid: int) -> float:
-    """Processor time of a process so far [s]."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from bench.peers.libraries.ompl_callback import Checker
+from bench.shared.clocks import spent
 from bench.speed.cases import (
     REACHES,
     Options,
@@ -25,7 +26,7 @@ from bench.speed.cases import (
     uniform,
     without_itself,
 )
-from bench.speed.ours import joint_values, timed
+from bench.speed.ours import joint_values
 from rrtik_bench.report.page import Report
 from rrtik_ompl import World, load_robot
 from rrtik_ompl.base.arrays import Matrix
@@ -98,7 +99,7 @@ def _along_free(world: World, options: Options) -> tuple[float, int] | None:
         return None
     V, W = (np.ascontiguousarray(part) for part in np.array(found[:wanted]).transpose(1, 0, 2))
     steps, fast = np.full(len(V), STEPS), world.fast
-    best = min(timed(lambda: fast.classify_edges(V, W, steps))[0] for _ in range(REPEATS))
+    best = min(spent(lambda: fast.classify_edges(V, W, steps))[0] for _ in range(REPEATS))
     return 1e9 * best / (len(V) * (STEPS + 1)), len(V)
 
 
@@ -131,8 +132,8 @@ def _exact_batch(world: World, Q: Matrix) -> tuple[list[str], float, float]:
     costs, answers = [], []
     for _ in range(3):
         runs = [
-            timed(lambda: world.valid_batch(Q)),
-            *(timed(partial(_one_by_one, peer, world, some)) for peer in peers),
+            spent(lambda: world.valid_batch(Q)),
+            *(spent(partial(_one_by_one, peer, world, some)) for peer in peers),
         ]
         costs.append([1e6 * seconds / len(rows) for (seconds, _), rows in zip(runs, (Q, some, some), strict=True)])
         answers = [found for _, found in runs]

@@ -11,6 +11,7 @@ import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 
+from bench.shared.clocks import spent
 from rrtik_ompl import Problem, World
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.budget import Budget
@@ -60,8 +61,8 @@ def ompl_overhead(problem: Problem, *, seconds: float, seed: int) -> Callable[[]
     usual, inside = ConnectSearch.solve, []
 
     def clocked(*arguments: Any, **options: Any) -> Any:
-        spent, path = timed(lambda: usual(*arguments, **options))
-        inside.append(spent)
+        taken, path = spent(lambda: usual(*arguments, **options))
+        inside.append(taken)
         return path
 
     def solve() -> tuple[float, float]:
@@ -69,7 +70,7 @@ def ompl_overhead(problem: Problem, *, seconds: float, seed: int) -> Callable[[]
         inside.clear()
         condition = ob.timedPlannerTerminationCondition(seconds)
         with patch.object(ConnectSearch, "solve", clocked):
-            whole, _ = timed(lambda: setup.solve(condition))
+            whole, _ = spent(lambda: setup.solve(condition))
         if not inside:
             raise RuntimeError(f"planner {PLANNER} did not call ConnectSearch.solve: its share cannot be told")
         return whole, sum(inside)
@@ -80,13 +81,6 @@ def ompl_overhead(problem: Problem, *, seconds: float, seed: int) -> Callable[[]
 def joint_values(world: World, Q: Matrix) -> Matrix:
     """Values of the joints of the chain, mimic joints resolved, shape (m, joints)."""
     return np.asarray(Q @ world.robot.chain.gain.T + world.robot.chain.offset)
-
-
-def timed(call: Callable[[], Any]) -> tuple[float, Any]:
-    """CPU seconds of this process that a call took, and what it returned."""
-    begin = time.process_time()
-    result = call()
-    return time.process_time() - begin, result
 
 
 def warm_up(problem: Problem) -> None:

@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 from bench.peers.description import task_of
 from bench.peers.libraries import roboplan, vamp
 from bench.peers.task import PER_RADIAN, Search, Task
+from bench.shared.clocks import spent
 from bench.speed.cases import Options, exact_problem, family, panda_files, shipped_problems, sphere_problem
-from bench.speed.ours import PLANNER, ompl_overhead, our_search, timed, warm_up
+from bench.speed.ours import PLANNER, ompl_overhead, our_search, warm_up
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, plan
 from rrtik_ompl.base.arrays import Matrix, Vector
@@ -53,7 +54,7 @@ def spheres(options: Options, report: Report) -> None:
         ours = our_search(problem, seconds=options.limit, per_radian=PER_RADIAN)
         if number == 0:
             warm_up(problem)
-        runs = [timed(partial(ours, options.seed)) for _ in range(REPEATS)]
+        runs = [spent(partial(ours, options.seed)) for _ in range(REPEATS)]
         times["ours"].append(min(seconds for seconds, _ in runs))
         rows = runs[0][1]
         found += rows is not None
@@ -61,11 +62,11 @@ def spheres(options: Options, report: Report) -> None:
         as_certified += _verified(problem, rows)
         if HAS_ROBOPLAN:
             peer = _peer(problem, options.limit, roboplan.search)
-            calls = [timed(partial(peer, options.seed))[0] for _ in range(REPEATS)]
+            calls = [spent(partial(peer, options.seed))[0] for _ in range(REPEATS)]
             times["roboplan"].append(min(calls))
         if HAS_VAMP:
             theirs = vamp.search(problem)
-            inner_calls = [timed(theirs) for _ in range(REPEATS)]
+            inner_calls = [spent(theirs) for _ in range(REPEATS)]
             times["VAMP, call"].append(min(seconds for seconds, _ in inner_calls))
             times["VAMP, inner"].append(min(inner for _, (_, inner) in inner_calls))
     table = _rows(times, "ours")
@@ -99,7 +100,7 @@ def exact(options: Options, report: Report) -> None:
             warm_up(problem)
         for name, search in _exact_searches(problem, options).items():
             begin = time.perf_counter()
-            seconds, rows = timed(partial(search, options.seed))
+            seconds, rows = spent(partial(search, options.seed))
             wall += [time.perf_counter() - begin] if name == "plan()" else []
             times[name].append(seconds)
             by_family.setdefault(family(file), _times(*names))[name].append(seconds)

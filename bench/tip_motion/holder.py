@@ -5,7 +5,6 @@ An interrupted run goes on where it was.
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
+from bench.shared.clocks import least
 from bench.shared.parts import Parts
 from bench.shared.run import Run
 from bench.tip_motion.judge import Judge
@@ -86,18 +86,14 @@ def scene_of(number: int) -> tuple[World, rrtik.Task]:
 def drawn_out(number: int) -> Drawn:
     """One scene, planned and judged."""
     world, task = scene_of(number)
-    spent = []
-    for _ in range(ROUNDS):
-        since = time.process_time()
-        plan = task.plan(world, "ready", seconds=LIMIT, seed=number)
-        spent.append(time.process_time() - since)
+    seconds, plan = least(lambda: task.plan(world, "ready", seconds=LIMIT, seed=number), ROUNDS)
     faults, before = 0, world.robot.posture("ready")
     for path, around in zip(plan.paths, plan.worlds, strict=True):
         faults += Judge(around).cuts(path.waypoints, EVERY) > 0.0 or np.abs(path.start - before).max() > 1e-9
         before = path.end
     room = _room(plan.worlds[2], plan.paths[2].waypoints) if plan.found else float("inf")
     proven = sum(path.proven for path in plan.paths)
-    return Drawn(plan.found, min(spent), len(plan.paths), proven, int(faults), room, plan.reason)
+    return Drawn(plan.found, seconds, len(plan.paths), proven, int(faults), room, plan.reason)
 
 
 def _room(world: World, rows: Matrix) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from functools import cache, partial
 
@@ -10,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
+from bench.shared.clocks import least
 from bench.tip_motion.judge import Judge
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.world.world import World
@@ -61,11 +61,7 @@ def line_of(arm: str, number: int, brute: bool) -> Line:
         if world.valid_batch(np.stack([q, other])).all() and world.certify(np.stack([q, other])).all():
             break
     begin, end = robot.fk(q), robot.fk(other)
-    spent = []
-    for _ in range(ROUNDS):
-        since = time.process_time()
-        made = rrtik.straight(world, q, end)
-        spent.append(time.process_time() - since)
+    seconds, made = least(lambda: rrtik.straight(world, q, end), ROUNDS)
     judge = Judge(world)
     off = turned = jump = cut = 0.0
     if made.path is not None:
@@ -76,7 +72,7 @@ def line_of(arm: str, number: int, brute: bool) -> Line:
         length=float(np.linalg.norm(end.translation - begin.translation)),
         fraction=made.fraction,
         brute=_brute(judge, q, begin, end, rng) if brute and made.fraction < 1.0 else float("nan"),
-        seconds=min(spent),
+        seconds=seconds,
         waypoints=0 if made.path is None else len(made.path.waypoints),
         off=off,
         turned=turned,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
@@ -11,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
+from bench.shared.clocks import least
 from bench.tip_motion.judge import Judge
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.tasks.stages import Stage
@@ -134,11 +134,7 @@ def carried(arm: str, number: int) -> Done:
     """One scene of an arm."""
     case = CASES[arm](number)
     task = rrtik.Task([rrtik.Alternatives(case.grasps), case.lift, rrtik.Alternatives(case.places)])
-    spent = []
-    for _ in range(ROUNDS):
-        since = time.process_time()
-        plan = task.plan(case.world, case.start, seconds=20.0, seed=number)
-        spent.append(time.process_time() - since)
+    seconds, plan = least(lambda: task.plan(case.world, case.start, seconds=20.0, seed=number), ROUNDS)
     faults, before = 0, case.world.robot.posture(case.start)
     for path, world in zip(plan.paths, plan.worlds, strict=True):
         faults += Judge(world).cuts(path.waypoints) > 0.0 or np.abs(path.start - before).max() > 1e-9
@@ -146,7 +142,7 @@ def carried(arm: str, number: int) -> Done:
     return Done(
         found=plan.found,
         brute=plan.found or _brute(case),
-        seconds=min(spent),
+        seconds=seconds,
         motions=len(plan.paths),
         faults=int(faults),
         proven=sum(path.proven for path in plan.paths),

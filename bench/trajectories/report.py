@@ -5,14 +5,13 @@ toppra and ruckig, which judge, come with the extra ``test``.
 
 from __future__ import annotations
 
-import time
 import warnings
-from collections.abc import Callable
 from typing import Annotated
 
 import numpy as np
 from typer import Option
 
+from bench.shared.clocks import least
 from bench.shared.parts import Parts
 from bench.shared.run import Run, Sets
 from bench.trajectories import judges
@@ -107,7 +106,7 @@ def times(report: Report) -> None:
         path, limits = JointPath(waypoints), judges.PANDA
         brisk = RateLimits(limits.velocity, limits.acceleration)
         slack = RateLimits(limits.velocity, limits.acceleration, 10.0 * limits.acceleration)
-        spent = [1e3 * least(lambda p=path, r=rates: _timed(p, r)) for rates in (brisk, limits, slack)]  # type: ignore[misc]
+        spent = [1e3 * least(lambda p=path, r=rates: _timed(p, r), ROUNDS)[0] for rates in (brisk, limits, slack)]  # type: ignore[misc]
         rows.append([name, *(f"{ms:.2f}" for ms in spent)])
         report.bar(f"{name} of 100 waypoints, 7 joints", "<= 1 ms", f"{spent[0]:.2f} ms", spent[0] <= 1.0)
         report.bar(f"{name}, with jerk limits", "<= 5 ms", f"{max(spent[1:]):.2f} ms", max(spent[1:]) <= 5.0)
@@ -121,13 +120,3 @@ def _timed(path: JointPath, limits: RateLimits) -> Trajectory | None:
     return blended(
         path, vertices(path.waypoints), limits, 0.1, np.inf, lambda motion, off_path: np.zeros(0, dtype=np.int64)
     )
-
-
-def least(work: Callable[[], object]) -> float:
-    """Least processor time of a few rounds [s]."""
-    spent = []
-    for _ in range(ROUNDS):
-        begin = time.process_time()
-        work()
-        spent.append(time.process_time() - begin)
-    return min(spent)

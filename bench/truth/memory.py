@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import gc
-from pathlib import Path
 
 import numpy as np
 
+from bench.shared.clocks import resident
 from bench.shared.parts import Parts
 from rrtik_bench.report.page import Report
 from rrtik_ompl import Obstacle, PointCloud, Scene, World, load_robot, plan
@@ -33,13 +33,8 @@ def scans(count: int) -> list[list[float]]:
         if number % EVERY == EVERY - 1 or number == count - 1:
             gc.collect()
             living = sum(isinstance(each, Cloud) for each in gc.get_objects())
-            told.append([float(living), _resident()])
+            told.append([float(living), resident()])
     return told
-
-
-def _resident() -> float:
-    words = Path("/proc/self/statm").read_text(encoding="ascii").split()
-    return int(words[1]) * 4096 / 1e6
 
 
 def section(parts: Parts, size: float) -> Report:

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.shared.clocks import of_process
 from bench.shared.run import Run
 from bench.speed.machine import machine
 from rrtik_bench.report.page import Report
@@ -107,10 +108,10 @@ def of_commands(report: Report, closed: Path, folder: Path) -> None:
             script = [sys.executable, "-c", "from rrtik_ompl.cli.entry import main; main()", *own]
             process = subprocess.Popen(script, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             time.sleep(rng.uniform(3.0, 9.0))
-            before = _spent(process.pid)
+            before = of_process(process.pid)
             os.kill(process.pid, signal.SIGINT)  # send_signal would first take away one that ended by itself
             os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
-            taken.append(1e3 * (_spent(process.pid) - before))
+            taken.append(1e3 * (of_process(process.pid) - before))
             codes.add(process.wait())
         rows.append([name, str(len(taken)), ", ".join(map(str, sorted(codes))), *(f"{f(taken):.1f}" for f in _BOTH)])
         held = max(taken) <= WANTED and codes == {INTERRUPTED}
@@ -119,13 +120,6 @@ def of_commands(report: Report, closed: Path, folder: Path) -> None:
 
 
 _BOTH = (np.median, max)
-
-
-def _spent(process: int) -> float:
-    """Processor time of a process so far, its children's left out, to the tick of the system's clock [s]."""
-    after_the_name = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-    user, system = after_the_name[11:13]
-    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
 def main(run: Run) -> Report:
