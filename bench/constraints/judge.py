@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
-import coal
 import numpy as np
 import pinocchio as pin
 
+from bench.shared.judge import Contacts
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.world.problem import Problem
 
@@ -42,6 +42,7 @@ def judged(problem: Problem, rows: Matrix) -> Verdict:
     model, data = robot.model, robot.model.createData()
     frame = model.getFrameId(robot.tip)
     dense = _dense(problem, rows)
+    judge = Contacts(problem.world)
     full = robot.pinocchio_configuration(dense)
     first, metres, radians, tilt, contacts = None, 0.0, 0.0, 1.0, 0
     low, high = region.bounds.T
@@ -55,7 +56,7 @@ def judged(problem: Problem, rows: Matrix) -> Verdict:
         metres = max(metres, float(np.linalg.norm(D.translation - np.clip(D.translation, low[:3], high[:3]))))
         radians = max(radians, _angle(D.rotation, low[3:], high[3:]))
         if number % CONTACTS == 0:
-            contacts += _touching(problem, data)
+            contacts += any(True for _ in judge.depths(dense[number]))
     beyond = max(metres - region.position_tolerance, 0.0), max(radians - region.orientation_tolerance, 0.0)
     return Verdict(
         beyond[0], float(np.degrees(beyond[1])), float(np.degrees(np.arccos(min(tilt, 1.0)))), contacts, len(dense)
@@ -79,21 +80,3 @@ def _angle(R: Matrix, low: Matrix, high: Matrix) -> float:
     if (high - low > 6.0).any():  # yaw is free
         return float(np.arccos(np.clip(R[2, 2], -1.0, 1.0)))
     return float(np.linalg.norm(pin.log3(R)))
-
-
-def _touching(problem: Problem, data: pin.Data) -> bool:
-    """Whether any pair of bodies touches, by coal."""
-    bodies, request, result = problem.world.bodies, coal.CollisionRequest(), coal.CollisionResult()
-    places = [data.oMi[body.joint] * body.placement for body in bodies]
-    centres = np.array([place.act(body.geometry.aabb_center) for place, body in zip(places, bodies, strict=True)])
-    radii = np.array([body.geometry.aabb_radius for body in bodies])
-    first, second = np.array(problem.world.pairs).T
-    near = np.linalg.norm(centres[first] - centres[second], axis=1) <= radii[first] + radii[second]
-    for i, j in zip(first[near].tolist(), second[near].tolist(), strict=True):
-        if bodies[i].joint == 0 and bodies[j].joint == 0:
-            continue
-        result.clear()
-        one, two = (coal.Transform3s(places[k].rotation, places[k].translation) for k in (i, j))
-        if coal.collide(bodies[i].geometry, one, bodies[j].geometry, two, request, result):
-            return True
-    return False

@@ -9,12 +9,12 @@ from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from bench.shared.clocks import least
+from bench.shared.judge import distance
 from bench.shared.parts import Parts
 from bench.shared.run import Run
 from bench.tip_motion.judge import Judge
@@ -98,17 +98,16 @@ def drawn_out(number: int) -> Drawn:
 
 def _room(world: World, rows: Matrix) -> float:
     """The least distance between the tool and its holder at 1/50 of every motion [m], below 0 if they touch."""
-    judge, least = Judge(world), np.inf
+    model, data = world.robot.model, world.robot.model.createData()
+    least = np.inf
     tool = next(body for body in world.bodies if body.name == "tool")
     walls = [body for body in world.bodies if body.name.startswith("holder")]
     dense = [a + share * (b - a) for a, b in pairwise(rows) for share in np.linspace(0.0, 1.0, 51)]
     for full in world.robot.pinocchio_configuration(np.array(dense)):
-        pin.forwardKinematics(judge.model, judge.data, full)
-        for wall in walls:
-            result = coal.DistanceResult()
-            ends = tool.geometry, judge.place(tool), wall.geometry, judge.place(wall)
-            least = min(least, coal.distance(*ends, coal.DistanceRequest(), result))
-    return float(least)
+        pin.forwardKinematics(model, data, full)
+        here = data.oMi[tool.joint] * tool.placement
+        least = min(least, *(distance(tool.geometry, here, wall.geometry, wall.placement) for wall in walls))
+    return least
 
 
 def _kind(reason: str) -> str:

@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 
-import coal
 import numpy as np
 import pinocchio as pin
 
+from bench.shared.judge import Contacts
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.world.world import World
 
 SAMPLES = 50  # of each motion
@@ -30,9 +29,10 @@ class Judge:
     """One world, seen through pinocchio and coal."""
 
     def __init__(self, world: World) -> None:
-        self.robot, self.world = world.robot, world
+        self.robot = world.robot
         self.model, self.data = world.robot.model, world.robot.model.createData()
         self.frame = self.model.getFrameId(world.robot.tip)
+        self._contacts = Contacts(world)
 
     def tip(self, q: Vector) -> pin.SE3:
         """T_world_tip."""
@@ -41,19 +41,7 @@ class Judge:
 
     def depth(self, q: Vector) -> float:
         """How deep anything enters anything else [m]; 0 if nothing touches."""
-        pin.forwardKinematics(self.model, self.data, self.robot.pinocchio_configuration(q)[0])
-        bodies, deepest = self.world.bodies, 0.0
-        places = [self.place(body) for body in bodies]
-        for i, j in self.world.pairs:
-            request, result = coal.CollisionRequest(), coal.CollisionResult()
-            if coal.collide(bodies[i].geometry, places[i], bodies[j].geometry, places[j], request, result):
-                deepest = max(deepest, -result.getContact(0).penetration_depth, TOUCHES)
-        return deepest
-
-    def place(self, body: Body) -> coal.Transform3s:
-        """Where a body is in the configuration that was looked at last."""
-        pose = body.placement if body.joint == 0 else self.data.oMi[body.joint] * body.placement
-        return coal.Transform3s(pose.rotation, pose.translation)
+        return max((max(depth, TOUCHES) for depth in self._contacts.depths(q)), default=0.0)
 
     def strays(self, rows: Matrix, begin: pin.SE3, end: pin.SE3, samples: int = SAMPLES) -> tuple[float, float]:
         """How far the tip leaves a line between two poses at some samples of each motion [m, rad].

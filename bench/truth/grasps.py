@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 import rrtik_ompl as rrtik
+from bench.shared.judge import distance
 from bench.shared.parts import Parts
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.arrays import Matrix, Vector
@@ -238,7 +239,7 @@ class Judge:
         for full in self._rows(path, STEP):
             self._at(full)
             pose = self._data.oMf[frame] * grasp
-            found.append(max(-_gap(self._case.thing, pose, solid, place) for solid, place in self._case.solids))
+            found.append(max(-distance(self._case.thing, pose, solid, place) for solid, place in self._case.solids))
         return np.array(found)
 
     def links(self, path: rrtik.JointPath, thing: pin.SE3 | None) -> float:
@@ -249,14 +250,8 @@ class Judge:
             self._at(full)
             for joint, placement, geometry in self._links:
                 pose = self._data.oMi[joint] * placement
-                deepest = max(deepest, *(-_gap(geometry, pose, solid, place) for solid, place in others))
+                deepest = max(deepest, *(-distance(geometry, pose, solid, place) for solid, place in others))
         return deepest
-
-
-def _gap(first: coal.CollisionGeometry, pose: pin.SE3, second: coal.CollisionGeometry, place: pin.SE3) -> float:
-    ends = [coal.Transform3s(each.rotation, each.translation) for each in (pose, place)]
-    result = coal.DistanceResult()
-    return float(coal.distance(first, ends[0], second, ends[1], coal.DistanceRequest(), result))
 
 
 def section(parts: Parts, size: float) -> Report:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 import yaml
 
+from bench.shared.judge import distance
 from rrtik_ompl.base.arrays import Matrix, Vector
 
 SLIDES = (("x", "base", "a", "1 0 0"), ("y", "a", "b", "0 1 0"), ("z", "b", "tool", "0 0 1"))
@@ -130,13 +132,10 @@ class Case:
     def distance(self, q: Vector) -> float:
         """Of the nearest part from the nearest obstacle at a configuration [m], by coal."""
         tool = self.base * at(*q)
-        request, result, least = coal.DistanceRequest(), coal.DistanceResult(), np.inf
-        for part, place in self.parts:
-            for solid, stands in self.obstacles:
-                result.clear()
-                poses = [coal.Transform3s(T.rotation, T.translation) for T in (tool * place, stands)]
-                least = min(least, coal.distance(part, poses[0], solid, poses[1], request, result))
-        return least
+        pairs = product(self.parts, self.obstacles)
+        return min(
+            (distance(part, tool * place, solid, there) for (part, place), (solid, there) in pairs), default=np.inf
+        )
 
     def tip(self, q: Vector) -> Vector:
         """Where the tool is at a configuration."""

@@ -10,12 +10,11 @@ from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 
-import coal
 import numpy as np
-import pinocchio as pin
 from ompl import geometric as og
 from ompl import util as ou
 
+from bench.shared.judge import Contacts
 from bench.shared.parts import Parts
 from bench.truth import own_planners
 from rrtik_bench.report.page import Report
@@ -90,28 +89,10 @@ def deepest(world: World, rows: Matrix, looks: int) -> float:
 
     In steps of half the motion resolution, evenly fewer if these are more than ``looks``.
     """
-    model, data = world.robot.model, world.robot.model.createData()
-    bodies, pairs = world.bodies, np.array(world.pairs, dtype=int).reshape(-1, 2)
-    for body in bodies:
-        body.geometry.computeLocalAABB()
-    middles = [body.geometry.aabb_center for body in bodies]
-    reach = np.array([body.geometry.aabb_radius for body in bodies])
-    deep = 0.0
+    contacts = Contacts(world)
     counts = [world.steps(a, b, world.motion_resolution / 2.0) for a, b in pairwise(rows)]
     dense = subdivided(rows, np.array(counts))[0]
-    for row in dense[:: -(-len(dense) // looks)]:
-        pin.forwardKinematics(model, data, world.robot.pinocchio_configuration(row[None])[0])
-        places = [data.oMi[body.joint] * body.placement for body in bodies]
-        balls = np.array([place.act(middle) for place, middle in zip(places, middles, strict=True)])
-        with np.errstate(over="ignore"):  # the ball of a half-space
-            apart = np.linalg.norm(balls[pairs[:, 0]] - balls[pairs[:, 1]], axis=1) > reach[pairs].sum(axis=1)
-        for pair in pairs[~apart].tolist():
-            poses = [coal.Transform3s(places[k].rotation, places[k].translation) for k in pair]
-            first, second = (bodies[k].geometry for k in pair)
-            request, result = coal.CollisionRequest(), coal.CollisionResult()
-            if coal.collide(first, poses[0], second, poses[1], request, result):
-                deep = max(deep, max(abs(contact.penetration_depth) for contact in result.getContacts()))
-    return deep
+    return max((depth for row in dense[:: -(-len(dense) // looks)] for depth in contacts.depths(row)), default=0.0)
 
 
 def exact_runs(problem_name: str, name: str, given: bool, seeds: int) -> tuple[dict[str, int], list[str]]:

@@ -16,10 +16,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
+from bench.shared.judge import distance
 from bench.shared.parts import Parts
 from bench.truth.robot_files import CASES, MENTIONED, misspelt, mjcf_arm, srdf_of, urdf_arm
 from rrtik_bench.report.page import Report
@@ -281,10 +281,7 @@ class _UrdfJudge:
         deepest = -np.inf
         for a, b in self._pairs():
             poses = [self._data.oMi[each.parentJoint] * each.placement for each in (a, b)]
-            ends = [coal.Transform3s(pose.rotation, pose.translation) for pose in poses]
-            result = coal.DistanceResult()
-            gap = coal.distance(a.geometry, ends[0], b.geometry, ends[1], coal.DistanceRequest(), result)
-            deepest = max(deepest, -float(gap))
+            deepest = max(deepest, -distance(a.geometry, poses[0], b.geometry, poses[1]))
         return deepest
 
     def _pairs(self) -> Iterator[tuple[Any, Any]]:

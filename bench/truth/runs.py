@@ -16,6 +16,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from bench.shared.judge import overlap
 from bench.shared.parts import Parts
 from rrtik_bench.report.page import Report
 from rrtik_ompl import (
@@ -328,14 +329,9 @@ def _any_touch(
                     gap = np.linalg.norm(there.act(np.asarray(solid.aabb_center)) - centre)
                     if gap > link.aabb_radius + solid.aabb_radius:
                         continue
-                if _overlap(link, place, solid, there):
+                if overlap(link, place, solid, there) is not None:
                     return True
     return False
-
-
-def _overlap(first: coal.CollisionGeometry, a: pin.SE3, second: coal.CollisionGeometry, b: pin.SE3) -> bool:
-    ends = first, coal.Transform3s(a.rotation, a.translation), second, coal.Transform3s(b.rotation, b.translation)
-    return bool(coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()))
 
 
 def section(parts: Parts, size: float) -> Report:
