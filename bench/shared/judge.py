@@ -29,7 +29,7 @@ def overlap(first: Any, pose: pin.SE3, second: Any, place: pin.SE3) -> float | N
     result = coal.CollisionResult()
     if not coal.collide(first, placed(pose), second, placed(place), coal.CollisionRequest(), result):
         return None
-    return max(abs(contact.penetration_depth) for contact in result.getContacts())
+    return max(float(abs(contact.penetration_depth)) for contact in result.getContacts())
 
 
 class Contacts:

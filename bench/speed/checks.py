@@ -131,7 +131,7 @@ def _exact_batch(world: World, Q: Matrix) -> tuple[list[str], float, float]:
     world.valid_batch(Q[:1])
     costs, answers = [], []
     for _ in range(3):
-        runs = [
+        runs: list[tuple[float, Any]] = [
             spent(lambda: world.valid_batch(Q)),
             *(spent(partial(_one_by_one, peer, world, some)) for peer in peers),
         ]

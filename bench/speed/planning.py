@@ -106,8 +106,8 @@ def exact(options: Options, report: Report) -> None:
             by_family.setdefault(family(file), _times(*names))[name].append(seconds)
             verified[name] += _verified(problem, rows)
     head = ["", "problems", "median [us]", "mean [us]", "95 % [us]", "median ratio to the first", "solved and verified"]
-    rows = [[*row, str(verified[row[0]])] for row in _rows(times, names[0])]
-    report.table(title, head, rows)
+    table = [[*row, str(verified[row[0]])] for row in _rows(times, names[0])]
+    report.table(title, head, table)
     cells = [[key, *(f"{1e3 * np.median(v[n]):.3g}" if v[n] else "" for n in names)] for key, v in by_family.items()]
     report.table("Medians by family [ms]", ["", *names], cells)
     own, same = 1e3 * np.array(times["ours, own rule"]), np.array(times[names[0]])

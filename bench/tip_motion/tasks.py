@@ -11,7 +11,7 @@ import pinocchio as pin
 
 import rrtik_ompl as rrtik
 from bench.shared.clocks import least
-from bench.tip_motion.judge import Judge
+from bench.tip_motion.judge import TOUCHES, Judge  # a thing that stands on its table touches it
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.tasks.stages import Stage
 from rrtik_ompl.world.world import World
@@ -137,7 +137,7 @@ def carried(arm: str, number: int) -> Done:
     seconds, plan = least(lambda: task.plan(case.world, case.start, seconds=20.0, seed=number), ROUNDS)
     faults, before = 0, case.world.robot.posture(case.start)
     for path, world in zip(plan.paths, plan.worlds, strict=True):
-        faults += Judge(world).cuts(path.waypoints) > 0.0 or np.abs(path.start - before).max() > 1e-9
+        faults += Judge(world).cuts(path.waypoints) > TOUCHES or np.abs(path.start - before).max() > 1e-9
         before = path.end
     return Done(
         found=plan.found,
