@@ -16,6 +16,7 @@ from numba.core.registry import cpu_target
 
 from rrtik_ompl.kernels.simd import compiled
 from rrtik_ompl.kernels.simd.code_files import PREFIX, Code
+from rrtik_ompl.kernels.simd.records import argument_types
 from rrtik_ompl.kernels.simd.targets import Target
 
 WHOLE = ir.IntType(64)
@@ -49,8 +50,8 @@ def _count(function: Any) -> int:
 
 
 def _overload(function: Any) -> Any:
-    """Numba's result for whole numbers as arguments."""
-    kinds = (types.int64,) * _count(function)
+    """Numba's result for the arguments as they are annotated: whole numbers, and addresses, which are whole numbers."""
+    kinds = argument_types(function.py_func)
     function.compile(kinds)
     return function.overloads[kinds]
 

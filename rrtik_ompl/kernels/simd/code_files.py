@@ -21,7 +21,8 @@ LAYOUT = 3
 CHECK_BYTES = 32
 PACKAGE = "rrtik_ompl.kernels"
 FOLDER = Path(__file__).parent.parent  # of the package's sources
-COMPILER = "simd.compiled"  # its own imports (caches, the processor) do not change what it makes of a kernel
+# Its own imports (caches, the processor) do not change what it makes of a kernel, but for what tables are to numba.
+COMPILER, RECORDS = "simd.compiled", "simd.records"
 PREFIX = "rrtik_"  # of the functions' names in the code
 
 _IMPORT = re.compile(rf"^from {re.escape(PACKAGE)}(?:\.([\w.]+))? import (\([^)]*\)|.*)$", re.MULTILINE)
@@ -56,7 +57,7 @@ def kernel_sources(name: str) -> list[str]:
         module = open_.pop()
         if module not in found:
             found.add(module)
-            open_ += [] if module == COMPILER else _imported(module)
+            open_ += [RECORDS] if module == COMPILER else _imported(module)
     return sorted(found)
 
 

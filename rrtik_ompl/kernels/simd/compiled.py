@@ -17,6 +17,7 @@ from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.sigutils import normalize_signature
 
+import rrtik_ompl.kernels.simd.records  # noqa: F401  what tables and arrays are to numba
 from rrtik_ompl.files.cache import nobody_else_s
 from rrtik_ompl.kernels.simd.code_files import PACKAGE, sources_digest
 from rrtik_ompl.kernels.simd.processor import WIDTH

@@ -1,8 +1,10 @@
 """Memory that Python makes and kernels work on: tables of fields, and the arrays whose addresses the fields hold.
 
-There are two functions for whoever needs a table. :func:`table` makes one that lives long, array by array; an array can
-be replaced by a larger one that :func:`aligned` makes. :class:`TablePlan` is for a table that every call makes anew:
-all its arrays lie in a single piece, for numpy takes as long to give the address of an array as a small kernel runs.
+There are two ways for whoever needs a table. :func:`packed` makes one that lives long, array by array; an array can be
+replaced by a larger one that :func:`aligned` makes. :func:`planned` is for a table that every call makes anew: all its
+arrays lie in a single piece, for numpy takes as long to give the address of an array as a small kernel runs. What a
+table holds is declared in its class, a :class:`rrtik_ompl.kernels.record.Record`; tables that have none yet are made by
+:func:`table` and :class:`TablePlan` of the places of their fields.
 
 Kernels check no bounds. Therefore every array lies between guard words, at least ``ALIGNMENT`` bytes of a pattern
 before and behind it (in a single piece behind it and behind the fields), and ``intact()`` says whether they are as they
@@ -13,18 +15,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.kernels.layout import ALIGNMENT
+from rrtik_ompl.kernels.record import WORD, Record, holds_array, word
 from rrtik_ompl.kernels.simd.processor import WIDTH
 
 Header: TypeAlias = NDArray[np.int64]
+R = TypeVar("R", bound=Record)
 
 GUARD = 0xA5  # each byte of the guard words
-WORD = 8  # bytes
 GUARD_WORDS = ALIGNMENT // WORD
 GUARD_WORD = float(np.full(WORD, GUARD, dtype=np.uint8).view(np.float64)[0])
 COPIED_WORDS = 4096  # up to so many it is quicker to copy a whole piece than to set its guard words
@@ -87,6 +90,33 @@ def table(fields: Mapping[int, int | NDArray[Any]], parts: Sequence[Table] = ())
     header = [placed[place][1] if place in placed else fields[place] for place in range(len(fields))]
     arrays = {place: array for place, (array, _) in placed.items()}
     return Table(aligned(np.array(header, dtype=np.int64)), arrays, tuple(parts))
+
+
+def packed(kind: type[R], **fields: Any) -> R:
+    """A table that lives long, from its fields by name: numbers, arrays to copy, and other tables.
+
+    Numbers that are not given are 0, and so are the addresses of arrays and tables that are not there yet.
+    """
+    placed: dict[int, Any] = dict.fromkeys(kind.places.values(), 0)
+    placed |= {kind.places[name]: value for name, value in fields.items() if isinstance(value, np.ndarray)}
+    made = kind(table(placed))
+    made.put(**{name: value for name, value in fields.items() if not isinstance(value, np.ndarray)})
+    return made
+
+
+def sizes_of(kind: type[Record], **fields: float) -> TablePlan:
+    """Where the arrays of a table of this class lie in a single piece; ``kind(PlannedTable(plan))`` is such a table.
+
+    Args:
+        kind: The class.
+        fields: How many words of 8 bytes each array has, by its name, in the order in which they lie in memory, and
+            the numbers that are not 0.
+    """
+    arrays = [name for name in fields if holds_array(kind.kinds[name])]
+    numbers = {
+        kind.places[name]: word(kind.kinds[name], fields.get(name, 0)) for name in kind.places if name not in arrays
+    }
+    return TablePlan({kind.places[name]: int(fields[name]) for name in arrays}, numbers)
 
 
 def with_own(shared: Table, own: Mapping[int, NDArray[Any]]) -> Table:

@@ -1,29 +1,51 @@
-"""The tables of the kernels for timing: what each field is. All arrays are of float64."""
+"""The tables of the kernels for timing."""
 
 from __future__ import annotations
 
-from typing import NewType
+from rrtik_ompl.kernels.record import Doubles, Record
 
 KERNELS = "timing.kernels"  # their library
-CurveTable = NewType("CurveTable", int)  # of a curve and places on it
-SearchTable = NewType("SearchTable", int)  # of the limits at the points of a grid
 
-# A curve through rounded corners, and where it is wanted. VERTICES: rows of n · ALONG: distance of each vertex from the
-# first one along the path · DIRECTIONS: of the edge behind each vertex, of length 1, rows of n · RADII: how far from
-# each vertex its rounding begins · AT: places, not decreasing · VALUES: rows of 3 n: position, its first and second
-# derivative at each place · WIDEST: the largest of the radii, an array of one
-VERTICES, ALONG, DIRECTIONS, RADII, AT, VALUES, WIDEST = range(7)
-# Numbers: of coordinates, vertices and places
-DOF, COUNT, PLACES = range(7, 10)
 
-# The search, in path speed squared x and path acceleration u at the points of a grid. SHAPE: rows of 3 n as in VALUES ·
-# VELOCITY, ACCELERATION: limits of n coordinates · row r of FIRST, SECOND, LOW, HIGH, R of them at each point, says
-# LOW <= FIRST u + SECOND x <= HIGH · CAP: the largest x of each point; the kernel lowers it by VELOCITY · GRID: places,
-# increasing · SQUARES: x of each point, to be found · REACHED: the largest x from which the end is reached ·
-# LINES: scratch, rows of LINE for one point at a time
-SHAPE, VELOCITY, ACCELERATION, FIRST, SECOND, LOW, HIGH, CAP, GRID, SQUARES, REACHED, LINES = range(12)
-# Numbers: of coordinates, of further rows at a point, and of points
-JOINTS, ROWS, POINTS = range(12, 15)
+class CurveTable(Record):
+    """A curve through rounded corners, and where it is wanted."""
+
+    vertices: Doubles  # rows of n
+    along: Doubles  # distance of each vertex from the first one along the path
+    directions: Doubles  # of the edge behind each vertex, of length 1, rows of n
+    radii: Doubles  # how far from each vertex its rounding begins
+    at: Doubles  # places, not decreasing
+    values: Doubles  # rows of 3 n: position, its first and second derivative at each place
+    widest: float  # the largest of the radii
+    dof: int  # n
+    vertex_count: int
+    place_count: int
+
+
+class SearchTable(Record):
+    """The search, in path speed squared x and path acceleration u at the points of a grid.
+
+    Row r of ``first``, ``second``, ``low``, ``high``, of which each point has ``rows``, says
+    ``low <= first u + second x <= high``.
+    """
+
+    shape: Doubles  # rows of 3 n as the values of a curve
+    velocity: Doubles  # limits of n coordinates
+    acceleration: Doubles
+    first: Doubles
+    second: Doubles
+    low: Doubles
+    high: Doubles
+    cap: Doubles  # the largest x of each point; the velocity limits lower it
+    grid: Doubles  # places, increasing
+    squares: Doubles  # x of each point, to be found
+    reached: Doubles  # the largest x from which the end is reached
+    lines: Doubles  # scratch, rows of LINE for one point at a time
+    joints: int  # n
+    rows: int
+    points: int
+
+
 LINE = 3  # numbers of a line: low, high and slope, for low <= u - slope x <= high
 
 FLAT = 1e-12  # a row whose factor of u is less bounds x alone

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan
-from rrtik_ompl.kernels.timing import layout, reference
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
+from rrtik_ompl.kernels.timing import reference
+from rrtik_ompl.kernels.timing.layout import KERNELS, CurveTable
 from rrtik_ompl.motion.trajectory.cubics import even_parts
 
 LEAST_STEPS = 150  # of the grid along a whole curve
@@ -86,23 +87,19 @@ class Curve:
 
     def at(self, places: Vector) -> Samples:
         """Position and derivatives at places that do not decrease, shape (m,)."""
-        kernels, n = library(layout.KERNELS), self.vertices.shape[1]
+        kernels, n = library(KERNELS), self.vertices.shape[1]
         if kernels is None:
             values = reference.sample_curve(self.vertices, self.along, self.directions, self.radii, places)
         else:
-            task = PlannedTable(_plan(len(self.along), n, len(places)))
-            given = {
-                layout.VERTICES: self.vertices.ravel(),
-                layout.ALONG: self.along,
-                layout.DIRECTIONS: self.directions.ravel(),
-                layout.RADII: self.radii,
-                layout.AT: places,
-                layout.WIDEST: self.radii.max(),
-            }
-            for place, numbers in given.items():
-                task[place][:] = numbers
+            task = CurveTable(PlannedTable(_plan(len(self.along), n, len(places))))
+            task.vertices[:] = self.vertices.ravel()
+            task.along[:] = self.along
+            task.directions[:] = self.directions.ravel()
+            task.radii[:] = self.radii
+            task.at[:] = places
+            task.widest = float(self.radii.max())
             kernels.sample_curve(task.address)
-            values = task[layout.VALUES].reshape(-1, 3 * n)
+            values = task.values.reshape(-1, 3 * n)
         return Samples(values)
 
     def edges(self, places: Vector) -> NDArray[np.int64]:
@@ -148,13 +145,15 @@ class Curve:
 @lru_cache(maxsize=64)
 def _plan(vertices: int, n: int, places: int) -> TablePlan:
     """Where a curve of n coordinates and places on it lie in memory."""
-    arrays = {
-        layout.VERTICES: vertices * n,
-        layout.ALONG: vertices,
-        layout.DIRECTIONS: (vertices - 1) * n,
-        layout.RADII: vertices,
-        layout.AT: places,
-        layout.VALUES: 3 * n * places,
-        layout.WIDEST: 1,
-    }
-    return TablePlan(arrays, {layout.DOF: n, layout.COUNT: vertices, layout.PLACES: places})
+    return sizes_of(
+        CurveTable,
+        vertices=vertices * n,
+        along=vertices,
+        directions=(vertices - 1) * n,
+        radii=vertices,
+        at=places,
+        values=3 * n * places,
+        dof=n,
+        vertex_count=vertices,
+        place_count=places,
+    )

@@ -10,8 +10,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan
-from rrtik_ompl.kernels.timing import layout, reference
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
+from rrtik_ompl.kernels.timing import reference
+from rrtik_ompl.kernels.timing.layout import KERNELS, LINE, SearchTable, line_count
 from rrtik_ompl.kernels.timing.reference import Rows
 from rrtik_ompl.motion.trajectory.curve import Samples
 from rrtik_ompl.motion.trajectory.limits import RateLimits
@@ -89,25 +90,23 @@ class PathTiming:
 
 def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) -> PathTiming:
     """The motion from rest to rest in the shortest time, along a curve that has these samples at the grid."""
-    kernels = library(layout.KERNELS)
+    kernels = library(KERNELS)
     if kernels is None:
         rows, cap = reference.all_rows(samples.values, limits.velocity, limits.acceleration, bounds.rows, bounds.cap)
         squares = reference.find_squares(rows, cap, grid)
     else:
-        task = PlannedTable(_plan(len(grid), len(limits.velocity), bounds.rows.first.shape[1]))
-        given = {
-            layout.SHAPE: samples.values.ravel(),
-            layout.VELOCITY: limits.velocity,
-            layout.ACCELERATION: limits.acceleration,
-            layout.CAP: bounds.cap,
-            layout.GRID: grid,
-        }
-        for place, values in given.items():
-            task[place][:] = values
-        for place, further in zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), bounds.rows, strict=True):
-            task[place][:] = further.ravel()
+        task = SearchTable(PlannedTable(_plan(len(grid), len(limits.velocity), bounds.rows.first.shape[1])))
+        task.shape[:] = samples.values.ravel()
+        task.velocity[:] = limits.velocity
+        task.acceleration[:] = limits.acceleration
+        task.cap[:] = bounds.cap
+        task.grid[:] = grid
+        task.first[:] = bounds.rows.first.ravel()
+        task.second[:] = bounds.rows.second.ravel()
+        task.low[:] = bounds.rows.low.ravel()
+        task.high[:] = bounds.rows.high.ravel()
         kernels.find_squares(task.address)
-        squares = task[layout.SQUARES].copy()
+        squares = task.squares.copy()
     speeds = np.sqrt(squares)
     with np.errstate(divide="ignore"):
         steps = 2.0 * (grid[1:] - grid[:-1]) / (speeds[1:] + speeds[:-1])
@@ -117,15 +116,21 @@ def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) 
 @lru_cache(maxsize=64)
 def _plan(points: int, joints: int, rows: int) -> TablePlan:
     """Where the search for a grid of so many points lies in memory."""
-    arrays = {
-        layout.SHAPE: 3 * joints * points,
-        layout.VELOCITY: joints,
-        layout.ACCELERATION: joints,
-        layout.CAP: points,
-        layout.GRID: points,
-        layout.SQUARES: points,
-        layout.REACHED: points,
-        layout.LINES: layout.LINE * layout.line_count(joints, rows),
-    }
-    arrays |= dict.fromkeys((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), rows * points)
-    return TablePlan(arrays, {layout.JOINTS: joints, layout.ROWS: rows, layout.POINTS: points})
+    return sizes_of(
+        SearchTable,
+        shape=3 * joints * points,
+        velocity=joints,
+        acceleration=joints,
+        cap=points,
+        grid=points,
+        squares=points,
+        reached=points,
+        lines=LINE * line_count(joints, rows),
+        first=rows * points,
+        second=rows * points,
+        low=rows * points,
+        high=rows * points,
+        joints=joints,
+        rows=rows,
+        points=points,
+    )

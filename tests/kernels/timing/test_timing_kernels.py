@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import table
-from rrtik_ompl.kernels.timing import layout, reference
+from rrtik_ompl.kernels.tables.memory import packed
+from rrtik_ompl.kernels.timing import reference
+from rrtik_ompl.kernels.timing.layout import KERNELS, LINE, CurveTable, SearchTable, line_count
 from rrtik_ompl.kernels.timing.reference import Rows
 
 pytestmark = pytest.mark.kernels
@@ -29,15 +30,13 @@ def test_places_on_a_curve(seed, n, count):
     rng = np.random.default_rng(seed)
     curve = random_curve(rng, n, count)
     at = np.sort(np.append(rng.uniform(0.0, curve[1][-1], 50), curve[1]))
-    task = table(
-        dict(zip((layout.VERTICES, layout.ALONG, layout.DIRECTIONS, layout.RADII), curve, strict=True))
-        | {layout.AT: at, layout.VALUES: np.empty((len(at), 3 * n)), layout.WIDEST: np.array([curve[3].max()])}
-        | {layout.DOF: n, layout.COUNT: count, layout.PLACES: len(at)}
-    )
-    library(layout.KERNELS).sample_curve(task.address)
+    given = dict(zip(("vertices", "along", "directions", "radii"), curve, strict=True))
+    counts = {"dof": n, "vertex_count": count, "place_count": len(at)}
+    task = packed(CurveTable, **given, at=at, values=np.empty((len(at), 3 * n)), widest=curve[3].max(), **counts)
+    library(KERNELS).sample_curve(task.address)
     assert task.intact()
     wanted = reference.sample_curve(*curve, at)
-    assert np.allclose(task[layout.VALUES].reshape(wanted.shape), wanted, rtol=1e-9, atol=1e-9)
+    assert np.allclose(task.values.reshape(wanted.shape), wanted, rtol=1e-9, atol=1e-9)
 
 
 @settings(max_examples=30)
@@ -51,16 +50,24 @@ def test_the_fastest_motion(seed, n, extra):
     rows = Rows(first, second, -rng.uniform(0.5, 2.0, (60, extra)), rng.uniform(0.5, 2.0, (60, extra)))
     velocity, acceleration = rng.uniform(0.5, 3.0, (2, n))
     cap = rng.uniform(0.5, 5.0, 60)
-    task = table(
-        {layout.SHAPE: shape, layout.VELOCITY: velocity, layout.ACCELERATION: acceleration}
-        | dict(zip((layout.FIRST, layout.SECOND, layout.LOW, layout.HIGH), rows, strict=True))
-        | {layout.CAP: cap, layout.GRID: grid, layout.SQUARES: np.zeros(60), layout.REACHED: np.zeros(60)}
-        | {layout.LINES: np.zeros(layout.LINE * layout.line_count(n, extra))}
-        | {layout.JOINTS: n, layout.ROWS: extra, layout.POINTS: 60}
+    task = packed(
+        SearchTable,
+        shape=shape,
+        velocity=velocity,
+        acceleration=acceleration,
+        **rows._asdict(),
+        cap=cap,
+        grid=grid,
+        squares=np.zeros(60),
+        reached=np.zeros(60),
+        lines=np.zeros(LINE * line_count(n, extra)),
+        joints=n,
+        rows=extra,
+        points=60,
     )
-    library(layout.KERNELS).find_squares(task.address)
+    library(KERNELS).find_squares(task.address)
     assert task.intact()
-    squares = task[layout.SQUARES]
+    squares = task.squares
     every, most = reference.all_rows(shape, velocity, acceleration, rows, cap)
     assert np.allclose(squares, reference.find_squares(every, most, grid), rtol=1e-6, atol=1e-8)
     u = 0.5 * np.diff(squares) / np.diff(grid)
