@@ -13,6 +13,7 @@ from rrtik_ompl.ik.numeric.kernel_call import call_table
 from rrtik_ompl.ik.serial_chain import limb_of
 from rrtik_ompl.kernels import layout
 from rrtik_ompl.kernels.ik import ik_layout
+from rrtik_ompl.kernels.record import holds_table
 from rrtik_ompl.kernels.search import connect_layout, shortcut_layout, tree_layout
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.crdt import layout as crdt_layout
@@ -42,10 +43,12 @@ LAYOUTS: dict[str, ModuleType] = {
 
 
 def layout_numbers() -> dict[str, dict[str, int]]:
-    """The whole numbers that the layouts of these tables name, by layout."""
+    """The whole numbers that the layouts of these tables name, and the places of their fields, by layout."""
 
     def numbers(module: ModuleType) -> dict[str, int]:
-        return {name: value for name, value in vars(module).items() if name.isupper() and type(value) is int}
+        named = {name: value for name, value in vars(module).items() if name.isupper() and type(value) is int}
+        own = [each for each in vars(module).values() if holds_table(each) and each.__module__ == module.__name__]
+        return named | {name.upper(): place for record in own for name, place in record.places.items()}
 
     return {name: numbers(module) for name, module in LAYOUTS.items()}
 
@@ -73,7 +76,7 @@ def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[M
     }
     places["search"] = _add_connect(image, problem, motions)
     shortcuts = ShortcutSearch(motions, np.zeros((PATH_ROWS, problem.robot.dof)) + problem.start, asking=False)
-    places["shortcuts"] = image.add(shortcuts.table, links={shortcut_layout.MOTIONS: motions.table})
+    places["shortcuts"] = image.add(shortcuts.table, links={shortcuts.table.places["motions"]: motions.table})
     places["crdt"] = _add_crdt(image, problem, world, motions)
     return image, places
 

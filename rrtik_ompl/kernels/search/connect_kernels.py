@@ -70,7 +70,7 @@ from rrtik_ompl.kernels.search.tree_kernels import add_vertex, clear_tree, is_fu
 from rrtik_ompl.kernels.search.tree_layout import CERTAIN, NO_PARENT, OPEN
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import field, set_field, set_int
-from rrtik_ompl.kernels.simd.random_kernels import next_share, start_points
+from rrtik_ompl.kernels.simd.random_kernels import next_share_at, start_points_at
 
 
 @kernel
@@ -195,8 +195,8 @@ def begin_between(
     set_field(search, connect_layout.PHASE, connect_layout.STRAIGHT)
     set_field(search, connect_layout.GOAL_COUNT, goals)
     set_field(search, connect_layout.RANDOM, seed)
-    next_share(search, connect_layout.RANDOM)
-    start_points(search, connect_layout.RANDOM, field(search, connect_layout.POINT), dof_in(search))
+    next_share_at(search, connect_layout.RANDOM)
+    start_points_at(search, connect_layout.RANDOM, field(search, connect_layout.POINT), dof_in(search))
     outside = plant_roots(search, 0, start_rows, starts)
     if outside >= 0:
         return outside

@@ -41,7 +41,7 @@ from rrtik_ompl.kernels.simd.lanes import (
     smaller,
     wide_lanes_at,
 )
-from rrtik_ompl.kernels.simd.random_kernels import next_point
+from rrtik_ompl.kernels.simd.random_kernels import next_point_at
 
 MAX_STRAIGHT_MOTIONS = 16  # whole motions to goals that are tried first
 SAMPLE_BOX_GROWTH = 1.1  # from one sample to the next, where samples begin near a place
@@ -226,10 +226,10 @@ def aim_at_sample(search: ConnectTable) -> bool:
     set_field(search, connect_layout.GROWER, side)
     dof, row = dof_in(search), candidate_row_of(search)
     point, bases = field(search, connect_layout.POINT), field(search, connect_layout.INVERSE_BASES)
-    next_point(search, connect_layout.RANDOM, point, bases, dof)
+    next_point_at(search, connect_layout.RANDOM, point, bases, dof)
     if field(search, connect_layout.ITERATIONS) & LAST_IN_TURN == 0:
         # Points of base 2 fall into the two halves of the box by turns, as the trees grow: each would see but one half.
-        next_point(search, connect_layout.RANDOM, point, bases, dof)
+        next_point_at(search, connect_layout.RANDOM, point, bases, dof)
     place_sample(search)
     tree = tree_of(search, side)
     near = nearest_inside(search, side)

@@ -12,9 +12,10 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search import repair_layout
 from rrtik_ompl.kernels.search.connect import FIRST_BUDGET, ConnectSearch
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
+from rrtik_ompl.kernels.search.repair_layout import RepairTable
 from rrtik_ompl.kernels.search.shortcut import ShortcutSearch
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import aligned, is_intact, table
+from rrtik_ompl.kernels.tables.memory import aligned, packed
 
 FIRST_CAPACITY = 256  # rows
 # Half the side of the first sample's box over the gap; narrower, new paths pass closer to what moves and are hit more.
@@ -58,30 +59,30 @@ class PathRepair:
         self._kernels, self._motions, self._dof = kernels, motions, motions.dof
         self._search = ConnectSearch(motions, lower, upper, range_=max_edge)
         self._iterations = iterations
-        fields: dict[int, Any] = dict.fromkeys(range(repair_layout.FIELD_COUNT), 0)
-        fields |= {
-            repair_layout.TRIES: tries,
-            repair_layout.PATIENCE: patience,
-            repair_layout.NUMBERS: np.array([0.5 * max_edge, GAP_BOX_RATIO]),
-        }
-        fields[repair_layout.MOTIONS] = motions.address
-        self._table = table(fields)
-        self._points = np.zeros((0, self._dof))
+        self._table = packed(
+            RepairTable,
+            motions=motions.address,
+            step=0.5 * max_edge,
+            box_ratio=GAP_BOX_RATIO,
+            tries=tries,
+            patience=patience,
+        )
+        self._table.put(points=self._zeros(0))
         self._make_room(FIRST_CAPACITY)
         self.checked = 0
 
     def check(self, path: Matrix) -> bool:
         """Whether all of a path, shape (k, n), is proven free."""
         rows = np.vstack([path, path]) if len(path) == 1 else path
-        if len(rows) > len(self._given):
+        if len(rows) > len(self._table.given):
             self._make_room(2 * len(rows))
         while True:
-            self._given[: len(rows)] = rows
+            self._table.given[: len(rows)] = rows
             found = self._kernels.check_path(self._table.address, len(rows))
             if found != repair_layout.NO_ROOM:
                 break
-            self._make_room(2 * int(self._table.header[repair_layout.COUNT]))
-        self.checked = int(self._table.header[repair_layout.CHECKED])
+            self._make_room(2 * self._table.count)
+        self.checked = self._table.checked
         return found == repair_layout.FREE_PATH
 
     def repair(self, seed: int, stop: Callable[[], Any], *, forgetting: bool = False) -> Matrix | None:
@@ -98,30 +99,22 @@ class PathRepair:
                 self._kernels.finish(self._table.address, seed) if self._search.go_on(stop) else repair_layout.NO_PATH
             )
         while rows == repair_layout.TOO_LONG:
-            self._make_room(2 * len(self._given))
+            self._make_room(2 * len(self._table.given))
             rows = self._kernels.finish(self._table.address, seed)
-        return self._path[:rows].copy() if rows > 0 else None
+        return self._table.path[:rows].copy() if rows > 0 else None
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond the memory of the repair, its search and its shortcuts."""
-        tables = all(each.intact() for each in (self._table, self._search, self._cuts))
-        return tables and all(is_intact(rows) for rows in (self._given, self._points, self._path))
+        return all(each.intact() for each in (self._table, self._search, self._cuts))
 
     def _make_room(self, rows: int) -> None:
         """Memory for paths of so many rows; the points stay."""
-        header, old = self._table.header, self._points
-        self._given, self._points = self._zeros(rows), self._zeros(rows)
-        self._points[: len(old)] = old
-        self._cuts = ShortcutSearch(self._motions, self._given, asking=False)
-        self._path = self._zeros(2 * rows + self._cuts.capacity)
-        header[repair_layout.SEARCH] = self._search.serve(rows, self._iterations)
-        header[repair_layout.CUTS], header[repair_layout.CAPACITY] = self._cuts.address, rows
-        for place, memory in (
-            (repair_layout.GIVEN, self._given),
-            (repair_layout.POINTS, self._points),
-            (repair_layout.PATH, self._path),
-        ):
-            header[place] = memory.ctypes.data
+        old = self._table.points
+        self._table.put(given=self._zeros(rows), points=self._zeros(rows), capacity=rows)
+        self._table.points[: len(old)] = old
+        self._cuts = ShortcutSearch(self._motions, self._table.given, asking=False)
+        self._table.put(shortcuts=self._cuts.table, path=self._zeros(2 * rows + self._cuts.capacity))
+        self._table.search = self._search.serve(rows, self._iterations)
 
     def _zeros(self, rows: int) -> Matrix:
         return aligned(np.zeros(rows * self._dof)).reshape(rows, self._dof)

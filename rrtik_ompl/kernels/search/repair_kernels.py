@@ -7,11 +7,8 @@ them until it is the whole space.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 from rrtik_ompl.kernels.layout import FREE
-from rrtik_ompl.kernels.search import connect_layout, repair_layout, shortcut_layout
+from rrtik_ompl.kernels.search import connect_layout, repair_layout
 from rrtik_ompl.kernels.search.connect_kernels import begin_between, search_on
 from rrtik_ompl.kernels.search.connect_layout import ConnectTable
 from rrtik_ompl.kernels.search.connect_motions import meeting_of, tree_of
@@ -23,78 +20,59 @@ from rrtik_ompl.kernels.search.motions.motion_kernels import (
     step_count,
     whole_steps,
 )
-from rrtik_ompl.kernels.search.motions.motion_layout import MotionTable
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, copy_row, distance, row_at
 from rrtik_ompl.kernels.search.repair_layout import RepairTable
 from rrtik_ompl.kernels.search.shortcut_kernels import resume as resume_shortcuts
-from rrtik_ompl.kernels.search.shortcut_kernels import route_of
-from rrtik_ompl.kernels.search.shortcut_layout import ShortcutTable
 from rrtik_ompl.kernels.search.tree_kernels import parent_of
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
-from rrtik_ompl.kernels.simd.access import field_reader
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, field, set_double, set_field
+from rrtik_ompl.kernels.simd.lanes import field, set_double
 
 DIRECTION_TOLERANCE = 1e-9  # change of a unit vector that is none
-
-
-motions_of: Callable[[RepairTable], MotionTable] = field_reader(repair_layout.MOTIONS)
-search_of: Callable[[RepairTable], ConnectTable] = field_reader(repair_layout.SEARCH)
-cuts_of: Callable[[RepairTable], ShortcutTable] = field_reader(repair_layout.CUTS)
-given_of: Callable[[RepairTable], Configuration] = field_reader(repair_layout.GIVEN)
-points_of: Callable[[RepairTable], Configuration] = field_reader(repair_layout.POINTS)
-path_of: Callable[[RepairTable], Configuration] = field_reader(repair_layout.PATH)
-count_of: Callable[[RepairTable], int] = field_reader(repair_layout.COUNT)  # points
-
-
-@inlined
-def number_of(repair: RepairTable, place: int) -> Any:
-    """STEP or BOX_RATIO."""
-    return double_at(field(repair, repair_layout.NUMBERS), place)
 
 
 @inlined
 def given(repair: RepairTable, number: int) -> Configuration:
     """Address of a waypoint of the path as it was given."""
-    return row_at(given_of(repair), dof_of(motions_of(repair)), number)
+    return row_at(repair.given, dof_of(repair.motions), number)
 
 
 @inlined
 def point_of(repair: RepairTable, number: int) -> Configuration:
     """Address of a point along the path."""
-    return row_at(points_of(repair), dof_of(motions_of(repair)), number)
+    return row_at(repair.points, dof_of(repair.motions), number)
 
 
 @inlined
 def repaired(repair: RepairTable, number: int) -> Configuration:
     """Address of a waypoint of the repaired path."""
-    return row_at(path_of(repair), dof_of(motions_of(repair)), number)
+    return row_at(repair.path, dof_of(repair.motions), number)
 
 
 @kernel
 def divide(repair: RepairTable, rows: int) -> bool:
-    """Set POINTS to points along the path as it was given, all its waypoints among them; False if there is no room."""
-    dof, count, step = dof_of(motions_of(repair)), 1, number_of(repair, repair_layout.STEP)
+    """Set points along the path as it was given, all its waypoints among them; False if there is no room."""
+    dof, count, step = dof_of(repair.motions), 1, repair.step
     copy_row(dof, given(repair, 0), point_of(repair, 0))
     for k in range(rows - 1):
         here, there = given(repair, k), given(repair, k + 1)
         parts = whole_steps(distance(dof, here, there) / step)
-        if count + parts > field(repair, repair_layout.CAPACITY):
-            set_field(repair, repair_layout.COUNT, count + parts)
+        if count + parts > repair.capacity:
+            repair.count = count + parts
             return False
         for part in range(1, parts + 1):
             share, point = part / parts, point_of(repair, count)
             for j in range(dof):
-                set_double(point, j, (1.0 - share) * double_at(here, j) + share * double_at(there, j))
+                point[j] = (1.0 - share) * here[j] + share * there[j]
             count += 1
-    set_field(repair, repair_layout.COUNT, count)
+    repair.count = count
     return True
 
 
 @kernel
 def edge_free(repair: RepairTable, edge: int) -> bool:
     """Whether the motion between a point and the next one is proven free."""
-    answer: int = check_motion(motions_of(repair), point_of(repair, edge), point_of(repair, edge + 1), False)
+    answer: int = check_motion(repair.motions, point_of(repair, edge), point_of(repair, edge + 1), False)
     return answer == FREE
 
 
@@ -103,19 +81,19 @@ def check_path(repair: RepairTable, rows: int) -> int:
     """Check the given path; the first blocked edge is searched for from either end. HIT, FREE_PATH or NO_ROOM."""
     if not divide(repair, rows):
         return repair_layout.NO_ROOM
-    edges, checked = count_of(repair) - 1, 0
+    edges, checked = repair.count - 1, 0
     for k in range(edges):
         a, b = point_of(repair, k), point_of(repair, k + 1)
-        checked += step_count(motions_of(repair), a, b) + 1
-    set_field(repair, repair_layout.CHECKED, checked)
+        checked += step_count(repair.motions, a, b) + 1
+    repair.checked = checked
     first = 0
     while first < edges and edge_free(repair, first):
         first += 1
     last = edges - 1
     while last > first and edge_free(repair, last):
         last -= 1
-    set_field(repair, repair_layout.FIRST, first)
-    set_field(repair, repair_layout.LAST, last)
+    repair.first = first
+    repair.last = last
     return repair_layout.FREE_PATH if first == edges else repair_layout.HIT
 
 
@@ -128,31 +106,29 @@ def set_spread(search: ConnectTable, spread: float) -> None:
 @kernel
 def sample_near(repair: RepairTable, first: int, second: int) -> None:
     """Let the first samples lie around the middle of two points."""
-    search, dof = search_of(repair), dof_of(motions_of(repair))
+    search, dof = repair.search, dof_of(repair.motions)
     a, b = point_of(repair, first), point_of(repair, second)
     for k in range(dof):
-        set_double(field(search, connect_layout.CENTRE), k, 0.5 * (double_at(a, k) + double_at(b, k)))
-    set_spread(search, number_of(repair, repair_layout.BOX_RATIO) * distance(dof, a, b))
+        set_double(field(search, connect_layout.CENTRE), k, 0.5 * (a[k] + b[k]))
+    set_spread(search, repair.box_ratio * distance(dof, a, b))
 
 
 @entry
 def repair_path(repair: RepairTable, seed: int, forgetting: int, budget: int) -> int:
     """After a check that found the path hit: join its pieces, or plan from scratch if ``forgetting``.
 
-    Returns the number of rows of the new PATH. UNFINISHED: the search needs more than ``budget`` motions, or room; go
+    Returns the number of rows of the new path. UNFINISHED: the search needs more than ``budget`` motions, or room; go
     on with it and call :func:`finish`. NO_PATH: an end is blocked, or the search has come to its end.
     """
-    edges = count_of(repair) - 1
-    if field(repair, repair_layout.FIRST) == 0 and not configuration_free(motions_of(repair), point_of(repair, 0)):
+    edges = repair.count - 1
+    if repair.first == 0 and not configuration_free(repair.motions, point_of(repair, 0)):
         return repair_layout.NO_PATH
-    if field(repair, repair_layout.LAST) == edges - 1 and not configuration_free(
-        motions_of(repair), point_of(repair, edges)
-    ):
+    if repair.last == edges - 1 and not configuration_free(repair.motions, point_of(repair, edges)):
         return repair_layout.NO_PATH
     if forgetting:
-        set_field(repair, repair_layout.FIRST, 0)
-        set_field(repair, repair_layout.LAST, edges - 1)
-    first, second, search = field(repair, repair_layout.FIRST), field(repair, repair_layout.LAST) + 1, search_of(repair)
+        repair.first = 0
+        repair.last = edges - 1
+    first, second, search = repair.first, repair.last + 1, repair.search
     starts, goals = point_of(repair, 0), point_of(repair, second)
     if begin_between(search, starts, first + 1, goals, edges - second + 1, seed) >= 0:
         return repair_layout.NO_PATH
@@ -176,16 +152,16 @@ def root_of(tree: TreeTable, vertex: int) -> int:
 
 @kernel
 def append(repair: RepairTable, count: int, row: Configuration) -> int:
-    """Add a row to PATH, in place of the last one if the path goes straight on there; the number of rows then."""
-    dof = dof_of(motions_of(repair))
+    """Add a row to the path, in place of the last one if the path goes straight on there; the number of rows then."""
+    dof = dof_of(repair.motions)
     if count > 0 and distance(dof, repaired(repair, count - 1), row) == 0.0:
         return count
     if count > 1:
         before, last = repaired(repair, count - 2), repaired(repair, count - 1)
         one, two, turn = distance(dof, before, last), distance(dof, last, row), 0.0
         for k in range(dof):
-            here = double_at(last, k)
-            gap = (here - double_at(before, k)) / one - (double_at(row, k) - here) / two
+            here = last[k]
+            gap = (here - before[k]) / one - (row[k] - here) / two
             turn += gap * gap
         if turn <= DIRECTION_TOLERANCE * DIRECTION_TOLERANCE:
             count -= 1
@@ -195,33 +171,35 @@ def append(repair: RepairTable, count: int, row: Configuration) -> int:
 
 @kernel
 def shorten(repair: RepairTable, rows: int, seed: int) -> None:
-    """Shorten the route of CUTS, which has that many rows."""
-    cuts = cuts_of(repair)
-    for place in (shortcut_layout.TRIES, shortcut_layout.FAILURES, shortcut_layout.GAINS, shortcut_layout.QUESTIONS):
-        set_field(cuts, place, 0)
-    set_field(cuts, shortcut_layout.COUNT, rows)
-    set_field(cuts, shortcut_layout.RANDOM, seed)
-    set_field(cuts, shortcut_layout.MAX_TRIES, field(repair, repair_layout.TRIES))
-    set_field(cuts, shortcut_layout.PATIENCE, field(repair, repair_layout.PATIENCE))
-    resume_shortcuts(cuts, field(repair, repair_layout.TRIES) + 1)
+    """Shorten the route of the shortcuts, which has that many rows."""
+    cuts = repair.shortcuts
+    cuts.tries = 0
+    cuts.failures = 0
+    cuts.gains = 0
+    cuts.questions = 0
+    cuts.count = rows
+    cuts.random = seed
+    cuts.max_tries = repair.tries
+    cuts.patience = repair.patience
+    resume_shortcuts(cuts, repair.tries + 1)
 
 
 @entry
 def finish(repair: RepairTable, seed: int) -> int:
-    """Write the PATH that a search has found, what is new of it shortened; its rows, or TOO_LONG without room."""
-    search, cuts = search_of(repair), cuts_of(repair)
-    dof, route = dof_of(motions_of(repair)), route_of(cuts)
+    """Write the path that a search has found, what is new of it shortened; its rows, or TOO_LONG without room."""
+    search, cuts = repair.search, repair.shortcuts
+    dof, route = dof_of(repair.motions), cuts.route
     begin = root_of(tree_of(search, 0), meeting_of(search, 0))
-    end = field(repair, repair_layout.LAST) + 1 + root_of(tree_of(search, 1), meeting_of(search, 1))
-    new = write_path(search, route, field(repair, repair_layout.CAPACITY))
-    if new > field(repair, repair_layout.CAPACITY):
+    end = repair.last + 1 + root_of(tree_of(search, 1), meeting_of(search, 1))
+    new = write_path(search, route, repair.capacity)
+    if new > repair.capacity:
         return repair_layout.TOO_LONG
     shorten(repair, new, seed)
     rows = 0
     for k in range(begin):
         rows = append(repair, rows, point_of(repair, k))
-    for k in range(field(cuts, shortcut_layout.COUNT)):
+    for k in range(cuts.count):
         rows = append(repair, rows, row_at(route, dof, k))
-    for k in range(end + 1, count_of(repair)):
+    for k in range(end + 1, repair.count):
         rows = append(repair, rows, point_of(repair, k))
     return rows

@@ -1,21 +1,34 @@
-"""The table of a path's check and repair in kernels: what each field is, and the words for their results."""
+"""The table of a path's check and repair in kernels, and the words for their results."""
 
 from __future__ import annotations
 
-from typing import NewType
+from rrtik_ompl.kernels.record import Record
+from rrtik_ompl.kernels.search.connect_layout import ConnectTable
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration, MotionTable
+from rrtik_ompl.kernels.search.shortcut_layout import ShortcutTable
 
 KERNELS = "search.repair_kernels"  # their library
-RepairTable = NewType("RepairTable", int)  # of the table of a repair
 
-# MOTIONS: the motion table of the world · SEARCH, CUTS: tables of an RRT-Connect search and of random shortcuts in that
-# world · NUMBERS: doubles, see below · GIVEN: the path as it was given · POINTS: points along it · PATH: the repaired
-# one · CAPACITY: of each, in rows
-MOTIONS, SEARCH, CUTS, NUMBERS, GIVEN, POINTS, PATH, CAPACITY = range(8)
-# Numbers that the kernels set. COUNT: of points · FIRST, LAST: blocked edges between points, seen from both ends
-# CHECKED: configurations that the check of a path counts · TRIES, PATIENCE: of the shortcuts
-COUNT, FIRST, LAST, CHECKED, TRIES, PATIENCE, FIELD_COUNT = range(8, 15)
-# The doubles. STEP: longest edge of the path's points · BOX_RATIO: half the side of the first sample's box over the gap
-STEP, BOX_RATIO = range(2)
+
+class RepairTable(Record):
+    """The check of a path, and its repair."""
+
+    motions: MotionTable  # of the world
+    search: ConnectTable  # an RRT-Connect search in that world
+    shortcuts: ShortcutTable  # of what it finds
+    step: float  # longest edge of the path's points
+    box_ratio: float  # half the side of the first sample's box over the gap
+    given: Configuration  # the path as it was given
+    points: Configuration  # along it
+    path: Configuration  # the repaired one
+    capacity: int  # of the given path and the points, in rows
+    count: int  # of points
+    first: int  # blocked edge between points, seen from the beginning
+    last: int  # the same, seen from the end
+    checked: int  # configurations that the check of a path counts
+    tries: int  # of the shortcuts
+    patience: int
+
 
 HIT, FREE_PATH, NO_ROOM = range(3)  # what check_path() returns
 UNFINISHED, NO_PATH, TOO_LONG = -1, -2, -3  # what repair() and finish() return in place of a number of rows

@@ -11,12 +11,12 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search import shortcut_layout
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions
+from rrtik_ompl.kernels.search.shortcut_layout import ShortcutTable
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 
 SPARE_WAYPOINTS = 256  # room for more than at the beginning
 TRIES_PER_CALL = 256  # of the kernel, until the caller may stop it
-_GIVEN = [shortcut_layout.MOTIONS, shortcut_layout.COUNT, shortcut_layout.RANDOM, shortcut_layout.RESOLVE]
 
 
 class ShortcutSearch:
@@ -61,13 +61,14 @@ class ShortcutSearch:
         self._kernels = kernels
         self._motions, self._dof = motions, dof  # its tables live as long as this search
         plan = _plan(len(rows) + SPARE_WAYPOINTS, dof)
-        self.table = made = PlannedTable(plan)
-        for place in plan.spans if plan.blank is None else ():  # a page's file shall be the same each time
-            made[place][:] = 0.0
-        made.header[_GIVEN] = motions.address, len(rows), seed % 2**62, int(asking)
-        made[shortcut_layout.METRIC][:] = lengths * lengths
-        made[shortcut_layout.PROBABILITIES][:] = share, pull
-        made[shortcut_layout.ROUTE][: rows.size] = rows.ravel()
+        self.table = made = ShortcutTable(PlannedTable(plan))
+        if plan.blank is None:
+            for array in made.memory.arrays.values():
+                array[:] = 0.0  # a page's file shall be the same each time
+        made.put(motions=motions.address, count=len(rows), random=seed % 2**62, resolve=int(asking))
+        made.put(waypoint_share=share, pull_share=pull)
+        made.metric[:] = lengths * lengths
+        made.route[: rows.size] = rows.ravel()
 
     @property
     def address(self) -> int:
@@ -77,32 +78,32 @@ class ShortcutSearch:
     @property
     def capacity(self) -> int:
         """Waypoints that there is room for."""
-        return self._number(shortcut_layout.CAPACITY)
+        return self.table.capacity
 
     @property
     def waypoints(self) -> Matrix:
         """The route as it is now, shape (k, dof); a copy."""
-        return self._rows(shortcut_layout.ROUTE, self._number(shortcut_layout.COUNT))
+        return self._rows(self.table.route, self.table.count)
 
     @property
     def tries(self) -> int:
         """How many shortcuts have been tried."""
-        return self._number(shortcut_layout.TRIES)
+        return self.table.tries
 
     @property
     def gains(self) -> int:
         """How many of them have been taken."""
-        return self._number(shortcut_layout.GAINS)
+        return self.table.gains
 
     @property
     def questions(self) -> tuple[Matrix, Matrix]:
         """Starts and ends of the motions that must be answered before the search can go on, shape (k, dof) each."""
-        count = self._number(shortcut_layout.QUESTIONS)
-        return self._rows(shortcut_layout.QUESTION_STARTS, count), self._rows(shortcut_layout.QUESTION_ENDS, count)
+        count = self.table.questions
+        return self._rows(self.table.question_starts, count), self._rows(self.table.question_ends, count)
 
     def answer(self, free: bool) -> None:
         """Answer whether all of the questions are free."""
-        self.table.header[shortcut_layout.ANSWERED] = shortcut_layout.ANSWER_YES if free else shortcut_layout.ANSWER_NO
+        self.table.answered = shortcut_layout.ANSWER_YES if free else shortcut_layout.ANSWER_NO
 
     def run(
         self,
@@ -125,8 +126,8 @@ class ShortcutSearch:
         Returns:
             Whether the search came to its end.
         """
-        self.table.header[shortcut_layout.MAX_TRIES] = min(tries, NO_LIMIT)
-        self.table.header[shortcut_layout.PATIENCE] = min(patience, NO_LIMIT)
+        self.table.max_tries = min(tries, NO_LIMIT)
+        self.table.patience = min(patience, NO_LIMIT)
         while True:
             self._motions.make_ready()
             status = self._kernels.resume(self.table.address, chunk)
@@ -141,28 +142,24 @@ class ShortcutSearch:
         """Whether no kernel has written beyond the memory of the search or what it works on."""
         return self.table.intact() and self._motions.intact()
 
-    def _number(self, place: int) -> int:
-        return int(self.table.header[place])
-
-    def _rows(self, place: int, count: int) -> Matrix:
-        flat: Vector = self.table[place]
-        return flat[: count * self._dof].reshape(-1, self._dof).copy()
+    def _rows(self, rows: Vector, count: int) -> Matrix:
+        return rows[: count * self._dof].reshape(-1, self._dof).copy()
 
 
 @lru_cache(maxsize=256)
 def _plan(capacity: int, dof: int) -> TablePlan:
     """The table of a search with room for so many waypoints."""
     questions = shortcut_layout.MAX_QUESTIONS * dof
-    arrays = {
-        shortcut_layout.METRIC: dof,
-        shortcut_layout.PROBABILITIES: 2,
-        shortcut_layout.ROUTE: capacity * dof,
-        shortcut_layout.ARC_LENGTHS: capacity,
-        shortcut_layout.ENDS: 2 * dof,
-        shortcut_layout.QUESTION_STARTS: questions,
-        shortcut_layout.QUESTION_ENDS: questions,
-    }
-    numbers = dict.fromkeys({*range(shortcut_layout.CUTS + 1)} - arrays.keys(), 0)
-    numbers |= dict.fromkeys((shortcut_layout.MAX_TRIES, shortcut_layout.PATIENCE), NO_LIMIT)
-    numbers |= {shortcut_layout.CAPACITY: capacity, shortcut_layout.ANSWERED: shortcut_layout.NO_ANSWER}
-    return TablePlan(arrays, numbers)
+    return sizes_of(
+        ShortcutTable,
+        metric=dof,
+        route=capacity * dof,
+        arc_lengths=capacity,
+        ends=2 * dof,
+        question_starts=questions,
+        question_ends=questions,
+        capacity=capacity,
+        max_tries=NO_LIMIT,
+        patience=NO_LIMIT,
+        answered=shortcut_layout.NO_ANSWER,
+    )

@@ -1,27 +1,46 @@
-"""The table of random shortcuts in a kernel: what each field is, and the words for its states."""
+"""The table of random shortcuts in a kernel, and the words for its states."""
 
 from __future__ import annotations
 
-from typing import NewType
+from rrtik_ompl.kernels.record import Doubles, Record
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration, MotionTable
 
 KERNELS = "search.shortcut_kernels"  # their library
-ShortcutTable = NewType("ShortcutTable", int)  # of the table of a search
 
 # What resume() returns: all tries are spent, the budget is spent, questions must be answered first.
 DONE, RUNNING, ASKING = range(3)
 
-# Search. MOTIONS: the motion table of the world · METRIC: squared weights of the length · PROBABILITIES: see below
-# ROUTE: waypoints · ARC_LENGTHS: length of the route up to each waypoint · ENDS: both ends of the shortcut
-# QUESTION_STARTS, QUESTION_ENDS: motions to ask about
-MOTIONS, METRIC, PROBABILITIES, ROUTE, ARC_LENGTHS, ENDS, QUESTION_STARTS, QUESTION_ENDS = range(8)
-# Numbers that the kernel changes. FAILURES: tries since the last gain · RESOLVE: 1 if undecided motions are asked for,
-# 0 if they count as colliding · FIRST, SECOND: waypoints at or before the ends of the shortcut · CUTS: see below
-COUNT, CAPACITY, RANDOM, TRIES, MAX_TRIES, FAILURES, PATIENCE, GAINS, RESOLVE = range(8, 17)
-QUESTIONS, ANSWERED, FIRST, SECOND, CUTS = range(17, 22)
 
-# Bits of CUTS: whether an end of the shortcut lies inside an edge; whether the first end is a pull, the new place of
-# waypoint FIRST.
+class ShortcutTable(Record):
+    """Random shortcuts of a route."""
+
+    motions: MotionTable  # of the world
+    metric: Doubles  # squared weights of the length
+    waypoint_share: float  # probability that an end of a shortcut is a waypoint
+    pull_share: float  # probability that a try is a pull
+    route: Configuration  # waypoints
+    arc_lengths: Doubles  # of the route up to each waypoint
+    ends: Configuration  # of the shortcut
+    question_starts: Configuration  # of motions to ask about
+    question_ends: Configuration
+    count: int  # waypoints
+    capacity: int  # of the route
+    random: int  # state
+    tries: int
+    max_tries: int
+    failures: int  # tries since the last gain
+    patience: int  # such tries that end the search
+    gains: int
+    resolve: int  # 1 if undecided motions are asked for, 0 if they count as colliding
+    questions: int
+    answered: int  # see below
+    first: int  # waypoint at or before the first end of the shortcut
+    second: int  # the same of the second
+    cuts: int  # see below
+
+
+# Bits of the cuts: whether an end of the shortcut lies inside an edge; whether it is a pull, and the first end the new
+# place of the first waypoint.
 FIRST_INSIDE, SECOND_INSIDE, PULL = 1, 2, 4
-WAYPOINT_END, PULL_TRY = range(2)  # probabilities: that a shortcut's end is a waypoint, that a try is a pull
 MAX_QUESTIONS = 3  # motions of a try
 ANSWER_NO, ANSWER_YES, NO_ANSWER = range(3)

@@ -1,8 +1,8 @@
 """Tables as an image of another memory: every table and array gets a place there, and fields that point move along.
 
-Which fields point is said, not guessed: to an array of the table itself or to a part of it (the table knows), to
-another table or an array that belongs to nobody (``links``), to where another field of the same table points
-(``same``).
+Which fields point is said, not guessed. A record knows by the kinds of its fields. Of a table without a class it is
+said: to an array of the table itself or to a part of it (the table knows), to another table or an array that belongs to
+nobody (``links``), to where another field of the same table points (``same``).
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.kernels.layout import ALIGNMENT
+from rrtik_ompl.kernels.record import Record, holds_array, holds_table
 from rrtik_ompl.kernels.tables.memory import PlannedTable, Table
 
-Block: TypeAlias = Table | PlannedTable | NDArray[Any]
+Block: TypeAlias = Record | Table | PlannedTable | NDArray[Any]
 
 
 class MemoryImage:
@@ -59,6 +60,8 @@ class MemoryImage:
         self._blocks.append(block)
         if isinstance(block, np.ndarray):
             return self._append(address, block)
+        if isinstance(block, Record):
+            return self._append(address, self._moved(block, links or {}))
         header = block.header.copy()
         parts = block.parts if isinstance(block, Table) else ()
         there = {part.address: self.add(part) for part in parts}
@@ -77,6 +80,18 @@ class MemoryImage:
             start = place - self._base
             whole[start : start + data.nbytes] = np.frombuffer(data.tobytes(), dtype=np.uint8)
         return whole.tobytes()
+
+    def _moved(self, record: Record, links: Mapping[int, Block]) -> NDArray[np.int64]:
+        """The fields of a record in the other memory, after all that they point to."""
+        header: NDArray[np.int64] = record.memory.header.copy()
+        arrays = record.memory.arrays
+        for name, place in record.places.items():
+            other = getattr(record, name) if holds_table(record.kinds[name]) else links.get(place)
+            if other is not None:
+                header[place] = self.add(other)
+            elif place in arrays and holds_array(record.kinds[name]):
+                header[place] = self.add(arrays[place])
+        return header
 
     def _add_pointing(self, array: NDArray[Any], there: Mapping[int, int]) -> int:
         """Add an array of a table; addresses of the table's parts in it become those of the other memory."""

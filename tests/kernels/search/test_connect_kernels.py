@@ -10,7 +10,7 @@ from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.tree_memory import grow, tree_table
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry
 from rrtik_ompl.kernels.simd.halton import inverse_bases
-from rrtik_ompl.kernels.simd.random_kernels import next_point, next_share, start_points
+from rrtik_ompl.kernels.simd.random_kernels import next_point_at, next_share_at, start_points_at
 from rrtik_ompl.kernels.tables.memory import aligned, table, whole_lanes
 
 pytestmark = pytest.mark.kernels
@@ -91,7 +91,7 @@ def test_a_tree_that_grows_keeps_its_vertices_and_its_address():
 @entry
 def shares(random: int, sink: int, count: int) -> int:
     for _ in range(count):
-        start_points(random, 0, sink, 1)
+        start_points_at(random, 0, sink, 1)
         sink += 8
     return count
 
@@ -117,8 +117,8 @@ def test_shares_are_those_of_splitmix64():
 
 @entry
 def second_share(random: int) -> int:
-    if next_share(random, 0) < 1.0:
-        return int(next_share(random, 0) * 2.0**53)
+    if next_share_at(random, 0) < 1.0:
+        return int(next_share_at(random, 0) * 2.0**53)
     return -1
 
 
@@ -134,10 +134,10 @@ def points(dimensions, count, start=None, seed=3):
     )
     bases = aligned(whole_lanes(np.array(inverse_bases(dimensions))))
     if start is None:
-        start_points(random.address, 0, point.ctypes.data, dimensions)
+        start_points_at(random.address, 0, point.ctypes.data, dimensions)
     rows = np.empty((count, dimensions))
     for row in rows:
-        next_point(random.address, 0, point.ctypes.data, bases.ctypes.data, dimensions)
+        next_point_at(random.address, 0, point.ctypes.data, bases.ctypes.data, dimensions)
         row[:] = point[:dimensions]
     return rows
 
@@ -213,4 +213,4 @@ def test_lengths_that_are_none_are_refused(bad):
 
 def test_a_share_is_below_one_even_where_all_bits_are_set():
     random = table({0: 0})
-    assert 0.0 <= next_share(random.address, 0) < 1.0
+    assert 0.0 <= next_share_at(random.address, 0) < 1.0

@@ -17,7 +17,7 @@ from rrtik_ompl.kernels.search.tree_kernels import cost_of, nearest_by_cost, par
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import double_at, field
-from rrtik_ompl.kernels.simd.random_kernels import next_share
+from rrtik_ompl.kernels.simd.random_kernels import next_share_at
 
 
 @inlined
@@ -50,7 +50,7 @@ def vertex_for(search: ConnectTable, tree: TreeTable, other: TreeTable, row: Con
     least, most = from_roots(dof, tree, row), bound - from_roots(dof, other, row)
     if least >= most:
         return -1
-    cost = least + next_share(search, connect_layout.RANDOM) * (most - least)
+    cost = least + next_share_at(search, connect_layout.RANDOM) * (most - least)
     return nearest_by_cost(tree, field(search, connect_layout.QUERY), cost)
 
 

@@ -47,7 +47,7 @@ from rrtik_ompl.kernels.search.tree_layout import CERTAIN, NO_PARENT
 from rrtik_ompl.kernels.simd.access import count_up
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import double_at, field, set_double, set_field, set_int
-from rrtik_ompl.kernels.simd.random_kernels import next_point, next_share, start_points
+from rrtik_ompl.kernels.simd.random_kernels import next_point_at, next_share_at, start_points_at
 
 MAX_STRAIGHT_WALKS = 16
 
@@ -65,7 +65,7 @@ def lacks_room(search: ConstrainedTable) -> bool:
 def draw(search: ConstrainedTable) -> None:
     """Set AIM to the next sample of the box."""
     point, dof = field(search, layout.POINT), dof_of(motions_of(search))
-    next_point(search, layout.RANDOM, point, field(search, layout.INVERSE_BASES), dof)
+    next_point_at(search, layout.RANDOM, point, field(search, layout.INVERSE_BASES), dof)
     for k in range(dof):
         low, high = double_at(field(search, layout.LOWER), k), double_at(field(search, layout.UPPER), k)
         set_double(aim_in(search), k, low + (high - low) * double_at(point, k))
@@ -152,8 +152,8 @@ def solve(search: ConstrainedTable, starts: int, goals: int, seed: int, budget: 
     set_field(search, layout.GOAL_COUNT, goals)
     set_field(search, layout.RANDOM, seed)
     set_number(search, layout.STEP, number_of(search, layout.LONGEST))
-    next_share(search, layout.RANDOM)
-    start_points(search, layout.RANDOM, field(search, layout.POINT), dof_of(motions_of(search)))
+    next_share_at(search, layout.RANDOM)
+    start_points_at(search, layout.RANDOM, field(search, layout.POINT), dof_of(motions_of(search)))
     outside = plant_roots(search, 0, field(search, layout.START_ROWS), starts)
     if outside >= 0:
         return layout.OUTSIDE - outside

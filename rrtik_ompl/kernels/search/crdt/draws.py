@@ -9,13 +9,13 @@ from rrtik_ompl.kernels.search.crdt.accessors import dof_in, extension_row, orde
 from rrtik_ompl.kernels.search.crdt.layout import CrdtTable
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import field, int_at, set_double, set_int
-from rrtik_ompl.kernels.simd.random_kernels import next_share
+from rrtik_ompl.kernels.simd.random_kernels import next_share_at
 
 
 @inlined
 def draw(search: CrdtTable) -> Any:
     """The next number of the stream, from 0 to 1, less than 1."""
-    return next_share(search, crdt_layout.RANDOM)
+    return next_share_at(search, crdt_layout.RANDOM)
 
 
 @inlined

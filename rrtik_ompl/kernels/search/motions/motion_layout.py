@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import NewType
 
+from rrtik_ompl.kernels.record import Doubles
+
 MotionTable = NewType("MotionTable", int)  # of a motion table
+
+
+class Configuration(Doubles):
+    """Rows of one number for each coordinate."""
+
 
 # WORLD: the tables of the checks · joint values are GAIN @ q + OFFSET, shapes (JOINTS, DOF) and (JOINTS,)
 # WEIGHTS: no point of the arm moves farther than WEIGHTS @ |b - a| [m] from a to b · NUMBERS: float64, see below

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NewType
+from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.kernels.simd.access import double_row
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import double_at, set_double
+from rrtik_ompl.kernels.simd.records import row_at
 
-Configuration = NewType("Configuration", int)  # rows of float64, one number for each coordinate
-
-row_at: Callable[[Configuration, int, int], Configuration] = double_row  # array, numbers in a row, number of the row
+__all__ = ["Configuration", "copy_row", "distance", "row_at"]
 
 
 @inlined
-def copy_row(length: int, source: int, sink: int) -> None:
+def copy_row(length: int, source: Any, sink: Any) -> None:
     """Copy ``length`` numbers from one address to another."""
     for k in range(length):
         set_double(sink, k, double_at(source, k))

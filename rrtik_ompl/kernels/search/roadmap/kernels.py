@@ -45,15 +45,15 @@ from rrtik_ompl.kernels.search.tree_layout import LIVE, SIZE
 from rrtik_ompl.kernels.simd.access import count_up
 from rrtik_ompl.kernels.simd.compiled import entry, kernel
 from rrtik_ompl.kernels.simd.lanes import double_at, field, int_at, set_double, set_field, set_int
-from rrtik_ompl.kernels.simd.random_kernels import next_point, next_share, start_points
+from rrtik_ompl.kernels.simd.random_kernels import next_point_at, next_share_at, start_points_at
 
 
 @entry
 def seed_samples(roadmap: RoadmapTable, seed: int) -> int:
     """Choose the first sample."""
     set_field(roadmap, layout.RANDOM, seed)
-    next_share(roadmap, layout.RANDOM)
-    return start_points(roadmap, layout.RANDOM, field(roadmap, layout.POINT), dof_of(motions_of(roadmap)))
+    next_share_at(roadmap, layout.RANDOM)
+    return start_points_at(roadmap, layout.RANDOM, field(roadmap, layout.POINT), dof_of(motions_of(roadmap)))
 
 
 @entry
@@ -67,7 +67,7 @@ def grow(roadmap: RoadmapTable, wanted: int, samples: int) -> int:
     while added < wanted and samples > 0:
         samples -= 1
         count_up(roadmap, layout.SAMPLES)
-        next_point(roadmap, layout.RANDOM, point, bases, dof)
+        next_point_at(roadmap, layout.RANDOM, point, bases, dof)
         for k in range(dof):
             low, high = double_at(field(roadmap, layout.LOWER), k), double_at(field(roadmap, layout.UPPER), k)
             set_double(row, k, low + (high - low) * double_at(point, k))

@@ -20,7 +20,7 @@ from rrtik_ompl.kernels.search.taut.layout import HINT_SIZE, TightenTable
 from rrtik_ompl.kernels.simd.access import count_up, double_row, field_reader
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import double_at, field, set_double, set_field
-from rrtik_ompl.kernels.simd.random_kernels import next_share
+from rrtik_ompl.kernels.simd.random_kernels import next_share_at
 
 DROP = 0.2  # probability that a bend is tried to be dropped
 LONGER, SHORTER = 2.0, 0.84  # a step after one that succeeded, or failed
@@ -86,7 +86,7 @@ def propose(route: TightenTable, bend: int, step: float) -> float:
     for k in range(dof):
         way = (1.0 - share) * double_at(before, k) + share * double_at(after, k) - double_at(here, k)
         straight += way * way
-        drawn = 2.0 * next_share(route, layout.RANDOM) - 1.0
+        drawn = 2.0 * next_share_at(route, layout.RANDOM) - 1.0
         aside += drawn * drawn
         set_double(target, k, drawn)
     size = sqrt(straight / max(aside, 1e-300))
@@ -119,7 +119,7 @@ def move_bend(route: TightenTable, bend: int, total: float) -> bool:
     if length - distance(dof, before, after) < LEAST_BEND * total or step < SHORTEST:
         return False
     set_field(route, layout.MOVED, 1)
-    dropping, hint = next_share(route, layout.RANDOM) < DROP, double_row(hints_of(route), 2 * HINT_SIZE, 0)
+    dropping, hint = next_share_at(route, layout.RANDOM) < DROP, double_row(hints_of(route), 2 * HINT_SIZE, 0)
     if dropping and passes(route, before, after, hint):
         drop_bend(route, bend)
         return True
