@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from typing import NewType
 
+from rrtik_ompl.kernels.record import Doubles
+
 ALIGNMENT = 64  # [bytes] of every array that whole vectors are read from
 INT_BYTES, FLOAT_BYTES, DOUBLE_BYTES = 4, 4, 8
 FREE, UNDECIDED, COLLIDING = 0, 1, 2  # answers
@@ -28,11 +30,15 @@ ScratchTable = NewType("ScratchTable", int)
 ProbeTable = NewType("ProbeTable", int)
 BoundTable = NewType("BoundTable", int)
 
+
+class JointValues(Doubles):
+    """Rows of one number for each joint."""
+
+
 # Addresses of arrays, by what they hold.
 IntArray = NewType("IntArray", int)
 DoubleArray = NewType("DoubleArray", int)
 LaneArray = NewType("LaneArray", int)
-JointValues = NewType("JointValues", int)  # rows of float64, one number for each joint
 BallArray = NewType("BallArray", int)
 HeadArray = NewType("HeadArray", int)
 ShapeArray = NewType("ShapeArray", int)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
 from rrtik_ompl.ik.numeric.kernel_call import call_table
 from rrtik_ompl.ik.serial_chain import limb_of
@@ -90,18 +89,14 @@ def add_limb(image: MemoryImage, robot: Robot) -> dict[str, int] | None:
 def _add_connect(image: MemoryImage, problem: Problem, motions: FastMotions) -> int:
     """RRT-Connect, with its trees, its ends and the path that it finds."""
     search = ConnectSearch(motions, *problem.robot.finite_range(), vertices=VERTICES)
-    starts, goals, _ = search.rows
-    path: Matrix = np.zeros((PATH_ROWS, motions.dof))
+    search.table.put(path=np.zeros((PATH_ROWS, motions.dof)))
     alias = {tree_layout.VALUES: tree_layout.ROWS} if motions.identity else {}
     for tree in search.trees:
         image.add(tree, same=alias)
-    for rows in (starts, goals, path):
-        image.add(rows)
-    links: dict[int, Any] = {connect_layout.MOTIONS: motions.table, connect_layout.PATH: path}
-    links |= {connect_layout.START_TREE + side: tree for side, tree in enumerate(search.trees)}
-    links |= {connect_layout.START_ROWS: starts, connect_layout.GOAL_ROWS: goals}
-    values = {connect_layout.ROW_VALUES: connect_layout.ROW} if motions.identity else {}
-    return image.add(search.table, links=links, same=values)
+    places = search.table.places
+    links: dict[int, Any] = {places["motions"]: motions.table}
+    links |= {places[f"{side}_tree"]: tree for side, tree in zip(("start", "goal"), search.trees, strict=True)}
+    return image.add(search.table, links=links)
 
 
 def _add_crdt(image: MemoryImage, problem: Problem, world: World, motions: FastMotions) -> int:

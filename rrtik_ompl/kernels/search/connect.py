@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search import connect_layout
+from rrtik_ompl.kernels.search.connect_layout import ConnectTable
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions, MotionsFree
 from rrtik_ompl.kernels.search.tree_layout import CAPACITY, SIZE
@@ -19,7 +19,7 @@ from rrtik_ompl.kernels.search.tree_memory import grow, tree_table
 from rrtik_ompl.kernels.simd.halton import inverse_bases
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import Table, aligned, is_intact, table, whole_lanes
+from rrtik_ompl.kernels.tables.memory import Table, aligned, packed, whole_lanes
 
 PATIENCE = 8  # rejected paths until undecided motions are asked for at once
 FIRST_CAPACITY = 64 * WIDTH  # vertices
@@ -74,13 +74,8 @@ class ConnectSearch:
         self.range, self.domain = connect_lengths(*box, range_, domain, turning=np.ones(dof, dtype=bool))
         joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(dof, joints, vertices) for _ in range(2)]
-        numbers = np.array([self.range, self.domain, connect_layout.UNBOUNDED_SPREAD, connect_layout.UNBOUNDED_COST])
-        self._search = _search_table(motions, self._trees, box, numbers)
-        fields: Any = self._search.header
-        self._fields = memoryview(fields)  # numpy takes ten times as long for one number
-        self._fields[connect_layout.PATIENCE] = patience
-        self._roots = [np.empty((0, dof)), np.empty((0, dof))]
-        self._places = [0, 0]  # addresses of the roots in memory, which numpy takes a microsecond to find
+        self._search = _search_table(motions, self._trees, box)
+        self._search.put(range=self.range, domain=self.domain, patience=patience)
         for side in range(2):
             self._make_room(side, FIRST_ROOTS)
         self._make_path_room(FIRST_PATH)
@@ -117,10 +112,10 @@ class ConnectSearch:
         """
         self._set_roots(0, starts)
         self._set_roots(1, goals)
-        self._fields[connect_layout.RESOLVE] = ask is not None
-        self._fields[connect_layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
+        self._search.resolve = ask is not None
+        self._search.limit = NO_LIMIT if max_iterations is None else max_iterations
         length = connect_layout.UNBOUNDED_COST if bound is None else bound
-        self._search[connect_layout.NUMBERS][connect_layout.BOUND] = length
+        self._search.bound = length
         self._questions = 0
         counts, number = (len(starts), len(goals)), int(seed) & (2**63 - 1)
         status = self._kernels.solve(self._search.address, *counts, number, FIRST_BUDGET)
@@ -131,7 +126,7 @@ class ConnectSearch:
         return self._path() if self._finished(status, ask, stop) == connect_layout.SOLVED else None
 
     @property
-    def table(self) -> Table:
+    def table(self) -> ConnectTable:
         """What the kernels read."""
         return self._search
 
@@ -143,7 +138,7 @@ class ConnectSearch:
     @property
     def rows(self) -> tuple[Matrix, Matrix, Matrix]:
         """Where starts, goals and the path stand, shapes (k, n)."""
-        return self._roots[0], self._roots[1], self._path_rows
+        return self._search.start_rows, self._search.goal_rows, self._search.path
 
     @property
     def capacity(self) -> int:
@@ -156,7 +151,7 @@ class ConnectSearch:
         Such a search asks nothing and draws ``max_iterations`` samples at most; :meth:`go_on` continues it.
         """
         self._fit_trees(roots)
-        self._fields[connect_layout.RESOLVE], self._fields[connect_layout.LIMIT] = 0, max_iterations
+        self._search.resolve, self._search.limit = 0, max_iterations
         return self._search.address
 
     def go_on(self, stop: Callable[[], object]) -> bool:
@@ -166,27 +161,26 @@ class ConnectSearch:
     def proven_free(self, rows: Matrix) -> bool:
         """Whether all configurations, shape (k, n), lie in the box and the covers prove them free."""
         self._set_roots(0, rows)
-        return self._kernels.rows_free(self._search.address, self._places[0], len(rows)) != 0
+        return self._kernels.rows_free(self._search.address, len(rows)) != 0
 
     def statistics(self) -> dict[str, int | float]:
         """Counts of the last search.
 
         Samples, vertices of both trees, motions checked, motions asked for, and paths that an answer has broken.
         """
-        iterations, rejected, motions = self._fields[_COUNTS]
+        search = self._search
         vertices = sum(int(tree.header[SIZE]) for tree in self._trees)
         return {
-            "iterations": iterations,
+            "iterations": search.iterations,
             "vertices": vertices,
-            "motions": motions,
+            "motions": search.checked,
             "questions": self._questions,
-            "rejected": rejected,
+            "rejected": search.rejected,
         }
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond the memory of the search or what it works on."""
-        tables = self._motions.intact() and all(own.intact() for own in (self._search, *self._trees))
-        return tables and all(is_intact(rows) for rows in (*self._roots, self._path_rows))
+        return self._motions.intact() and all(own.intact() for own in (self._search, *self._trees))
 
     def _finished(self, status: int, ask: MotionsFree | None, stop: Callable[[], object] | None) -> int:
         """Do what a status asks for and call the kernel again, until it is done; its last status."""
@@ -207,9 +201,10 @@ class ConnectSearch:
         return status
 
     def _answer(self, ask: MotionsFree) -> None:
-        count, shape = self._fields[connect_layout.QUESTIONS], (-1, self._dof)
-        ends = (self._search[place].reshape(shape)[:count].copy() for place in _QUESTIONS)
-        self._search[connect_layout.ANSWERS][:count] = ask(*ends)
+        count, shape = self._search.questions, (-1, self._dof)
+        starts = self._search.question_starts.reshape(shape)[:count].copy()
+        ends = self._search.question_ends.reshape(shape)[:count].copy()
+        self._search.answers[:count] = ask(starts, ends)
         self._questions += count
 
     def _grow(self) -> None:
@@ -217,56 +212,59 @@ class ConnectSearch:
             grow(tree)
 
     def _path(self) -> Matrix:
-        count = self._fields[connect_layout.PATH_ROWS]
-        if count > len(self._path_rows):
+        count = self._search.path_rows
+        if count > len(self._search.path):
             self._make_path_room(2 * count)
             self._kernels.keep_path(self._search.address)
-        return self._path_rows[:count].copy()
+        return self._search.path[:count].copy()
 
     def _set_roots(self, side: int, rows: Matrix) -> None:
         if rows.ndim != 2 or rows.shape[1] != self._dof or len(rows) == 0:
             raise InputError(f"search: expected starts and goals of shape (k, {self._dof}), got {rows.shape}")
-        if len(rows) > len(self._roots[side]):
+        if len(rows) > len(self.rows[side]):
             self._make_room(side, 2 * len(rows))
         self._fit_trees(len(rows))
-        self._roots[side][: len(rows)] = rows
+        self.rows[side][: len(rows)] = rows
 
     def _fit_trees(self, roots: int) -> None:
         while roots >= FIRST_CAPACITY and roots >= self.capacity:
             self._grow()  # both are as large
 
     def _make_room(self, side: int, count: int) -> None:
-        self._roots[side] = aligned(np.zeros(count * self._dof)).reshape(count, self._dof)
-        self._places[side] = self._roots[side].ctypes.data
-        self._fields[connect_layout.START_ROWS + side] = self._places[side]
+        self._search.put(**{("start_rows", "goal_rows")[side]: self._zeros(count)})
 
     def _make_path_room(self, count: int) -> None:
-        self._path_rows = aligned(np.zeros(count * self._dof)).reshape(count, self._dof)
-        self._fields[connect_layout.PATH] = self._path_rows.ctypes.data
-        self._fields[connect_layout.PATH_CAPACITY] = count
+        self._search.put(path=self._zeros(count), path_capacity=count)
+
+    def _zeros(self, count: int) -> Matrix:
+        return aligned(np.zeros(count * self._dof)).reshape(count, self._dof)
 
 
-_QUESTIONS = (connect_layout.QUESTION_STARTS, connect_layout.QUESTION_ENDS)
-_COUNTS = slice(connect_layout.ITERATIONS, connect_layout.CHECKED + 1)
-
-
-def _search_table(motions: FastMotions, trees: list[Table], box: tuple[Vector, Vector], numbers: Vector) -> Table:
+def _search_table(motions: FastMotions, trees: list[Table], box: tuple[Vector, Vector]) -> ConnectTable:
     """The table of a search; fields that are not named here are numbers that the kernels set."""
     dof, asked = motions.dof, connect_layout.MAX_QUESTIONS
-    fields: dict[int, int | NDArray[Any]] = dict.fromkeys(range(connect_layout.FIELD_COUNT), 0)
-    fields |= {connect_layout.MOTIONS: motions.address}
-    fields |= {connect_layout.START_TREE + side: tree.address for side, tree in enumerate(trees)}
-    lanes: dict[int, NDArray[Any]] = {connect_layout.LOWER: box[0], connect_layout.UPPER: box[1]}
-    lanes |= {connect_layout.INVERSE_BASES: np.array(inverse_bases(dof))}
-    lanes |= {place: np.zeros(dof) for place in (connect_layout.ROW, connect_layout.POINT, connect_layout.CENTRE)}
-    lanes |= {connect_layout.QUERY: np.zeros(dof, dtype=np.float32)}
-    fields |= {place: whole_lanes(row) for place, row in lanes.items()}
-    fields |= {connect_layout.NUMBERS: numbers}
-    fields |= {connect_layout.ROW_VALUES: np.zeros(motions.joints)}
-    fields |= {place: np.zeros(asked * dof) for place in _QUESTIONS}
-    whole = (connect_layout.QUESTION_SIDES, connect_layout.QUESTION_VERTICES, connect_layout.ANSWERS)
-    fields |= {place: np.zeros(asked, dtype=np.int32) for place in whole}
-    made = table(fields)
+    none = whole_lanes(np.zeros(dof))
+    made = packed(
+        ConnectTable,
+        motions=motions.address,
+        start_tree=trees[0].address,
+        goal_tree=trees[1].address,
+        lower=whole_lanes(box[0]),
+        upper=whole_lanes(box[1]),
+        inverse_bases=whole_lanes(np.array(inverse_bases(dof))),
+        bound=connect_layout.UNBOUNDED_COST,
+        centre=none,
+        spread=connect_layout.UNBOUNDED_SPREAD,
+        point=none,
+        row=none,
+        row_values=np.zeros(motions.joints),
+        query=whole_lanes(np.zeros(dof, dtype=np.float32)),
+        question_starts=np.zeros(asked * dof),
+        question_ends=np.zeros(asked * dof),
+        question_sides=np.zeros(asked, dtype=np.int32),
+        question_vertices=np.zeros(asked, dtype=np.int32),
+        answers=np.zeros(asked, dtype=np.int32),
+    )
     if motions.identity:
-        made.header[connect_layout.ROW_VALUES] = made.header[connect_layout.ROW]
+        made.put(row_values=made.row)
     return made

@@ -68,8 +68,8 @@ def solve_each(search: ConnectSearch, ends: Matrix, seeds: list[int], max_iterat
     )
     if kernels is None:
         return [None] * len(ends)
-    search.table.header[connect_layout.RESOLVE] = 1
-    search.table[connect_layout.NUMBERS][connect_layout.BOUND] = connect_layout.UNBOUNDED_COST
+    search.table.resolve = 1
+    search.table.bound = connect_layout.UNBOUNDED_COST
     paths = np.empty((FIRST_PATH * len(rows), rows.shape[2]))
     numbers = np.array([seed & (2**63 - 1) for seed in seeds], dtype=np.int64)
     results = np.empty((len(rows), connect_layout.RESULT_NUMBERS), dtype=np.int64)

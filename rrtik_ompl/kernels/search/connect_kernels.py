@@ -1,7 +1,7 @@
 """RRT-Connect whole in a kernel: two trees grow towards each other until a path between a start and a goal is certain.
 
 Sources: RRT-Connect [4]; the smaller tree grows [5]; dynamic domain: a vertex that was blocked is only extended towards
-samples near it [6]. With a BOUND it is AORRTC [15], see :mod:`rrtik_ompl.kernels.search.bounded.cost_kernels`.
+samples near it [6]. With a bound it is AORRTC [15], see :mod:`rrtik_ompl.kernels.search.bounded.cost_kernels`.
 
 The search, as worlds without kernels run it in Python, and the kernels of each line::
 
@@ -33,7 +33,7 @@ The search, as worlds without kernels run it in Python, and the kernels of each 
 
 A motion that the kernels leave undecided is inserted as OPEN (lazy). When the trees meet, the open motions of the path
 are asked for (``finish_or_ask``); those that are not free cut off what hangs on them (``apply_path_answers``), and the
-search goes on. After ``PATIENCE`` rejected paths each undecided motion is asked for before it is inserted (eager).
+search goes on. After ``patience`` rejected paths each undecided motion is asked for before it is inserted (eager).
 
 The search runs in short calls of :func:`resume`. Nothing depends on how its work is divided into calls.
 """
@@ -49,11 +49,8 @@ from rrtik_ompl.kernels.search.connect_motions import (
     aim_at_sample,
     aim_at_vertex,
     aim_straight,
-    candidate_row_of,
-    candidate_values_of,
     check_candidate,
     dof_in,
-    motions_of,
     set_row_values,
     tree_of,
 )
@@ -69,24 +66,24 @@ from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, row_at
 from rrtik_ompl.kernels.search.tree_kernels import add_vertex, clear_tree, is_full, size_of
 from rrtik_ompl.kernels.search.tree_layout import CERTAIN, NO_PARENT, OPEN
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import field, set_field, set_int
-from rrtik_ompl.kernels.simd.random_kernels import next_share_at, start_points_at
+from rrtik_ompl.kernels.simd.lanes import field, set_field
+from rrtik_ompl.kernels.simd.random_kernels import next_share, start_points
 
 
 @kernel
 def candidate(search: ConnectTable) -> bool:
     """Choose the next motion to check; False if there is none this time."""
-    phase = field(search, connect_layout.PHASE)
+    phase = search.phase
     if phase == connect_layout.CONNECT:
-        side, start = field(search, connect_layout.GROWING), field(search, connect_layout.FROM)
-        if aim_at_vertex(search, side, start, field(search, connect_layout.TARGET)):
+        side, start = search.growing, search.start
+        if aim_at_vertex(search, side, start, search.target):
             return True
-        set_field(search, connect_layout.PHASE, connect_layout.EXTEND)
+        search.phase = connect_layout.EXTEND
         return False
     if phase == connect_layout.STRAIGHT:
         if aim_straight(search):
             return True
-        set_field(search, connect_layout.PHASE, connect_layout.EXTEND)
+        search.phase = connect_layout.EXTEND
         return False
     return aim_at_sample(search)
 
@@ -97,8 +94,8 @@ def advance(search: ConnectTable) -> int:
     if not candidate(search):
         return connect_layout.RUNNING
     answer = check_candidate(search)
-    if answer == UNDECIDED and field(search, connect_layout.RESOLVE) != 0:
-        if field(search, connect_layout.REJECTED) < field(search, connect_layout.PATIENCE):
+    if answer == UNDECIDED and search.resolve != 0:
+        if search.rejected < search.patience:
             return on_free(search, OPEN)
         ask_for_candidate(search)
         return connect_layout.ASKING
@@ -118,18 +115,18 @@ def lacks_room(search: ConnectTable) -> bool:
 @inlined
 def samples_spent(search: ConnectTable) -> bool:
     """Whether the next motion wants a sample, and there may be no more."""
-    spent: bool = field(search, connect_layout.ITERATIONS) >= field(search, connect_layout.LIMIT)
-    return spent and field(search, connect_layout.PHASE) == connect_layout.EXTEND
+    spent: bool = search.iterations >= search.limit
+    return spent and search.phase == connect_layout.EXTEND
 
 
 @kernel
 def search_on(search: ConnectTable, budget: int) -> int:
     """Search on for at most ``budget`` motions or samples; returns the status.
 
-    ASKING: there are QUESTIONS in the table; write the ANSWERS (1 for free) and call again. FULL: a tree needs room.
+    ASKING: there are questions in the table; write the answers (1 for free) and call again. FULL: a tree needs room.
     """
     status = connect_layout.RUNNING
-    if field(search, connect_layout.ASKED) != connect_layout.NO_QUESTION:
+    if search.asked != connect_layout.NO_QUESTION:
         if lacks_room(search):
             return connect_layout.FULL
         status = resume_after_answers(search)
@@ -145,9 +142,9 @@ def search_on(search: ConnectTable, budget: int) -> int:
 
 @kernel
 def load_row(search: ConnectTable, source: Configuration) -> bool:
-    """Set ROW to a configuration; False if that is outside the box."""
-    lower, upper = field(search, connect_layout.LOWER), field(search, connect_layout.UPPER)
-    if not copy_inside(dof_in(search), source, lower, upper, candidate_row_of(search)):
+    """Set the row to a configuration; False if that is outside the box."""
+    lower, upper = search.lower, search.upper
+    if not copy_inside(dof_in(search), source, lower, upper, search.row):
         return False
     set_row_values(search)
     return True
@@ -157,7 +154,7 @@ def load_row(search: ConnectTable, source: Configuration) -> bool:
 def plant_roots(search: ConnectTable, side: int, rows: Configuration, count: int) -> int:
     """Make the rows the roots of a tree; returns the number of the first one outside the box, or -1."""
     tree = tree_of(search, side)
-    row, values = candidate_row_of(search), candidate_values_of(search)
+    row, values = search.row, search.row_values
     clear_tree(tree)
     for k in range(count):
         if not load_row(search, row_at(rows, dof_in(search), k)):
@@ -167,12 +164,12 @@ def plant_roots(search: ConnectTable, side: int, rows: Configuration, count: int
 
 
 @entry
-def rows_free(search: ConnectTable, rows: Configuration, count: int) -> int:
-    """Whether all of some configurations are in the box and proven free: 1 if they are, 0 if one may not be."""
+def rows_free(search: ConnectTable, count: int) -> int:
+    """Whether all starts are in the box and proven free: 1 if they are, 0 if one may not be."""
     for k in range(count):
-        if not load_row(search, row_at(rows, dof_in(search), k)):
+        if not load_row(search, row_at(search.start_rows, dof_in(search), k)):
             return 0
-        if not configuration_free(motions_of(search), candidate_row_of(search)):
+        if not configuration_free(search.motions, search.row):
             return 0
     return 1
 
@@ -182,21 +179,18 @@ def begin_between(
     search: ConnectTable, start_rows: Configuration, starts: int, goal_rows: Configuration, goals: int, seed: int
 ) -> int:
     """Start anew from roots at two addresses; returns -1, or the number of a root that is outside the box."""
-    for place in (
-        connect_layout.ITERATIONS,
-        connect_layout.REJECTED,
-        connect_layout.CHECKED,
-        connect_layout.STRAIGHT_TRIED,
-        connect_layout.ASKED,
-        connect_layout.QUESTIONS,
-        connect_layout.GROWER,
-    ):
-        set_field(search, place, 0)
-    set_field(search, connect_layout.PHASE, connect_layout.STRAIGHT)
-    set_field(search, connect_layout.GOAL_COUNT, goals)
-    set_field(search, connect_layout.RANDOM, seed)
-    next_share_at(search, connect_layout.RANDOM)
-    start_points_at(search, connect_layout.RANDOM, field(search, connect_layout.POINT), dof_in(search))
+    search.iterations = 0
+    search.rejected = 0
+    search.checked = 0
+    search.straight_tried = 0
+    search.asked = connect_layout.NO_QUESTION
+    search.questions = 0
+    search.grower = 0
+    search.phase = connect_layout.STRAIGHT
+    search.goal_count = goals
+    search.random = seed
+    next_share(search)
+    start_points(search, search.point, dof_in(search))
     outside = plant_roots(search, 0, start_rows, starts)
     if outside >= 0:
         return outside
@@ -206,9 +200,9 @@ def begin_between(
 
 @entry
 def keep_path(search: ConnectTable) -> int:
-    """Write the path to PATH, if there is room for it; returns its number of rows, PATH_ROWS."""
-    count = write_path(search, field(search, connect_layout.PATH), field(search, connect_layout.PATH_CAPACITY))
-    set_field(search, connect_layout.PATH_ROWS, count)
+    """Keep the path in the table, if there is room for it; returns its number of rows."""
+    count = write_path(search, search.path, search.path_capacity)
+    search.path_rows = count
     return count
 
 
@@ -227,7 +221,7 @@ def solve(search: ConnectTable, starts: int, goals: int, seed: int, budget: int)
 
     OUTSIDE less k: root number k is not in the box, goals counted after the starts.
     """
-    start_rows, goal_rows = field(search, connect_layout.START_ROWS), field(search, connect_layout.GOAL_ROWS)
+    start_rows, goal_rows = search.start_rows, search.goal_rows
     outside = begin_between(search, start_rows, starts, goal_rows, goals, seed)
     return connect_layout.OUTSIDE - outside if outside >= 0 else resume(search, budget)
 
@@ -235,9 +229,9 @@ def solve(search: ConnectTable, starts: int, goals: int, seed: int, budget: int)
 @kernel
 def refuse_all(search: ConnectTable) -> int:
     """Answer that none of what is asked is free; returns how many there were."""
-    count: int = field(search, connect_layout.QUESTIONS)
+    count: int = search.questions
     for k in range(count):
-        set_int(field(search, connect_layout.ANSWERS), k, 0)
+        search.answers[k] = 0
     return count
 
 
@@ -266,7 +260,7 @@ def solve_each(
             while status == connect_layout.ASKING:
                 questions += refuse_all(search)
                 status = search_on(search, budget)
-            budget -= field(search, connect_layout.ITERATIONS) + field(search, connect_layout.CHECKED)
+            budget -= search.iterations + search.checked
             if status == connect_layout.SOLVED:
                 rows = write_path(search, row_at(paths, dof, used), capacity - used)
             if rows > capacity - used:
@@ -274,10 +268,10 @@ def solve_each(
         place = connect_layout.RESULT_NUMBERS * k
         set_field(results, place, status)
         set_field(results, place + 1, rows)
-        set_field(results, place + 2, field(search, connect_layout.ITERATIONS))
-        set_field(results, place + 3, field(search, connect_layout.CHECKED))
+        set_field(results, place + 2, search.iterations)
+        set_field(results, place + 3, search.checked)
         set_field(results, place + 4, size_of(tree_of(search, 0)) + size_of(tree_of(search, 1)))
         set_field(results, place + 5, questions)
-        set_field(results, place + 6, field(search, connect_layout.REJECTED))
+        set_field(results, place + 6, search.rejected)
         used += rows
     return used

@@ -1,37 +1,77 @@
-"""The table of an RRT-Connect search in kernels: what each field is, and the words for its states."""
+"""The table of an RRT-Connect search in kernels, and the words for its states."""
 
 from __future__ import annotations
 
-from typing import NewType
+from rrtik_ompl.kernels.layout import JointValues
+from rrtik_ompl.kernels.record import Doubles, Floats, Ints, Record
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration, MotionTable
+from rrtik_ompl.kernels.search.tree_layout import TreeTable
 
 KERNELS = "search.connect_kernels"  # the library of these searches
-ConnectTable = NewType("ConnectTable", int)  # of the table of a search
 
-# What a search works on: the motion table of the world, its trees, the box of configurations, the numbers below, the
-# inverse bases of the sequence of samples ...
-MOTIONS, START_TREE, GOAL_TREE, LOWER, UPPER, NUMBERS, INVERSE_BASES = range(7)
-# ... its rules. RESOLVE: 1 if undecided motions are asked for, 0 if they count as colliding · PATIENCE: rejected paths
-# until undecided motions are asked for before they are inserted · LIMIT: of the samples ...
-RESOLVE, PATIENCE, LIMIT, START_ROWS, GOAL_ROWS = range(7, 12)
-# ... the motion that is checked: from vertex FROM of tree GROWING to ROW (joint values ROW_VALUES). If BRIDGE, it ends
-# at vertex TARGET of the other tree. GROWER: the tree that was extended towards the last sample. QUERY: floats of the
-# configuration whose nearest vertex is wanted. POINT: the last sample in the unit box ...
-PHASE, GROWER, GROWING, FROM, TARGET, BRIDGE, ROW, ROW_VALUES, QUERY, POINT, RANDOM = range(12, 23)
-# ... the vertices at which the trees meet and the state of the motion between them; what is asked. SIDES and VERTICES:
-# to which vertex of which tree a motion leads, or -1 ...
-START_MEETING, GOAL_MEETING, MEETING_STATE, ASKED, QUESTIONS, QUESTION_STARTS, QUESTION_ENDS = range(23, 30)
-QUESTION_SIDES, QUESTION_VERTICES, ANSWERS = range(30, 33)
-# ... and counts. CHECKED: motions. STRAIGHT_TRIED: of GOAL_COUNT goals.
-ITERATIONS, REJECTED, CHECKED, GOAL_COUNT, STRAIGHT_TRIED = range(33, 38)
-# Samples lie in the box around CENTRE whose sides are twice the number SPREAD, which grows with every sample.
-CENTRE = 38
-# PATH: memory for PATH_CAPACITY rows, and how many the path has, which is there if these are enough.
-PATH, PATH_CAPACITY, PATH_ROWS, FIELD_COUNT = range(39, 43)
 
-# The numbers, all in the unit of the configurations. RANGE: longest motion of the trees · DOMAIN: radius in which a
-# vertex is extended once it was blocked · BOUND: length that paths have to stay below, see kernels/search/bounded.
-RANGE, DOMAIN, SPREAD, BOUND = range(4)
-UNBOUNDED_COST = 1e30  # [unit of the configurations] of BOUND: paths of any length
+class ConnectTable(Record):
+    """An RRT-Connect search. Lengths are in the unit of the configurations."""
+
+    motions: MotionTable  # of the world
+    start_tree: TreeTable
+    goal_tree: TreeTable
+    lower: Doubles  # the box of configurations, in whole lanes
+    upper: Doubles
+    inverse_bases: Doubles  # of the sequence of samples
+
+    # Its rules.
+    range: float  # longest motion of the trees
+    domain: float  # radius in which a vertex is extended once it was blocked
+    bound: float  # length that paths have to stay below, see kernels/search/bounded
+    resolve: int  # 1 if undecided motions are asked for, 0 if they count as colliding
+    patience: int  # rejected paths until undecided motions are asked for before they are inserted
+    limit: int  # of the samples
+    start_rows: Configuration  # roots
+    goal_rows: Configuration
+    goal_count: int
+
+    # Samples lie in the box around the centre whose sides are twice the spread, which grows with every sample.
+    centre: Doubles
+    spread: float
+    point: Doubles  # the last sample, in the unit box
+    random: int  # state
+
+    # The motion that is checked: from a vertex of the tree that grows to ``row``.
+    phase: int
+    grower: int  # side of the tree that was extended towards the last sample
+    growing: int  # side of the tree
+    start: int  # vertex of it
+    target: int  # vertex of the other tree at which the motion ends ...
+    bridge: int  # ... if this is 1
+    row: Configuration
+    row_values: JointValues  # of the row; the same memory where they are the same
+    query: Floats  # the configuration whose nearest vertex is wanted
+
+    # Where the trees meet, and what is asked.
+    start_meeting: int  # vertices
+    goal_meeting: int
+    meeting_state: int  # of the motion between them
+    asked: int  # what
+    questions: int
+    question_starts: Configuration
+    question_ends: Configuration
+    question_sides: Ints  # to a vertex of which tree each motion leads
+    question_vertices: Ints  # and to which, or NO_VERTEX
+    answers: Ints
+
+    # Counts.
+    iterations: int
+    rejected: int  # paths
+    checked: int  # motions
+    straight_tried: int  # goals
+
+    path: Configuration  # memory for ``path_capacity`` rows
+    path_capacity: int
+    path_rows: int  # how many the path has, which is there if there is room for it
+
+
+UNBOUNDED_COST = 1e30  # [unit of the configurations] of the bound: paths of any length
 UNBOUNDED_SPREAD = 1e30  # [unit of the configurations] samples lie in the whole box
 UNBOUNDED_DOMAIN = 1e30  # [unit of the configurations] of a vertex that was never blocked
 

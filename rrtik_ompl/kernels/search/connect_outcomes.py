@@ -6,12 +6,9 @@ from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.bounded.cost_kernels import is_bounded, note_cost
 from rrtik_ompl.kernels.search.connect_layout import ConnectTable
 from rrtik_ompl.kernels.search.connect_motions import (
-    candidate_row_of,
-    candidate_values_of,
     dof_in,
     meeting_of,
     met_by,
-    number_of,
     set_meeting,
     tree_of,
 )
@@ -26,67 +23,65 @@ from rrtik_ompl.kernels.search.tree_kernels import (
     state_of,
 )
 from rrtik_ompl.kernels.search.tree_layout import CERTAIN, CUT, OPEN, TreeTable
-from rrtik_ompl.kernels.simd.access import count_up
 from rrtik_ompl.kernels.simd.compiled import kernel
-from rrtik_ompl.kernels.simd.lanes import field, int_at, set_field, set_int
 
 
 @kernel
 def shrink_domain(search: ConnectTable, side: int, vertex: int) -> None:
     """A vertex that was blocked is given a domain."""
-    set_radius(tree_of(search, side), vertex, number_of(search, connect_layout.DOMAIN))
+    set_radius(tree_of(search, side), vertex, search.domain)
 
 
 @kernel
 def on_blocked(search: ConnectTable) -> None:
     """The motion is not free."""
-    if field(search, connect_layout.PHASE) == connect_layout.EXTEND:
-        shrink_domain(search, field(search, connect_layout.GROWING), field(search, connect_layout.FROM))
-    elif field(search, connect_layout.PHASE) == connect_layout.CONNECT:
-        set_field(search, connect_layout.PHASE, connect_layout.EXTEND)
+    if search.phase == connect_layout.EXTEND:
+        shrink_domain(search, search.growing, search.start)
+    elif search.phase == connect_layout.CONNECT:
+        search.phase = connect_layout.EXTEND
 
 
 @kernel
 def on_free(search: ConnectTable, state: int) -> int:
     """The motion is free, or taken to be for now; returns the status."""
-    side, start = field(search, connect_layout.GROWING), field(search, connect_layout.FROM)
-    if field(search, connect_layout.BRIDGE) != 0:
+    side, start = search.growing, search.start
+    if search.bridge != 0:
         set_meeting(search, side, start)
-        set_meeting(search, 1 - side, field(search, connect_layout.TARGET))
-        set_field(search, connect_layout.MEETING_STATE, state)
+        set_meeting(search, 1 - side, search.target)
+        search.meeting_state = state
         return finish_or_ask(search)
-    row, values = candidate_row_of(search), candidate_values_of(search)
+    row, values = search.row, search.row_values
     vertex = add_vertex(tree_of(search, side), row, values, start, state, connect_layout.UNBOUNDED_DOMAIN)
     if is_bounded(search):
         note_cost(search, tree_of(search, side), vertex)
-    if field(search, connect_layout.PHASE) == connect_layout.EXTEND:
-        set_field(search, connect_layout.PHASE, connect_layout.CONNECT)
-        set_field(search, connect_layout.GROWING, 1 - side)
-        set_field(search, connect_layout.FROM, met_by(search, side, vertex))
-        set_field(search, connect_layout.TARGET, vertex)
+    if search.phase == connect_layout.EXTEND:
+        search.phase = connect_layout.CONNECT
+        search.growing = 1 - side
+        search.start = met_by(search, side, vertex)
+        search.target = vertex
     else:
-        set_field(search, connect_layout.FROM, vertex)
+        search.start = vertex
     return connect_layout.RUNNING
 
 
 @kernel
 def ask(search: ConnectTable, kind: int, start: Configuration, end: Configuration, side: int, vertex: int) -> None:
     """Ask whether the motion from ``start`` to ``end`` is free, which leads to a vertex of a tree or to NO_VERTEX."""
-    place, dof = field(search, connect_layout.QUESTIONS), dof_in(search)
-    copy_row(dof, start, row_at(field(search, connect_layout.QUESTION_STARTS), dof, place))
-    copy_row(dof, end, row_at(field(search, connect_layout.QUESTION_ENDS), dof, place))
-    set_int(field(search, connect_layout.QUESTION_SIDES), place, side)
-    set_int(field(search, connect_layout.QUESTION_VERTICES), place, vertex)
-    set_field(search, connect_layout.QUESTIONS, place + 1)
-    set_field(search, connect_layout.ASKED, kind)
+    place, dof = search.questions, dof_in(search)
+    copy_row(dof, start, row_at(search.question_starts, dof, place))
+    copy_row(dof, end, row_at(search.question_ends, dof, place))
+    search.question_sides[place] = side
+    search.question_vertices[place] = vertex
+    search.questions = place + 1
+    search.asked = kind
 
 
 @kernel
 def ask_for_candidate(search: ConnectTable) -> None:
-    """Ask whether the motion to ROW is free, before it is inserted."""
-    tree = tree_of(search, field(search, connect_layout.GROWING))
-    start, end = row_of(tree, field(search, connect_layout.FROM)), candidate_row_of(search)
-    set_field(search, connect_layout.QUESTIONS, 0)
+    """Ask whether the motion to the row is free, before it is inserted."""
+    tree = tree_of(search, search.growing)
+    start, end = row_of(tree, search.start), search.row
+    search.questions = 0
     ask(search, connect_layout.MOTION_QUESTION, start, end, 0, connect_layout.NO_VERTEX)
 
 
@@ -94,35 +89,35 @@ def ask_for_candidate(search: ConnectTable) -> None:
 def finish_or_ask(search: ConnectTable) -> int:
     """The trees have met: SOLVED if all motions of the path are certain, else the open ones are asked for."""
     kind, most = connect_layout.PATH_QUESTION, connect_layout.MAX_QUESTIONS
-    set_field(search, connect_layout.QUESTIONS, 0)
+    search.questions = 0
     for side in range(2):
         tree, vertex = tree_of(search, side), meeting_of(search, side)
         while vertex >= 0:
             parent = parent_of(tree, vertex)
-            if state_of(tree, vertex) == OPEN and field(search, connect_layout.QUESTIONS) < most:
+            if state_of(tree, vertex) == OPEN and search.questions < most:
                 ask(search, kind, row_of(tree, parent), row_of(tree, vertex), side, vertex)
             vertex = parent
-    if field(search, connect_layout.MEETING_STATE) != CERTAIN and field(search, connect_layout.QUESTIONS) < most:
+    if search.meeting_state != CERTAIN and search.questions < most:
         start, end = (
             row_of(tree_of(search, 0), meeting_of(search, 0)),
             row_of(tree_of(search, 1), meeting_of(search, 1)),
         )
         ask(search, kind, start, end, 0, connect_layout.NO_VERTEX)
-    return connect_layout.SOLVED if field(search, connect_layout.QUESTIONS) == 0 else connect_layout.ASKING
+    return connect_layout.SOLVED if search.questions == 0 else connect_layout.ASKING
 
 
 @kernel
 def apply_path_answers(search: ConnectTable) -> int:
     """Use the answers for the motions of a path; returns the status."""
     rejected = 0
-    for k in range(field(search, connect_layout.QUESTIONS)):
-        side = int_at(field(search, connect_layout.QUESTION_SIDES), k)
-        vertex = int_at(field(search, connect_layout.QUESTION_VERTICES), k)
-        free, tree = int_at(field(search, connect_layout.ANSWERS), k) != 0, tree_of(search, side)
+    for k in range(search.questions):
+        side = search.question_sides[k]
+        vertex = search.question_vertices[k]
+        free, tree = search.answers[k] != 0, tree_of(search, side)
         if not free:
             rejected += 1
         if vertex == connect_layout.NO_VERTEX:
-            set_field(search, connect_layout.MEETING_STATE, CERTAIN if free else OPEN)
+            search.meeting_state = CERTAIN if free else OPEN
         elif free and state_of(tree, vertex) != CUT:
             set_state(tree, vertex, CERTAIN)
         elif not free:
@@ -130,21 +125,21 @@ def apply_path_answers(search: ConnectTable) -> int:
             cut_branch(tree, vertex)
     if rejected == 0:
         return finish_or_ask(search)
-    count_up(search, connect_layout.REJECTED)
-    if field(search, connect_layout.PHASE) == connect_layout.CONNECT:
-        set_field(search, connect_layout.PHASE, connect_layout.EXTEND)
+    search.rejected += 1
+    if search.phase == connect_layout.CONNECT:
+        search.phase = connect_layout.EXTEND
     return connect_layout.RUNNING
 
 
 @kernel
 def resume_after_answers(search: ConnectTable) -> int:
     """Go on from the answers to what was asked; returns the status."""
-    kind = field(search, connect_layout.ASKED)
-    set_field(search, connect_layout.ASKED, connect_layout.NO_QUESTION)
+    kind = search.asked
+    search.asked = connect_layout.NO_QUESTION
     if kind == connect_layout.PATH_QUESTION:
         return apply_path_answers(search)
     if kind == connect_layout.MOTION_QUESTION:
-        if int_at(field(search, connect_layout.ANSWERS), 0) != 0:
+        if search.answers[0] != 0:
             return on_free(search, CERTAIN)
         on_blocked(search)
     return connect_layout.RUNNING

@@ -114,7 +114,8 @@ class PathRepair:
         self._table.points[: len(old)] = old
         self._cuts = ShortcutSearch(self._motions, self._table.given, asking=False)
         self._table.put(shortcuts=self._cuts.table, path=self._zeros(2 * rows + self._cuts.capacity))
-        self._table.search = self._search.serve(rows, self._iterations)
+        self._search.serve(rows, self._iterations)
+        self._table.search = self._search.table
 
     def _zeros(self, rows: int) -> Matrix:
         return aligned(np.zeros(rows * self._dof)).reshape(rows, self._dof)

@@ -26,7 +26,6 @@ from rrtik_ompl.kernels.search.shortcut_kernels import resume as resume_shortcut
 from rrtik_ompl.kernels.search.tree_kernels import parent_of
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import field, set_double
 
 DIRECTION_TOLERANCE = 1e-9  # change of a unit vector that is none
 
@@ -100,7 +99,7 @@ def check_path(repair: RepairTable, rows: int) -> int:
 @inlined
 def set_spread(search: ConnectTable, spread: float) -> None:
     """Set half the side of the box in which the next sample lies."""
-    set_double(field(search, connect_layout.NUMBERS), connect_layout.SPREAD, spread)
+    search.spread = spread
 
 
 @kernel
@@ -109,7 +108,7 @@ def sample_near(repair: RepairTable, first: int, second: int) -> None:
     search, dof = repair.search, dof_of(repair.motions)
     a, b = point_of(repair, first), point_of(repair, second)
     for k in range(dof):
-        set_double(field(search, connect_layout.CENTRE), k, 0.5 * (a[k] + b[k]))
+        search.centre[k] = 0.5 * (a[k] + b[k])
     set_spread(search, repair.box_ratio * distance(dof, a, b))
 
 

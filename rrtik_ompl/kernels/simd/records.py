@@ -160,6 +160,16 @@ def _exists(typingctx: Any, address: Any) -> Any:
 exists: Callable[[Record | View], bool] = intrinsic(_exists)  # whether there is a table or array, which may be absent
 
 
+def _same_place(typingctx: Any, one: Any, other: Any) -> Any:
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.icmp_signed("==", *args)
+
+    return types.boolean(one, other), emit
+
+
+same_place: Callable[[View, View], bool] = intrinsic(_same_place)  # whether two arrays are one
+
+
 def _type_of_record(record: Record, context: Any) -> RecordType:
     return RecordType(type(record))
 

@@ -16,20 +16,13 @@ from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, distanc
 from rrtik_ompl.kernels.search.tree_kernels import cost_of, nearest_by_cost, parent_of, row_of, set_cost, size_of
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, field
-from rrtik_ompl.kernels.simd.random_kernels import next_share_at
-
-
-@inlined
-def bound_of(search: ConnectTable) -> Any:
-    """The length that paths have to stay below."""
-    return double_at(field(search, connect_layout.NUMBERS), connect_layout.BOUND)
+from rrtik_ompl.kernels.simd.random_kernels import next_share
 
 
 @inlined
 def is_bounded(search: ConnectTable) -> bool:
     """Whether there is a bound."""
-    bounded: bool = bound_of(search) < connect_layout.UNBOUNDED_COST
+    bounded: bool = search.bound < connect_layout.UNBOUNDED_COST
     return bounded
 
 
@@ -46,25 +39,25 @@ def from_roots(dof: int, tree: TreeTable, row: Configuration) -> float:
 @kernel
 def vertex_for(search: ConnectTable, tree: TreeTable, other: TreeTable, row: Configuration) -> Any:
     """The vertex to be extended towards a sample, and -1 if no path below the bound leads through that."""
-    dof, bound = dof_of(field(search, connect_layout.MOTIONS)), bound_of(search)
+    dof, bound = dof_of(search.motions), search.bound
     least, most = from_roots(dof, tree, row), bound - from_roots(dof, other, row)
     if least >= most:
         return -1
-    cost = least + next_share_at(search, connect_layout.RANDOM) * (most - least)
-    return nearest_by_cost(tree, field(search, connect_layout.QUERY), cost)
+    cost = least + next_share(search) * (most - least)
+    return nearest_by_cost(tree, search.query, cost)
 
 
 @kernel
 def may_lead(search: ConnectTable, tree: TreeTable, vertex: int, row: Configuration, rest: float) -> bool:
     """Whether a path below the bound may lead from a vertex to a configuration, from which ``rest`` is left."""
-    dof = dof_of(field(search, connect_layout.MOTIONS))
-    return cost_of(tree, vertex) + distance(dof, row_of(tree, vertex), row) + rest < bound_of(search)  # type: ignore[no-any-return]
+    dof = dof_of(search.motions)
+    return cost_of(tree, vertex) + distance(dof, row_of(tree, vertex), row) + rest < search.bound  # type: ignore[no-any-return]
 
 
 @kernel
 def note_cost(search: ConnectTable, tree: TreeTable, vertex: int) -> None:
     """Set the cost of a new vertex: that of its parent, and the motion from there."""
-    parent, dof = parent_of(tree, vertex), dof_of(field(search, connect_layout.MOTIONS))
+    parent, dof = parent_of(tree, vertex), dof_of(search.motions)
     cost = 0.0
     if parent >= 0:
         cost = cost_of(tree, parent) + distance(dof, row_of(tree, parent), row_of(tree, vertex))
