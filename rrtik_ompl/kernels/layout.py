@@ -36,9 +36,6 @@ class JointValues(Doubles):
 
 
 # Addresses of arrays, by what they hold.
-IntArray = NewType("IntArray", int)
-DoubleArray = NewType("DoubleArray", int)
-LaneArray = NewType("LaneArray", int)
 BallArray = NewType("BallArray", int)
 HeadArray = NewType("HeadArray", int)
 ShapeArray = NewType("ShapeArray", int)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 
@@ -69,13 +68,13 @@ def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[M
         image.add(each)
     places = {
         "world": image.add(fast.table, links=dict(enumerate(fast.tables))),
-        "motions": image.add(motions.table, links={motion_layout.WORLD: fast.table}),
+        "motions": image.add(motions.table, links={motions.table.places["world"]: fast.table}),
         "probe": image.add(probe_table(fast.tables[layout.OUTER_PRIMITIVES : layout.INNER_PRIMITIVES + 1])),
         "pathRows": PATH_ROWS,
     }
     places["search"] = _add_connect(image, problem, motions)
     shortcuts = ShortcutSearch(motions, np.zeros((PATH_ROWS, problem.robot.dof)) + problem.start, asking=False)
-    places["shortcuts"] = image.add(shortcuts.table, links={shortcuts.table.places["motions"]: motions.table})
+    places["shortcuts"] = image.add(shortcuts.table)
     places["crdt"] = _add_crdt(image, problem, world, motions)
     return image, places
 
@@ -90,13 +89,7 @@ def _add_connect(image: MemoryImage, problem: Problem, motions: FastMotions) -> 
     """RRT-Connect, with its trees, its ends and the path that it finds."""
     search = ConnectSearch(motions, *problem.robot.finite_range(), vertices=VERTICES)
     search.table.put(path=np.zeros((PATH_ROWS, motions.dof)))
-    alias = {tree_layout.VALUES: tree_layout.ROWS} if motions.identity else {}
-    for tree in search.trees:
-        image.add(tree, same=alias)
-    places = search.table.places
-    links: dict[int, Any] = {places["motions"]: motions.table}
-    links |= {places[f"{side}_tree"]: tree for side, tree in zip(("start", "goal"), search.trees, strict=True)}
-    return image.add(search.table, links=links)
+    return image.add(search.table)
 
 
 def _add_crdt(image: MemoryImage, problem: Problem, world: World, motions: FastMotions) -> int:
@@ -105,8 +98,5 @@ def _add_crdt(image: MemoryImage, problem: Problem, world: World, motions: FastM
     none = np.zeros(motions.dof)
     rules = CrdtRules(*problem.robot.finite_range(), same, none, same)
     root = problem.start[None]
-    table, trees = CrdtSearch(world, rules, 1, None, root, root, vertices=VERTICES).tables
-    for tree in trees:
-        image.add(tree)
-    links: dict[int, Any] = {crdt_layout.MOTIONS: motions.table}
-    return image.add(table, links=links | {crdt_layout.TREE + side: tree for side, tree in enumerate(trees)})
+    table, _ = CrdtSearch(world, rules, 1, None, root, root, vertices=VERTICES).tables
+    return image.add(table)

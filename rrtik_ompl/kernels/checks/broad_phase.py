@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.kernels import layout
-from rrtik_ompl.kernels.layout import LaneArray, PrimitiveList, PrimitiveTable
+from rrtik_ompl.kernels.layout import PrimitiveList, PrimitiveTable
+from rrtik_ompl.kernels.record import Floats
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import bits, first_bit, float_at, highest, lanes_at, larger, lowest, set_int, spread
 from rrtik_ompl.kernels.tables.accessors import block_boxes_of, block_count_of, boxes_of, padded_count_of
@@ -19,7 +20,7 @@ ZERO = np.float32(0.0)
 
 
 @inlined
-def boxes_that_meet(boxes: LaneArray, run: int, k: int, low: Any, high: Any) -> int:
+def boxes_that_meet(boxes: Floats, run: int, k: int, low: Any, high: Any) -> int:
     """Which of ``WIDTH`` bounding boxes meet a box, whose corners are given in all lanes."""
     x = (lanes_at(boxes, layout.LOW_X * run + k) < high[0]) & (lanes_at(boxes, layout.HIGH_X * run + k) > low[0])
     y = (lanes_at(boxes, layout.LOW_Y * run + k) < high[1]) & (lanes_at(boxes, layout.HIGH_Y * run + k) > low[1])
@@ -39,7 +40,7 @@ def listed(found: PrimitiveList, count: int, first: int, left: int) -> int:
 
 
 @inlined
-def block_in_reach(boxes: LaneArray, run: int, block: int, x: Any, y: Any, z: Any, radius: Any) -> bool:
+def block_in_reach(boxes: Floats, run: int, block: int, x: Any, y: Any, z: Any, radius: Any) -> bool:
     """Whether a ball meets the box around a block of primitives in any lane."""
     place, side = block, run * WIDTH
     square = spread(ZERO)

@@ -25,13 +25,13 @@ from rrtik_ompl.kernels.layout import (
     UNDECIDED,
     UNSOUND,
     BallTable,
-    IntArray,
     JointValues,
     LikelyBalls,
     PrimitiveTable,
     Watch,
     WorldTable,
 )
+from rrtik_ompl.kernels.record import Ints
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
     bits,
@@ -132,7 +132,7 @@ def sound_count(world: WorldTable, count: int) -> int:
 
 
 @kernel
-def resolve_doubtful(world: WorldTable, rows: JointValues, waiting: int, answers: IntArray) -> None:
+def resolve_doubtful(world: WorldTable, rows: JointValues, waiting: int, answers: Ints) -> None:
     """Answer what a second check finds for the rows that wait: by their inner balls, then by the narrow phase."""
     queue = waiting_of(scratch_of(world))
     for lane in range(WIDTH):
@@ -149,7 +149,7 @@ def resolve_doubtful(world: WorldTable, rows: JointValues, waiting: int, answers
 
 
 @entry
-def classify(world: WorldTable, rows: JointValues, count: int, answers: IntArray, resolve: int) -> int:
+def classify(world: WorldTable, rows: JointValues, count: int, answers: Ints, resolve: int) -> int:
     """Check ``count`` rows of joint values (float64) at an address; int32 answers go to another.
 
     Rows that are not proven free wait until there are enough of them to fill all lanes of a second check. Returns
@@ -267,9 +267,9 @@ def classify_edges(
     world: WorldTable,
     starts: JointValues,
     ends: JointValues,
-    steps: IntArray,
+    steps: Ints,
     count: int,
-    answers: IntArray,
+    answers: Ints,
     resolve: int,
 ) -> int:
     """Check ``count`` motions between rows of two arrays in the given numbers of steps; int32 answers.

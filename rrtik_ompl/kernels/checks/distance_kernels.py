@@ -16,14 +16,13 @@ from rrtik_ompl.kernels.checks.obstacle_kernels import UNBOUNDED_DISTANCE, ZERO,
 from rrtik_ompl.kernels.checks.sphere_kernels import place_cluster, placed_centre, prepare
 from rrtik_ompl.kernels.layout import (
     BallTable,
-    DoubleArray,
-    IntArray,
     JointValues,
     PrimitiveTable,
     ProbeTable,
     ScratchTable,
     WorldTable,
 )
+from rrtik_ompl.kernels.record import Doubles, Ints
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
     bits,
@@ -254,8 +253,8 @@ def measure(
     values: JointValues,
     count: int,
     probe: ProbeTable,
-    distances: DoubleArray,
-    pairs: IntArray,
+    distances: Doubles,
+    pairs: Ints,
 ) -> int:
     """Distances (float64) and numbers of the nearest pairs (int32) for ``count`` rows of joint values (float64).
 

@@ -13,7 +13,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from rrtik_ompl.kernels import layout
-from rrtik_ompl.kernels.layout import COLLIDING, FREE, UNDECIDED, CornerArray, Frame, LaneArray, SolidTable
+from rrtik_ompl.kernels.layout import COLLIDING, FREE, UNDECIDED, CornerArray, Frame, SolidTable
+from rrtik_ompl.kernels.record import Floats
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import bits, choose, first_bit, float_at, highest, set_lanes, spread
 from rrtik_ompl.kernels.tables.accessors import (
@@ -30,7 +31,7 @@ from rrtik_ompl.kernels.tables.accessors import (
     solid_of,
 )
 
-Frames: TypeAlias = tuple[Frame, Frame, LaneArray]  # of the first and the second solid; lanes to write to
+Frames: TypeAlias = tuple[Frame, Frame, Floats]  # of the first and the second solid; lanes to write to
 
 MOST_STEPS = 24
 CONVERGED = 1e-7  # [m]
@@ -106,7 +107,7 @@ def corner_at(corners: CornerArray, block: int, lane: int) -> Any:
 
 
 @kernel
-def farthest(solids: SolidTable, number: int, frame: Frame, note: LaneArray, lane: int, direction: Any) -> Any:
+def farthest(solids: SolidTable, number: int, frame: Frame, note: Floats, lane: int, direction: Any) -> Any:
     """The point of a solid's core that lies farthest along a unit vector, in the world. Here lanes hold corners.
 
     ``note`` is the address of lanes to write to.

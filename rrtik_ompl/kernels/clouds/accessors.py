@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rrtik_ompl.kernels.layout import AXES, IntArray, PrimitiveTable
+from rrtik_ompl.kernels.layout import AXES, PrimitiveTable
+from rrtik_ompl.kernels.record import Ints
 from rrtik_ompl.kernels.simd.access import field_reader
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined
 from rrtik_ompl.kernels.simd.lanes import field, float_at, int_at, lanes_at
@@ -14,7 +15,7 @@ from rrtik_ompl.kernels.tables.accessors import clouds_of
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF, BoxGroups, CloudTable, PointBlocks
 
 level_count_of: Callable[[CloudTable], int] = field_reader(layout.LEVEL_COUNT)
-firsts_of: Callable[[CloudTable], IntArray] = field_reader(layout.FIRSTS)
+firsts_of: Callable[[CloudTable], Ints] = field_reader(layout.FIRSTS)
 groups_of: Callable[[CloudTable], BoxGroups] = field_reader(layout.GROUPS)
 blocks_of: Callable[[CloudTable], PointBlocks] = field_reader(layout.BLOCKS)
 

@@ -11,7 +11,8 @@ from typing import Any
 from rrtik_ompl.kernels.ik import branch_layout
 from rrtik_ompl.kernels.ik.branch_layout import BRANCHES, DOF, MATRIX_NUMBERS, MATRIX_SIDE
 from rrtik_ompl.kernels.ik.ik_layout import LimbTable
-from rrtik_ompl.kernels.layout import DOUBLE_BYTES, DoubleArray, IntArray
+from rrtik_ompl.kernels.layout import DOUBLE_BYTES
+from rrtik_ompl.kernels.record import Doubles, Ints
 from rrtik_ompl.kernels.simd.access import field_reader, member_reader
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined
 from rrtik_ompl.kernels.simd.lanes import double_at, field, set_double, set_wide_lanes, wide_lanes_at
@@ -19,9 +20,9 @@ from rrtik_ompl.kernels.simd.lanes import double_at, field, set_double, set_wide
 # Arm
 from_world_of: Callable[[branch_layout.ArmTable], branch_layout.Frame] = field_reader(branch_layout.FROM_WORLD)
 to_frame_of: Callable[[branch_layout.ArmTable], branch_layout.Frame] = field_reader(branch_layout.TO_FRAME)
-lowest_of: Callable[[branch_layout.ArmTable], DoubleArray] = field_reader(branch_layout.LOWEST)
-highest_of: Callable[[branch_layout.ArmTable], DoubleArray] = field_reader(branch_layout.HIGHEST)
-turning_of: Callable[[branch_layout.ArmTable], IntArray] = field_reader(branch_layout.TURNING)
+lowest_of: Callable[[branch_layout.ArmTable], Doubles] = field_reader(branch_layout.LOWEST)
+highest_of: Callable[[branch_layout.ArmTable], Doubles] = field_reader(branch_layout.HIGHEST)
+turning_of: Callable[[branch_layout.ArmTable], Ints] = field_reader(branch_layout.TURNING)
 limb_of: Callable[[branch_layout.ArmTable], LimbTable] = field_reader(branch_layout.LIMB)
 
 # Call
@@ -30,7 +31,7 @@ block_count_of: Callable[[branch_layout.CallTable], int] = field_reader(branch_l
 pose_of: Callable[[branch_layout.CallTable, int], branch_layout.Matrices] = member_reader(
     branch_layout.POSES, DOUBLE_BYTES * MATRIX_NUMBERS
 )
-near_of: Callable[[branch_layout.CallTable], DoubleArray] = field_reader(branch_layout.NEAR)
+near_of: Callable[[branch_layout.CallTable], Doubles] = field_reader(branch_layout.NEAR)
 q_of: Callable[[branch_layout.CallTable], branch_layout.Lanes] = field_reader(branch_layout.Q)
 real_of: Callable[[branch_layout.CallTable], int] = field_reader(branch_layout.REAL)
 fits_of: Callable[[branch_layout.CallTable], int] = field_reader(branch_layout.FITS)

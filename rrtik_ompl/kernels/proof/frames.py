@@ -6,6 +6,7 @@ from math import cos, sin
 from typing import Any
 
 from rrtik_ompl.kernels.checks.gjk import dot
+from rrtik_ompl.kernels.layout import JointValues
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.accessors import (
     base_of_sweep,
@@ -57,7 +58,7 @@ def carried(array: int, place: int, p: Any) -> Any:
 
 
 @kernel
-def place_frames(table: ProofTable, start: int, end: int, s: float, node: int) -> None:
+def place_frames(table: ProofTable, start: JointValues, end: JointValues, s: float, node: int) -> None:
     """Write the frames of all joints at a share s of the motion between two rows of joint values."""
     frames, joints, parents = frames_of(table), joints_of(table), parents_of(table)
     first = node_frames(table, node)
@@ -105,7 +106,7 @@ def seen_from(frames: int, frame: int, base: int, seen: int, to: int) -> None:
 
 
 @kernel
-def bound_bends(table: ProofTable, start: int, end: int) -> None:
+def bound_bends(table: ProofTable, start: JointValues, end: JointValues) -> None:
     """Bound the acceleration of each sweep's points over a whole motion, time running from 0 to 1 [m].
 
     From the body inwards: what turns at rate w about an axis at most r away adds the centripetal w^2 r and the Coriolis

@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.kernels.checks.gjk import dot
+from rrtik_ompl.kernels.layout import JointValues
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.accessors import (
     base_of_pair,
@@ -53,8 +54,10 @@ from rrtik_ompl.kernels.proof.cloud_planes import cloud_apart
 from rrtik_ompl.kernels.proof.frames import bound_bends, place_frames, seen_from
 from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.proof.planes import ball_gap, best_plane, beyond_half_space
+from rrtik_ompl.kernels.record import Doubles, Ints
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import double_at, int_at, set_double, set_int
+from rrtik_ompl.kernels.simd.records import row_at
 
 EAGER = 0.9  # of a ball's radius: bodies that are nearer than the sagitta less this are split at once, not compared
 SHARE = 0.25  # of a ball's radius: up to this sagitta bodies are compared with the points of a cloud
@@ -65,7 +68,7 @@ FORGET = 1 << 30  # stamps, after which they begin anew
 
 
 @kernel
-def begin_motion(table: ProofTable, start: int, end: int) -> None:
+def begin_motion(table: ProofTable, start: JointValues, end: JointValues) -> None:
     """Make what is computed once a motion: the stamp of its nodes, the bends of the sweeps."""
     last, stamps = last_stamp_of(table), stamps_of(table)
     stamp = int_at(last, 0) + 1
@@ -78,7 +81,7 @@ def begin_motion(table: ProofTable, start: int, end: int) -> None:
 
 
 @kernel
-def visit(table: ProofTable, start: int, end: int, node: int) -> None:
+def visit(table: ProofTable, start: JointValues, end: JointValues, node: int) -> None:
     """Make the frames of a node, a multiple of 1 / 2**DEEPEST of the motion, if this motion has not had it yet."""
     stamps, stamp = stamps_of(table), int_at(last_stamp_of(table), 0)
     if int_at(stamps, node) != stamp:
@@ -237,7 +240,7 @@ def settle(table: ProofTable, level: int, number: int) -> int:
 
 
 @kernel
-def prove_motion(table: ProofTable, start: int, end: int) -> Any:
+def prove_motion(table: ProofTable, start: JointValues, end: JointValues) -> Any:
     """Prove one motion. Returns a pair that is not proven, -1 if there is none, and where on the motion that is."""
     begin_motion(table, start, end)
     lists, stack, full = lists_of(table), stack_of(table), layout.NODES - 1
@@ -270,7 +273,7 @@ def prove_motion(table: ProofTable, start: int, end: int) -> Any:
 
 
 @entry
-def prove(table: ProofTable, starts: int, ends: int, count: int, pairs: int, places: int) -> int:
+def prove(table: ProofTable, starts: JointValues, ends: JointValues, count: int, pairs: Ints, places: Doubles) -> int:
     """Prove motions between rows of joint values (float64); returns how many are not proven.
 
     Args:
@@ -281,11 +284,11 @@ def prove(table: ProofTable, starts: int, ends: int, count: int, pairs: int, pla
         pairs: Gets for each motion -1, or the number of a pair that is not proven apart (int32).
         places: Gets where on the motion that is, from 0 to 1 (float64).
     """
-    open_, row = 0, 8 * joint_count_of(table)
+    open_, joints = 0, joint_count_of(table)
     for k in range(count):
-        pair, place = prove_motion(table, starts + row * k, ends + row * k)
-        set_int(pairs, k, pair)
-        set_double(places, k, place)
+        pair, place = prove_motion(table, row_at(starts, joints, k), row_at(ends, joints, k))
+        pairs[k] = pair
+        places[k] = place
         if pair >= 0:
             open_ += 1
     return open_

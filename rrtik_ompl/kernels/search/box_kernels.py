@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from rrtik_ompl.kernels.layout import DoubleArray
+from rrtik_ompl.kernels.record import Doubles
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration
 from rrtik_ompl.kernels.simd.compiled import kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, set_double
 
 # [unit of the configurations] by which a start or goal may lie outside the box, as robots and spaces tolerate a little
 BOX_TOLERANCE = 1e-6
 
 
 @kernel
-def copy_inside(dof: int, source: Configuration, lower: DoubleArray, upper: DoubleArray, sink: Configuration) -> bool:
+def copy_inside(dof: int, source: Configuration, lower: Doubles, upper: Doubles, sink: Configuration) -> bool:
     """Copy a configuration; False, at the first coordinate beyond its bounds, if that is outside the box."""
     for k in range(dof):
-        value = double_at(source, k)
-        if not (value >= double_at(lower, k) - BOX_TOLERANCE and value <= double_at(upper, k) + BOX_TOLERANCE):
+        value = source[k]
+        if not (value >= lower[k] - BOX_TOLERANCE and value <= upper[k] + BOX_TOLERANCE):
             return False
-        set_double(sink, k, value)
+        sink[k] = value
     return True

@@ -14,12 +14,12 @@ from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.connect_layout import ConnectTable
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions, MotionsFree
-from rrtik_ompl.kernels.search.tree_layout import CAPACITY, SIZE
+from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.search.tree_memory import grow, tree_table
 from rrtik_ompl.kernels.simd.halton import inverse_bases
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import Table, aligned, packed, whole_lanes
+from rrtik_ompl.kernels.tables.memory import aligned, packed, whole_lanes
 
 PATIENCE = 8  # rejected paths until undecided motions are asked for at once
 FIRST_CAPACITY = 64 * WIDTH  # vertices
@@ -131,7 +131,7 @@ class ConnectSearch:
         return self._search
 
     @property
-    def trees(self) -> tuple[Table, Table]:
+    def trees(self) -> tuple[TreeTable, TreeTable]:
         """The trees of the start and of the goal."""
         return self._trees[0], self._trees[1]
 
@@ -143,7 +143,7 @@ class ConnectSearch:
     @property
     def capacity(self) -> int:
         """Vertices for which each tree has room."""
-        return int(self._trees[0].header[CAPACITY])
+        return self._trees[0].capacity
 
     def serve(self, roots: int, max_iterations: int) -> int:
         """Let other kernels begin searches, with as many roots on a side; the address of the table.
@@ -169,7 +169,7 @@ class ConnectSearch:
         Samples, vertices of both trees, motions checked, motions asked for, and paths that an answer has broken.
         """
         search = self._search
-        vertices = sum(int(tree.header[SIZE]) for tree in self._trees)
+        vertices = sum(tree.size for tree in self._trees)
         return {
             "iterations": search.iterations,
             "vertices": vertices,
@@ -240,15 +240,15 @@ class ConnectSearch:
         return aligned(np.zeros(count * self._dof)).reshape(count, self._dof)
 
 
-def _search_table(motions: FastMotions, trees: list[Table], box: tuple[Vector, Vector]) -> ConnectTable:
+def _search_table(motions: FastMotions, trees: list[TreeTable], box: tuple[Vector, Vector]) -> ConnectTable:
     """The table of a search; fields that are not named here are numbers that the kernels set."""
     dof, asked = motions.dof, connect_layout.MAX_QUESTIONS
     none = whole_lanes(np.zeros(dof))
     made = packed(
         ConnectTable,
-        motions=motions.address,
-        start_tree=trees[0].address,
-        goal_tree=trees[1].address,
+        motions=motions.table,
+        start_tree=trees[0],
+        goal_tree=trees[1],
         lower=whole_lanes(box[0]),
         upper=whole_lanes(box[1]),
         inverse_bases=whole_lanes(np.array(inverse_bases(dof))),

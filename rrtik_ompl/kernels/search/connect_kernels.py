@@ -41,6 +41,7 @@ The search runs in short calls of :func:`resume`. Nothing depends on how its wor
 from __future__ import annotations
 
 from rrtik_ompl.kernels.layout import FREE, UNDECIDED
+from rrtik_ompl.kernels.record import Wholes
 from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.bounded.cost_kernels import note_cost
 from rrtik_ompl.kernels.search.box_kernels import copy_inside
@@ -63,10 +64,9 @@ from rrtik_ompl.kernels.search.connect_outcomes import (
 )
 from rrtik_ompl.kernels.search.motions.motion_kernels import configuration_free
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, row_at
-from rrtik_ompl.kernels.search.tree_kernels import add_vertex, clear_tree, is_full, size_of
+from rrtik_ompl.kernels.search.tree_kernels import add_vertex, clear_tree, is_full
 from rrtik_ompl.kernels.search.tree_layout import CERTAIN, NO_PARENT, OPEN
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import field, set_field
 from rrtik_ompl.kernels.simd.random_kernels import next_share, start_points
 
 
@@ -239,12 +239,12 @@ def refuse_all(search: ConnectTable) -> int:
 def solve_each(
     search: ConnectTable,
     ends: Configuration,
-    seeds: int,
+    seeds: Wholes,
     count: int,
     budget: int,
     paths: Configuration,
     capacity: int,
-    results: int,
+    results: Wholes,
 ) -> int:
     """Search for one query after the other; of what is asked none is free, so it is never asked.
 
@@ -255,7 +255,7 @@ def solve_each(
     for k in range(count):
         status, rows, questions = connect_layout.RUNNING, 0, 0
         start, goal = row_at(ends, dof, 2 * k), row_at(ends, dof, 2 * k + 1)
-        if budget > 0 and begin_between(search, start, 1, goal, 1, field(seeds, k)) < 0:
+        if budget > 0 and begin_between(search, start, 1, goal, 1, seeds[k]) < 0:
             status = search_on(search, budget)
             while status == connect_layout.ASKING:
                 questions += refuse_all(search)
@@ -266,12 +266,12 @@ def solve_each(
             if rows > capacity - used:
                 status, rows = connect_layout.RUNNING, 0
         place = connect_layout.RESULT_NUMBERS * k
-        set_field(results, place, status)
-        set_field(results, place + 1, rows)
-        set_field(results, place + 2, search.iterations)
-        set_field(results, place + 3, search.checked)
-        set_field(results, place + 4, size_of(tree_of(search, 0)) + size_of(tree_of(search, 1)))
-        set_field(results, place + 5, questions)
-        set_field(results, place + 6, search.rejected)
+        results[place] = status
+        results[place + 1] = rows
+        results[place + 2] = search.iterations
+        results[place + 3] = search.checked
+        results[place + 4] = tree_of(search, 0).size + tree_of(search, 1).size
+        results[place + 5] = questions
+        results[place + 6] = search.rejected
         used += rows
     return used

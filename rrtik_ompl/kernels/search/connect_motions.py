@@ -10,11 +10,10 @@ from rrtik_ompl.kernels.checks.check_kernels import check_part
 from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.bounded.cost_kernels import from_roots, is_bounded, may_lead, vertex_for
 from rrtik_ompl.kernels.search.connect_layout import ConnectTable
-from rrtik_ompl.kernels.search.motions.motion_kernels import descends, dof_of, set_joint_values, step_count, world_of
+from rrtik_ompl.kernels.search.motions.motion_kernels import descends, set_joint_values, step_count
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, copy_row, distance
 from rrtik_ompl.kernels.search.tree_kernels import (
     cost_of,
-    live_of,
     nearest_and_square,
     nearest_by_cost,
     nearest_vertex,
@@ -25,10 +24,7 @@ from rrtik_ompl.kernels.search.tree_kernels import (
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
-    double_at,
     larger,
-    set_double,
-    set_float,
     set_lanes,
     set_wide_lanes,
     single,
@@ -47,7 +43,7 @@ RANGE_TOLERANCE = 1e-9  # of the range, by which a motion of the trees may be lo
 @inlined
 def dof_in(search: ConnectTable) -> int:
     """How many numbers a configuration has."""
-    return dof_of(search.motions)
+    return search.motions.dof
 
 
 @inlined
@@ -84,7 +80,7 @@ def nearest_to(search: ConnectTable, side: int, row: Configuration) -> Any:
     """The vertex of a tree that is nearest to a configuration."""
     query = search.query
     for k in range(dof_in(search)):
-        set_float(query, k, np.float32(double_at(row, k)))
+        query[k] = np.float32(row[k])
     return nearest_vertex(tree_of(search, side), query)
 
 
@@ -96,7 +92,7 @@ def met_by(search: ConnectTable, side: int, vertex: int) -> Any:
         return nearest_to(search, 1 - side, row)
     query = search.query
     for k in range(dof_in(search)):
-        set_float(query, k, np.float32(double_at(row, k)))
+        query[k] = np.float32(row[k])
     return nearest_by_cost(other, query, max(search.bound - cost_of(tree, vertex), 0.0))
 
 
@@ -106,11 +102,11 @@ def steer(search: ConnectTable, start: Configuration, aim: Configuration, length
     row, span = search.row, search.range
     reached = length <= span * (1.0 + RANGE_TOLERANCE)
     for k in range(dof_in(search)):
-        there = double_at(aim, k)
+        there = aim[k]
         if not reached:
-            here = double_at(start, k)
+            here = start[k]
             there = here + (there - here) * (span / length)
-        set_double(row, k, there)
+        row[k] = there
     set_row_values(search)
     return reached
 
@@ -129,9 +125,9 @@ def check_candidate(search: ConnectTable) -> int:
     resolve = search.resolve != 0
     search.checked += 1
     there, first = search.row_values, 1
-    if descends(dof_of(motions), start, row):
+    if descends(motions.dof, start, row):
         values, there, first = there, values, last - count
-    return check_part(world_of(motions), values, there, last, first, count, resolve)
+    return check_part(motions.world, values, there, last, first, count, resolve)
 
 
 @inlined
@@ -205,7 +201,7 @@ def aim_at_sample(search: ConnectTable) -> bool:
     """The next motion: from the nearest vertex of a tree towards a sample. False if that is outside its domain."""
     search.iterations += 1
     side = 1 - search.grower
-    if live_of(tree_of(search, side)) > live_of(tree_of(search, 1 - side)):
+    if tree_of(search, side).live > tree_of(search, 1 - side).live:
         side = 1 - side
     search.grower = side
     dof, row = dof_in(search), search.row

@@ -61,7 +61,7 @@ class PathRepair:
         self._iterations = iterations
         self._table = packed(
             RepairTable,
-            motions=motions.address,
+            motions=motions.table,
             step=0.5 * max_edge,
             box_ratio=GAP_BOX_RATIO,
             tries=tries,

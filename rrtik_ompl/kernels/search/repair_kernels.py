@@ -16,7 +16,6 @@ from rrtik_ompl.kernels.search.connect_outcomes import write_path
 from rrtik_ompl.kernels.search.motions.motion_kernels import (
     check_motion,
     configuration_free,
-    dof_of,
     step_count,
     whole_steps,
 )
@@ -33,25 +32,25 @@ DIRECTION_TOLERANCE = 1e-9  # change of a unit vector that is none
 @inlined
 def given(repair: RepairTable, number: int) -> Configuration:
     """Address of a waypoint of the path as it was given."""
-    return row_at(repair.given, dof_of(repair.motions), number)
+    return row_at(repair.given, repair.motions.dof, number)
 
 
 @inlined
 def point_of(repair: RepairTable, number: int) -> Configuration:
     """Address of a point along the path."""
-    return row_at(repair.points, dof_of(repair.motions), number)
+    return row_at(repair.points, repair.motions.dof, number)
 
 
 @inlined
 def repaired(repair: RepairTable, number: int) -> Configuration:
     """Address of a waypoint of the repaired path."""
-    return row_at(repair.path, dof_of(repair.motions), number)
+    return row_at(repair.path, repair.motions.dof, number)
 
 
 @kernel
 def divide(repair: RepairTable, rows: int) -> bool:
     """Set points along the path as it was given, all its waypoints among them; False if there is no room."""
-    dof, count, step = dof_of(repair.motions), 1, repair.step
+    dof, count, step = repair.motions.dof, 1, repair.step
     copy_row(dof, given(repair, 0), point_of(repair, 0))
     for k in range(rows - 1):
         here, there = given(repair, k), given(repair, k + 1)
@@ -105,7 +104,7 @@ def set_spread(search: ConnectTable, spread: float) -> None:
 @kernel
 def sample_near(repair: RepairTable, first: int, second: int) -> None:
     """Let the first samples lie around the middle of two points."""
-    search, dof = repair.search, dof_of(repair.motions)
+    search, dof = repair.search, repair.motions.dof
     a, b = point_of(repair, first), point_of(repair, second)
     for k in range(dof):
         search.centre[k] = 0.5 * (a[k] + b[k])
@@ -152,7 +151,7 @@ def root_of(tree: TreeTable, vertex: int) -> int:
 @kernel
 def append(repair: RepairTable, count: int, row: Configuration) -> int:
     """Add a row to the path, in place of the last one if the path goes straight on there; the number of rows then."""
-    dof = dof_of(repair.motions)
+    dof = repair.motions.dof
     if count > 0 and distance(dof, repaired(repair, count - 1), row) == 0.0:
         return count
     if count > 1:
@@ -187,7 +186,7 @@ def shorten(repair: RepairTable, rows: int, seed: int) -> None:
 def finish(repair: RepairTable, seed: int) -> int:
     """Write the path that a search has found, what is new of it shortened; its rows, or TOO_LONG without room."""
     search, cuts = repair.search, repair.shortcuts
-    dof, route = dof_of(repair.motions), cuts.route
+    dof, route = repair.motions.dof, cuts.route
     begin = root_of(tree_of(search, 0), meeting_of(search, 0))
     end = repair.last + 1 + root_of(tree_of(search, 1), meeting_of(search, 1))
     new = write_path(search, route, repair.capacity)

@@ -65,7 +65,7 @@ class ShortcutSearch:
         if plan.blank is None:
             for array in made.memory.arrays.values():
                 array[:] = 0.0  # a page's file shall be the same each time
-        made.put(motions=motions.address, count=len(rows), random=seed % 2**62, resolve=int(asking))
+        made.put(motions=motions.table, count=len(rows), random=seed % 2**62, resolve=int(asking))
         made.put(waypoint_share=share, pull_share=pull)
         made.metric[:] = lengths * lengths
         made.route[: rows.size] = rows.ravel()

@@ -15,8 +15,7 @@ import numpy as np
 
 from rrtik_ompl.kernels.layout import COLLIDING, FREE, UNDECIDED
 from rrtik_ompl.kernels.search import shortcut_layout
-from rrtik_ompl.kernels.search.motions.motion_kernels import dof_of
-from rrtik_ompl.kernels.search.motions.proven_kernels import judge_motion, proof_of
+from rrtik_ompl.kernels.search.motions.proven_kernels import judge_motion
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, copy_row, row_at
 from rrtik_ompl.kernels.search.shortcut_layout import FIRST_INSIDE, SECOND_INSIDE, ShortcutTable
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
@@ -30,7 +29,7 @@ WAYPOINT_TOLERANCE = 1e-9  # of the length of an edge: nearer to a waypoint is a
 @inlined
 def dof_in(search: ShortcutTable) -> int:
     """How many numbers a configuration has."""
-    return dof_of(search.motions)
+    return search.motions.dof
 
 
 @inlined
@@ -188,7 +187,7 @@ def check_parts(search: ShortcutTable) -> int:
     search.questions = 0
     worst = FREE
     pulled = search.cuts == shortcut_layout.PULL
-    proven = proof_of(search.motions) != 0
+    proven = search.motions.proof != 0
     for part in range(1 if proven and not pulled else shortcut_layout.MAX_QUESTIONS):
         a, b = ends_of_part(search, part)
         if a != b:

@@ -10,11 +10,7 @@ from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
     bits,
     choose,
-    double_at,
-    field,
     larger,
-    set_double,
-    set_field,
     set_wide_lanes,
     wide_lanes_at,
 )
@@ -68,43 +64,10 @@ def next_point(table: Any, points: Any, inverses: Any, count: int) -> int:
 
     Both arrays have room for whole lanes.
     """
-    if double_at(inverses, 0) > 0.0:
+    if inverses[0] > 0.0:
         for block in range((count + WIDTH - 1) // WIDTH):
             x = next_in_bases(wide_lanes_at(points, block), wide_lanes_at(inverses, block))
             set_wide_lanes(points, block, x)
     else:
         start_points(table, points, count)
-    return count
-
-
-@kernel
-def next_share_at(table: int, place: int) -> float:
-    """The next number in [0, 1); the state is a field of a table. Source: splitmix64 [46]."""
-    state: Any = np.uint64(field(table, place)) + GOLDEN
-    set_field(table, place, np.int64(state))
-    mixed = (state ^ (state >> SHIFT_30)) * FIRST_FACTOR
-    mixed = (mixed ^ (mixed >> SHIFT_27)) * SECOND_FACTOR
-    return float(np.int64((mixed ^ (mixed >> SHIFT_31)) >> SHIFT_11)) * SHARE_OF_BIT
-
-
-@kernel
-def start_points_at(table: int, place: int, points: int, count: int) -> int:
-    """Set the first point of a sequence in ``count`` dimensions."""
-    for k in range(count):
-        set_double(points, k, next_share_at(table, place))
-    return count
-
-
-@kernel
-def next_point_at(table: int, place: int, points: int, inverses: int, count: int) -> int:
-    """Replace a point by the next one: of the Halton sequence, or uniformly random where the inverse bases are 0.
-
-    Both arrays have room for whole lanes.
-    """
-    if double_at(inverses, 0) > 0.0:
-        for block in range((count + WIDTH - 1) // WIDTH):
-            x = next_in_bases(wide_lanes_at(points, block), wide_lanes_at(inverses, block))
-            set_wide_lanes(points, block, x)
-    else:
-        start_points_at(table, place, points, count)
     return count

@@ -174,10 +174,25 @@ def _type_of_record(record: Record, context: Any) -> RecordType:
     return RecordType(type(record))
 
 
-def _given_by_python(table: RecordType, record: Any, context: Any) -> Any:
+def _type_of_view(array: View, context: Any) -> ViewType:
+    return ViewType(array.scalar)
+
+
+def _record_of_python(table: RecordType, record: Any, context: Any) -> Any:
     address = context.pyapi.object_getattr_string(record, "address")
-    value = context.pyapi.long_as_longlong(address)
-    context.pyapi.decref(address)
+    return _whole_number(address, context.pyapi)
+
+
+def _view_of_python(view: ViewType, array: Any, context: Any) -> Any:
+    memory = context.pyapi.object_getattr_string(array, "ctypes")
+    address = context.pyapi.object_getattr_string(memory, "data")
+    context.pyapi.decref(memory)
+    return _whole_number(address, context.pyapi)
+
+
+def _whole_number(number: Any, python: Any) -> Any:
+    value = python.long_as_longlong(number)
+    python.decref(number)
     return NativeValue(value)
 
 
@@ -187,4 +202,6 @@ lower_setattr_generic(RecordType)(_write_field)
 lower_builtin(operator.getitem, ViewType, types.int64)(_read_element)
 lower_builtin(operator.setitem, ViewType, types.int64, types.Any)(_write_element)
 typeof_impl.register(Record)(_type_of_record)
-unbox(RecordType)(_given_by_python)
+typeof_impl.register(View)(_type_of_view)
+unbox(RecordType)(_record_of_python)
+unbox(ViewType)(_view_of_python)

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 from rrtik_ompl.kernels import layout
 from rrtik_ompl.kernels.layout import DOUBLE_BYTES, FLOAT_BYTES, INT_BYTES
+from rrtik_ompl.kernels.record import Doubles, Floats, Ints
 from rrtik_ompl.kernels.simd.access import (
     double_reader,
     double_vector_reader,
@@ -23,10 +24,10 @@ from rrtik_ompl.kernels.simd.access import (
     record_reader,
     vector_reader,
 )
-from rrtik_ompl.kernels.simd.access import double_row as _double_row
 from rrtik_ompl.kernels.simd.access import int_row as _int_row
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined
 from rrtik_ompl.kernels.simd.lanes import float_at, lanes_at, set_int, set_lanes
+from rrtik_ompl.kernels.simd.records import row_at as _row_at
 
 Vector: TypeAlias = Any  # three numbers
 
@@ -47,9 +48,9 @@ bounds_of: Callable[[layout.WorldTable], layout.BoundTable] = field_reader(layou
 
 # Arm
 joint_count_of: Callable[[layout.ArmTable], int] = field_reader(layout.JOINT_COUNT)
-parents_of: Callable[[layout.ArmTable], layout.IntArray] = field_reader(layout.PARENTS)
-joint_kinds_of: Callable[[layout.ArmTable], layout.IntArray] = field_reader(layout.JOINT_KINDS)
-phases_of: Callable[[layout.ArmTable], layout.DoubleArray] = field_reader(layout.PHASES)
+parents_of: Callable[[layout.ArmTable], Ints] = field_reader(layout.PARENTS)
+joint_kinds_of: Callable[[layout.ArmTable], Ints] = field_reader(layout.JOINT_KINDS)
+phases_of: Callable[[layout.ArmTable], Doubles] = field_reader(layout.PHASES)
 placement_of: Callable[[layout.ArmTable, int], layout.Placement] = member_reader(
     layout.PLACEMENTS, FLOAT_BYTES * layout.POSE_NUMBERS
 )
@@ -107,19 +108,19 @@ other_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_OTHER)
 
 # Bounds of motions
 bound_blocks_of: Callable[[layout.BoundTable], int] = field_reader(layout.BOUND_BLOCKS)
-bound_rows_of: Callable[[layout.BoundTable], layout.LaneArray] = field_reader(layout.BOUNDS)
+bound_rows_of: Callable[[layout.BoundTable], Floats] = field_reader(layout.BOUNDS)
 
 # Primitives: what stands still
 primitive_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.PRIMITIVE_COUNT)
 padded_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.PADDED_COUNT)
 standing_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.STANDING_COUNT)
-boxes_of: Callable[[layout.PrimitiveTable], layout.LaneArray] = field_reader(layout.BOXES)
+boxes_of: Callable[[layout.PrimitiveTable], Floats] = field_reader(layout.BOXES)
 block_count_of: Callable[[layout.PrimitiveTable], int] = field_reader(layout.BLOCK_COUNT)
-block_boxes_of: Callable[[layout.PrimitiveTable], layout.LaneArray] = field_reader(layout.BLOCK_BOXES)
+block_boxes_of: Callable[[layout.PrimitiveTable], Floats] = field_reader(layout.BLOCK_BOXES)
 planes_of: Callable[[layout.PrimitiveTable], layout.PlaneArray] = field_reader(layout.PLANES)
-checked_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.CHECKED)
-excluding_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.EXCLUDING)
-own_of: Callable[[layout.PrimitiveTable], layout.IntArray] = field_reader(layout.OWN)
+checked_of: Callable[[layout.PrimitiveTable], Ints] = field_reader(layout.CHECKED)
+excluding_of: Callable[[layout.PrimitiveTable], Ints] = field_reader(layout.EXCLUDING)
+own_of: Callable[[layout.PrimitiveTable], Ints] = field_reader(layout.OWN)
 clouds_of: Callable[[layout.PrimitiveTable], layout.CloudArray] = field_reader(layout.CLOUDS)
 head_of: Callable[[layout.PrimitiveTable, int], layout.PrimitiveHead] = member_reader(
     layout.NUMBERS, INT_BYTES * layout.HEAD_INTS
@@ -171,33 +172,33 @@ bound_radius_of: Callable[[layout.SolidSizes], float] = double_reader(layout.BOU
 corners_of: Callable[[layout.SolidTable], layout.CornerArray] = field_reader(layout.CORNERS)
 
 # Scratch memory
-values_of: Callable[[layout.ScratchTable], layout.LaneArray] = field_reader(layout.VALUES)
+values_of: Callable[[layout.ScratchTable], Floats] = field_reader(layout.VALUES)
 frames_of: Callable[[layout.ScratchTable], layout.FrameArray] = field_reader(layout.FRAMES)
 group_centres_of: Callable[[layout.ScratchTable], layout.CentreArray] = field_reader(layout.GROUP_CENTRES)
 centres_of: Callable[[layout.ScratchTable], layout.CentreArray] = field_reader(layout.CENTRES)
-placed_flags_of: Callable[[layout.ScratchTable], layout.IntArray] = field_reader(layout.PLACED)
+placed_flags_of: Callable[[layout.ScratchTable], Ints] = field_reader(layout.PLACED)
 found_of: Callable[[layout.ScratchTable], layout.PrimitiveList] = field_reader(layout.FOUND)
 near_of: Callable[[layout.ScratchTable], layout.PrimitiveList] = field_reader(layout.NEAR)
 met_of: Callable[[layout.ScratchTable], layout.PrimitiveList] = field_reader(layout.MET)
 marks_of: Callable[[layout.ScratchTable], layout.Marks] = field_reader(layout.MARKS)
-waiting_of: Callable[[layout.ScratchTable], layout.IntArray] = field_reader(layout.WAITING)
+waiting_of: Callable[[layout.ScratchTable], Ints] = field_reader(layout.WAITING)
 outer_likely_of: Callable[[layout.ScratchTable], layout.LikelyBalls] = field_reader(layout.OUTER_LIKELY)
 inner_likely_of: Callable[[layout.ScratchTable], layout.LikelyBalls] = field_reader(layout.INNER_LIKELY)
 watch_of: Callable[[layout.ScratchTable], layout.Watch] = field_reader(layout.WATCH)
-note_of: Callable[[layout.ScratchTable], layout.LaneArray] = field_reader(layout.NOTE)
+note_of: Callable[[layout.ScratchTable], Floats] = field_reader(layout.NOTE)
 likely_at: Callable[[layout.LikelyBalls, int], layout.LikelyBall] = record_reader(INT_BYTES * layout.LIKELY_INTS)
 likely_number_of: Callable[[layout.LikelyBall], int] = int_reader(layout.LIKELY_NUMBER)
 likely_frame_of: Callable[[layout.LikelyBall], int] = int_reader(layout.LIKELY_FRAME)
 likely_body_of: Callable[[layout.LikelyBall], int] = int_reader(layout.LIKELY_BODY)
 
 # Probe
-best_of: Callable[[layout.ProbeTable], layout.LaneArray] = field_reader(layout.BEST)
-which_of: Callable[[layout.ProbeTable], layout.IntArray] = field_reader(layout.WHICH)
-gaps_of: Callable[[layout.ProbeTable], layout.LaneArray] = field_reader(layout.GAPS)
+best_of: Callable[[layout.ProbeTable], Floats] = field_reader(layout.BEST)
+which_of: Callable[[layout.ProbeTable], Ints] = field_reader(layout.WHICH)
+gaps_of: Callable[[layout.ProbeTable], Floats] = field_reader(layout.GAPS)
 
 # Rows: array, numbers in a row, number of the row
-joint_row: Callable[[layout.JointValues, int, int], layout.JointValues] = _double_row
-checked_row: Callable[[layout.IntArray, int, int], layout.IntArray] = _int_row
+joint_row: Callable[[layout.JointValues, int, int], layout.JointValues] = _row_at
+checked_row: Callable[[Ints, int, int], Ints] = _int_row
 marks_row: Callable[[layout.Marks, int, int], layout.Marks] = _int_row
 
 

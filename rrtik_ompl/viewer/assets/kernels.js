@@ -113,9 +113,10 @@ class Kernels {
 
   /** In how many steps a motion is checked; see motion_table.py. */
   stepCount(a, b) {
-    const [weights, numbers] = ["WEIGHTS", "NUMBERS"].map((name) => this.motions.get(name) / NUMBER_BYTES);
+    const weights = this.motions.get("WEIGHTS") / NUMBER_BYTES;
+    const resolution = this.doubles[this.motions.address / NUMBER_BYTES + this.plan.names.motion.RESOLUTION];
     const travel = a.reduce((sum, value, k) => sum + this.doubles[weights + k] * Math.abs(b[k] - value), 0);
-    return Math.max(1, Math.ceil(travel / this.doubles[numbers + this.plan.names.motion.RESOLUTION] - STEP_TOLERANCE));
+    return Math.max(1, Math.ceil(travel / resolution - STEP_TOLERANCE));
   }
 
   /** Write the joint values of a configuration where single answers are found, or behind it (row 1). */

@@ -9,9 +9,11 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.record import Floats
 from rrtik_ompl.kernels.search import tree_kernels as trees
 from rrtik_ompl.kernels.search.connect import ConnectSearch
-from rrtik_ompl.kernels.search.tree_layout import CERTAIN, COSTS
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration
+from rrtik_ompl.kernels.search.tree_layout import CERTAIN, TreeTable
 from rrtik_ompl.kernels.search.tree_memory import tree_table
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry
 from rrtik_ompl.model.transitions import route_length
@@ -37,7 +39,7 @@ def solved(seed, bound=None, max_iterations=20_000):
 
 
 @entry
-def cheapest(tree: int, query: int, millionths: int) -> int:
+def cheapest(tree: TreeTable, query: Floats, millionths: int) -> int:
     return trees.nearest_by_cost(tree, query, millionths * 1e-6)
 
 
@@ -47,13 +49,13 @@ def test_the_nearest_vertex_by_cost_is_the_one_of_numpy(count):
     rows, costs = rng.uniform(-3, 3, (count, 4)), rng.uniform(0, 5, count)
     tree = tree_table(4, 0, WIDTH * -(-count // WIDTH))
     for row in rows:
-        kept = np.array(row)
-        trees.add_vertex(tree.address, kept.ctypes.data, kept.ctypes.data, -1, CERTAIN, 1e30)
-    tree[COSTS][:count] = costs
+        kept = np.array(row).view(Configuration)
+        trees.add_vertex(tree, kept, kept, -1, CERTAIN, 1e30)
+    tree.costs[:count] = costs
     for query, wanted in zip(rng.uniform(-3, 3, (50, 4)), rng.integers(0, 5_000_000, 50).tolist(), strict=True):
-        single = np.array(query, dtype=np.float32)
+        single = np.array(query, dtype=np.float32).view(Floats)
         squares = ((rows - query) ** 2).sum(axis=1) + np.maximum(costs - 1e-6 * wanted, 0.0) ** 2
-        assert squares[cheapest(tree.address, single.ctypes.data, wanted)] <= squares.min() + 1e-4
+        assert squares[cheapest(tree, single, wanted)] <= squares.min() + 1e-4
     assert tree.intact()
 
 

@@ -4,20 +4,31 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.record import Doubles, Floats, Record
 from rrtik_ompl.kernels.search import tree_kernels as trees
 from rrtik_ompl.kernels.search import tree_layout as layout
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration
 from rrtik_ompl.kernels.search.tree_memory import grow, tree_table
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry
 from rrtik_ompl.kernels.simd.halton import inverse_bases
-from rrtik_ompl.kernels.simd.random_kernels import next_point_at, next_share_at, start_points_at
-from rrtik_ompl.kernels.tables.memory import aligned, table, whole_lanes
+from rrtik_ompl.kernels.simd.random_kernels import next_point, next_share, start_points
+from rrtik_ompl.kernels.simd.records import row_at
+from rrtik_ompl.kernels.tables.memory import packed, whole_lanes
 
 pytestmark = pytest.mark.kernels
 
 
+class Random(Record):
+    """A sequence of points."""
+
+    random: int
+    point: Doubles
+    bases: Doubles
+
+
 @entry
-def nearest(tree: int, query: int) -> int:
+def nearest(tree: layout.TreeTable, query: Floats) -> int:
     return trees.nearest_vertex(tree, query)
 
 
@@ -30,13 +41,13 @@ def planted(rows, parents, capacity=None):
 
 def add(tree, rows, parents):
     for row, parent in zip(rows, parents, strict=True):
-        kept = np.array(row)
-        trees.add_vertex(tree.address, kept.ctypes.data, kept.ctypes.data, int(parent), layout.CERTAIN, 1e30)
+        kept = np.array(row).view(Configuration)
+        trees.add_vertex(tree, kept, kept, int(parent), layout.CERTAIN, 1e30)
 
 
 def ask(tree, query):
-    single = np.array(query, dtype=np.float32)
-    return nearest(tree.address, single.ctypes.data)
+    single = np.array(query, dtype=np.float32).view(Floats)
+    return nearest(tree, single)
 
 
 @pytest.mark.parametrize("dof", [1, 2, 3, 6, 7, 13, 50])
@@ -65,10 +76,10 @@ def test_a_branch_that_was_cut_off_is_never_the_nearest_again():
     for vertex in range(8, count):
         if parents[vertex] in doomed:
             doomed.add(vertex)
-    left = trees.cut_branch(tree.address, 7)
+    left = trees.cut_branch(tree, 7)
     alive = np.array([v for v in range(count) if v not in doomed])
-    assert left == len(alive) == tree.header[layout.LIVE]
-    assert trees.cut_branch(tree.address, 7) == left
+    assert left == len(alive) == tree.live
+    assert trees.cut_branch(tree, 7) == left
     for query in rng.uniform(-1, 1, (200, 3)):
         assert ask(tree, query) == alive[np.linalg.norm(rows[alive] - query, axis=1).argmin()]
 
@@ -82,24 +93,23 @@ def test_a_tree_that_grows_keeps_its_vertices_and_its_address():
         grow(tree)
         add(tree, rows[size * WIDTH : 2 * size * WIDTH], np.zeros(size * WIDTH))
     assert tree.address == address
-    assert tree.header[layout.SIZE] == len(rows)
-    np.testing.assert_array_equal(tree[layout.ROWS].reshape(-1, 4)[: len(rows)], rows)
+    assert tree.size == len(rows)
+    np.testing.assert_array_equal(tree.rows.reshape(-1, 4)[: len(rows)], rows)
     for query in rng.uniform(-1, 1, (50, 4)):
         assert ask(tree, query) == np.linalg.norm(rows - query, axis=1).argmin()
 
 
 @entry
-def shares(random: int, sink: int, count: int) -> int:
-    for _ in range(count):
-        start_points_at(random, 0, sink, 1)
-        sink += 8
+def shares(random: Random, count: int) -> int:
+    for k in range(count):
+        start_points(random, row_at(random.point, 1, k), 1)
     return count
 
 
 def uniform(seed, count):
-    random, numbers = table({0: seed}), np.empty(count)
-    shares(random.address, numbers.ctypes.data, count)
-    return numbers
+    random = packed(Random, random=seed, point=np.zeros(count))
+    shares(random, count)
+    return random.point
 
 
 def test_shares_are_those_of_splitmix64():
@@ -116,29 +126,27 @@ def test_shares_are_those_of_splitmix64():
 
 
 @entry
-def second_share(random: int) -> int:
-    if next_share_at(random, 0) < 1.0:
-        return int(next_share_at(random, 0) * 2.0**53)
+def second_share(random: Random) -> int:
+    if next_share(random) < 1.0:
+        return int(next_share(random) * 2.0**53)
     return -1
 
 
 def test_a_second_share_in_one_kernel_is_the_next_of_the_stream():
     for seed in (0, 1, 2**62 + 12345):
-        assert second_share(table({0: seed}).address) == uniform(seed, 2)[1] * 2.0**53
+        assert second_share(packed(Random, random=seed)) == uniform(seed, 2)[1] * 2.0**53
 
 
 def points(dimensions, count, start=None, seed=3):
-    random, point = (
-        table({0: seed}),
-        aligned(whole_lanes(np.array(start if start is not None else np.zeros(dimensions)))),
-    )
-    bases = aligned(whole_lanes(np.array(inverse_bases(dimensions))))
+    first = np.zeros(dimensions) if start is None else np.array(start)
+    bases = whole_lanes(np.array(inverse_bases(dimensions)))
+    random = packed(Random, random=seed, point=whole_lanes(first), bases=bases)
     if start is None:
-        start_points_at(random.address, 0, point.ctypes.data, dimensions)
+        start_points(random, random.point.view(Doubles), dimensions)
     rows = np.empty((count, dimensions))
     for row in rows:
-        next_point_at(random.address, 0, point.ctypes.data, bases.ctypes.data, dimensions)
-        row[:] = point[:dimensions]
+        next_point(random, random.point.view(Doubles), random.bases.view(Doubles), dimensions)
+        row[:] = random.point[:dimensions]
     return rows
 
 
@@ -212,5 +220,5 @@ def test_lengths_that_are_none_are_refused(bad):
 
 
 def test_a_share_is_below_one_even_where_all_bits_are_set():
-    random = table({0: 0})
-    assert 0.0 <= next_share_at(random.address, 0) < 1.0
+    random = packed(Random)
+    assert 0.0 <= next_share(random) < 1.0

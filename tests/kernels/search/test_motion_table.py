@@ -9,12 +9,13 @@ import pytest
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.kernels import COLLIDING, FREE, UNDECIDED
+from rrtik_ompl.kernels.record import Ints
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.motions.motion_kernels import step_count
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration, MotionTable
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, step_counts
 from rrtik_ompl.kernels.search.motions.row_kernels import row_at
 from rrtik_ompl.kernels.simd.compiled import entry
-from rrtik_ompl.kernels.simd.lanes import set_int
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.world.moving_world import MovingWorld
@@ -26,16 +27,16 @@ MOTIONS = 1_000_000
 
 
 @entry
-def write_steps(motions: int, dof: int, starts: int, ends: int, count: int, sink: int) -> int:
+def write_steps(motions: MotionTable, starts: Configuration, ends: Configuration, count: int, sink: Ints) -> int:
     for k in range(count):
-        set_int(sink, k, step_count(motions, row_at(starts, dof, k), row_at(ends, dof, k)))
+        sink[k] = step_count(motions, row_at(starts, motions.dof, k), row_at(ends, motions.dof, k))
     return count
 
 
 def steps_in_kernels(motions: FastMotions, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     found = np.zeros(len(starts), dtype=np.int32)
-    places = starts.ctypes.data, ends.ctypes.data, len(starts), found.ctypes.data
-    write_steps(motions.address, motions.dof, *places)
+    rows = starts.view(Configuration), ends.view(Configuration)
+    write_steps(motions.table, *rows, len(starts), found.view(Ints))
     return found
 
 

@@ -11,9 +11,8 @@ from typing import Any
 
 from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.connect_layout import ConnectTable
-from rrtik_ompl.kernels.search.motions.motion_kernels import dof_of
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, distance
-from rrtik_ompl.kernels.search.tree_kernels import cost_of, nearest_by_cost, parent_of, row_of, set_cost, size_of
+from rrtik_ompl.kernels.search.tree_kernels import cost_of, nearest_by_cost, parent_of, row_of, set_cost
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 from rrtik_ompl.kernels.simd.random_kernels import next_share
@@ -30,7 +29,7 @@ def is_bounded(search: ConnectTable) -> bool:
 def from_roots(dof: int, tree: TreeTable, row: Configuration) -> float:
     """Distance of a configuration from the nearest root of a tree."""
     least, vertex = connect_layout.UNBOUNDED_COST, 0
-    while vertex < size_of(tree) and parent_of(tree, vertex) < 0:
+    while vertex < tree.size and parent_of(tree, vertex) < 0:
         least = min(least, distance(dof, row_of(tree, vertex), row))
         vertex += 1
     return least
@@ -39,7 +38,7 @@ def from_roots(dof: int, tree: TreeTable, row: Configuration) -> float:
 @kernel
 def vertex_for(search: ConnectTable, tree: TreeTable, other: TreeTable, row: Configuration) -> Any:
     """The vertex to be extended towards a sample, and -1 if no path below the bound leads through that."""
-    dof, bound = dof_of(search.motions), search.bound
+    dof, bound = search.motions.dof, search.bound
     least, most = from_roots(dof, tree, row), bound - from_roots(dof, other, row)
     if least >= most:
         return -1
@@ -50,14 +49,14 @@ def vertex_for(search: ConnectTable, tree: TreeTable, other: TreeTable, row: Con
 @kernel
 def may_lead(search: ConnectTable, tree: TreeTable, vertex: int, row: Configuration, rest: float) -> bool:
     """Whether a path below the bound may lead from a vertex to a configuration, from which ``rest`` is left."""
-    dof = dof_of(search.motions)
+    dof = search.motions.dof
     return cost_of(tree, vertex) + distance(dof, row_of(tree, vertex), row) + rest < search.bound  # type: ignore[no-any-return]
 
 
 @kernel
 def note_cost(search: ConnectTable, tree: TreeTable, vertex: int) -> None:
     """Set the cost of a new vertex: that of its parent, and the motion from there."""
-    parent, dof = parent_of(tree, vertex), dof_of(search.motions)
+    parent, dof = parent_of(tree, vertex), search.motions.dof
     cost = 0.0
     if parent >= 0:
         cost = cost_of(tree, parent) + distance(dof, row_of(tree, parent), row_of(tree, vertex))

@@ -7,12 +7,16 @@ from __future__ import annotations
 
 from typing import NewType
 
+from rrtik_ompl.kernels.layout import JointValues
+from rrtik_ompl.kernels.record import Doubles, Floats, Record
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration, MotionTable
+from rrtik_ompl.kernels.search.tree_layout import TreeTable
+
 KERNELS = "search.constrained.kernels"  # the library of these searches
 
 HeldTable = NewType("HeldTable", int)
 RegionTable = NewType("RegionTable", int)
 RegionRecord = NewType("RegionRecord", int)
-ConstrainedTable = NewType("ConstrainedTable", int)
 
 # Held: COUNT addresses of regions in REGIONS · DOF, LOWER, UPPER: of the configurations · HELD_NUMBERS: see below ·
 # scratch memory: COLUMNS, 6 numbers for each coordinate, SQUARE matrix, CHANGE of the coordinates, ERROR and WEIGHTS of
@@ -32,20 +36,45 @@ FREE_TURN, AXIS, BALL, RANGES = range(4)  # rrtik_ompl.constraints.held_region.T
 LOW, HIGH, ANGLES_LOW, ANGLES_HIGH, DIRECTION = 0, 3, 6, 9, 12
 KEPT, AIMED, MOST, CURVATURE, LEVERS = 15, 17, 19, 21, 22
 
-# Search. What it works on ...
-MOTIONS, START_TREE, GOAL_TREE, HELD, LOWER, UPPER, NUMBERS, INVERSE_BASES = range(8)
-# ... its rules. RESOLVE: 1 if undecided motions are inserted, to be asked for · LIMIT: of the samples · UNCHECKED: 1
-# to leave collisions out ...
-RESOLVE, LIMIT, UNCHECKED, START_ROWS, GOAL_ROWS = range(8, 13)
-# ... its state. ROW and AIM: configurations · MEETINGS: the vertices at which the trees meet · STRAIGHT_TRIED: goals
-# that were walked to straight away ...
-GROWER, ROW, ROW_VALUES, AIM, QUERY, POINT, RANDOM, START_MEETING, GOAL_MEETING, STRAIGHT_TRIED = range(13, 23)
-# ... and counts. CHECKED: motions · WALK_ROOM: vertices that one walk adds at most
-ITERATIONS, CHECKED, GOAL_COUNT, WALK_ROOM, FIELD_COUNT = range(23, 28)
 
-# The numbers [unit of the configurations]: LONGEST and SHORTEST step, STEP in use, DOMAIN as of RRT-Connect
-LONGEST, SHORTEST, STEP, DOMAIN = range(4)
+class ConstrainedTable(Record):
+    """A search along path constraints. Lengths are in the unit of the configurations."""
+
+    motions: MotionTable  # of the world
+    start_tree: TreeTable
+    goal_tree: TreeTable
+    held: HeldTable
+    lower: Doubles  # the box of configurations
+    upper: Doubles
+    inverse_bases: Doubles  # of the sequence of samples
+
+    longest: float  # step
+    shortest: float
+    step: float  # in use
+    domain: float  # as of RRT-Connect
+    resolve: int  # 1 if undecided motions are inserted, to be asked for
+    limit: int  # of the samples
+    unchecked: int  # 1 to leave collisions out
+    start_rows: Configuration  # roots
+    goal_rows: Configuration
+    goal_count: int
+    walk_room: int  # vertices that one walk adds at most
+
+    grower: int  # side of the tree that was extended towards the last sample
+    row: Configuration
+    row_values: JointValues  # of the row; the same memory where they are the same
+    aim: Configuration
+    query: Floats  # the configuration whose nearest vertex is wanted
+    point: Doubles  # the last sample, in the unit box
+    random: int  # state
+    start_meeting: int  # vertices at which the trees meet
+    goal_meeting: int
+    straight_tried: int  # goals that were walked to straight away
+
+    iterations: int
+    checked: int  # motions
+
 
 SOLVED, EXHAUSTED, RUNNING, FULL = range(4)  # status
 OUTSIDE = -1  # status that a root is not in the box; less its number
-ROOM = 256  # WALK_ROOM of steps of usual length
+ROOM = 256  # vertices of a walk in steps of usual length

@@ -22,7 +22,7 @@ from rrtik_ompl.kernels.ik.ik_accessors import (
 )
 from rrtik_ompl.kernels.ik.ik_kinematics import add, felt, move_tip, moved_axis, swept
 from rrtik_ompl.kernels.ik.ik_layout import ANGULAR, LINEAR, TWIST_NUMBERS, CallTable, Columns, LimbTable, Pose
-from rrtik_ompl.kernels.layout import DoubleArray
+from rrtik_ompl.kernels.record import Doubles
 from rrtik_ompl.kernels.search.constrained import layout
 from rrtik_ompl.kernels.search.constrained.layout import HeldTable, RegionRecord, RegionTable
 from rrtik_ompl.kernels.simd.access import field_reader
@@ -37,8 +37,8 @@ STEEPEST = 1e-3  # cosine of the pitch, at least
 region_count_of: Callable[[HeldTable], int] = field_reader(layout.COUNT)
 dof_of: Callable[[HeldTable], int] = field_reader(layout.HELD_DOF)
 columns_of: Callable[[HeldTable], Columns] = field_reader(layout.COLUMNS)
-error_of: Callable[[HeldTable], DoubleArray] = field_reader(layout.ERROR)
-weights_of: Callable[[HeldTable], DoubleArray] = field_reader(layout.WEIGHTS)
+error_of: Callable[[HeldTable], Doubles] = field_reader(layout.ERROR)
+weights_of: Callable[[HeldTable], Doubles] = field_reader(layout.WEIGHTS)
 limb_of: Callable[[RegionTable], LimbTable] = field_reader(layout.LIMB)
 call_of: Callable[[RegionTable], CallTable] = field_reader(layout.CALL)
 turning_of: Callable[[RegionTable], int] = field_reader(layout.TURNING)

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search import tree_layout
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.constrained import layout
+from rrtik_ompl.kernels.search.constrained.layout import ConstrainedTable
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions, MotionsFree
+from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.search.tree_memory import grow, tree_table
 from rrtik_ompl.kernels.simd.halton import inverse_bases
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import Table, aligned, is_intact, table, whole_lanes
+from rrtik_ompl.kernels.tables.memory import aligned, packed, whole_lanes
 
 FIRST_CAPACITY = 128 * WIDTH  # vertices
 MOST_ROOM = 16_384  # vertices of one walk
@@ -62,13 +62,10 @@ class ConstrainedSearch:
         longest, domain = connect_lengths(lower, upper, range_, None, turning=np.ones(motions.dof, dtype=bool))
         joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(self._dof, joints, FIRST_CAPACITY) for _ in range(2)]
-        numbers = np.array([longest, min(shortest, longest), longest, domain])
-        self._search = _search_table(motions, self._trees, held, (lower, upper), numbers)
-        fields: Any = self._search.header
-        self._fields = memoryview(fields)
+        self._search = _search_table(motions, self._trees, held, (lower, upper))
+        self._search.put(longest=longest, shortest=min(shortest, longest), step=longest, domain=domain)
         self._room = min(round(layout.ROOM * max(SHORTEST_STEP / shortest, 1.0)), MOST_ROOM)
-        self._fields[layout.WALK_ROOM] = self._room
-        self._roots: list[NDArray[np.float64]] = [np.empty(0), np.empty(0)]
+        self._search.walk_room = self._room
         self._questions = self._rejected = 0
 
     def solve(
@@ -102,8 +99,8 @@ class ConstrainedSearch:
         """
         self._set_roots(0, starts)
         self._set_roots(1, goals)
-        self._fields[layout.RESOLVE], self._fields[layout.UNCHECKED] = int(ask is not None), int(unchecked)
-        self._fields[layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
+        self._search.put(resolve=int(ask is not None), unchecked=int(unchecked))
+        self._search.limit = NO_LIMIT if max_iterations is None else max_iterations
         self._questions = self._rejected = 0
         counts, number = (len(starts), len(goals)), int(seed) & (2**63 - 1)
         status = self._kernels.solve(self._search.address, *counts, number, FIRST_BUDGET)
@@ -117,7 +114,7 @@ class ConstrainedSearch:
         self, max_iterations: int | None, *, ask: MotionsFree | None = None, stop: Callable[[], object] | None = None
     ) -> Matrix | None:
         """Search on, up to so many samples altogether; see :meth:`solve`."""
-        self._fields[layout.LIMIT] = NO_LIMIT if max_iterations is None else max_iterations
+        self._search.limit = NO_LIMIT if max_iterations is None else max_iterations
         return self._finished(layout.RUNNING, ask, stop)
 
     def _finished(self, status: int, ask: MotionsFree | None, stop: Callable[[], object] | None) -> Matrix | None:
@@ -146,46 +143,45 @@ class ConstrainedSearch:
         """
         self._set_roots(0, a[None])
         self._set_roots(1, b[None])
-        self._fields[layout.RESOLVE], self._fields[layout.UNCHECKED] = int(ask is not None), 0
+        self._search.put(resolve=int(ask is not None), unchecked=0)
         count = self._kernels.connect(self._search.address)
         rows = self._rows(0)[:count].copy()
         if count == 0 or ask is None:
             return rows if count else None
-        open_ = np.flatnonzero(self._trees[0][tree_layout.STATES][:count] == tree_layout.OPEN)
+        open_ = np.flatnonzero(self._trees[0].states[:count] == tree_layout.OPEN)
         return rows if len(open_) == 0 or ask(rows[open_ - 1], rows[open_]).all() else None
 
     @property
-    def trees(self) -> list[Table]:
+    def trees(self) -> list[TreeTable]:
         """The trees from the starts and from the goals."""
         return self._trees
 
     @property
     def sizes(self) -> tuple[int, int]:
         """Vertices of the trees from the starts and from the goals."""
-        first, second = (int(tree.header[tree_layout.SIZE]) for tree in self._trees)
+        first, second = (tree.size for tree in self._trees)
         return first, second
 
     def statistics(self) -> dict[str, int | float]:
         """Counts of the last search."""
         return {
-            "iterations": self._fields[layout.ITERATIONS],
+            "iterations": self._search.iterations,
             "vertices": sum(self.sizes),
-            "motions": self._fields[layout.CHECKED],
+            "motions": self._search.checked,
             "questions": self._questions,
             "rejected": self._rejected,
         }
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond the memory of the search."""
-        tables = all(own.intact() for own in (self._search, *self._trees))
-        return tables and all(is_intact(rows) for rows in self._roots)
+        return all(own.intact() for own in (self._search, *self._trees))
 
     def _settled(self, ask: MotionsFree | None) -> Matrix | None:
         """The path, once the world has answered for its open motions; None where one of them is not free."""
-        branches = [self._branch(side, self._fields[layout.START_MEETING + side]) for side in range(2)]
+        branches = [self._branch(0, self._search.start_meeting), self._branch(1, self._search.goal_meeting)]
         for side, branch in enumerate(branches):
             tree = self._trees[side]
-            states, parents = tree[tree_layout.STATES], tree[tree_layout.PARENTS]
+            states, parents = tree.states, tree.parents
             open_ = [vertex for vertex in branch if states[vertex] == tree_layout.OPEN]
             if not open_ or ask is None:
                 continue
@@ -203,36 +199,42 @@ class ConstrainedSearch:
 
     def _branch(self, side: int, vertex: int) -> list[int]:
         """A vertex and what leads to it, the root last."""
-        parents, branch = self._trees[side][tree_layout.PARENTS], [vertex]
+        parents, branch = self._trees[side].parents, [vertex]
         while (vertex := int(parents[vertex])) >= 0:
             branch.append(vertex)
         return branch
 
     def _rows(self, side: int) -> Matrix:
-        rows: Matrix = self._trees[side][tree_layout.ROWS].reshape(-1, self._dof)
+        rows: Matrix = self._trees[side].rows.reshape(-1, self._dof)
         return rows
 
     def _set_roots(self, side: int, rows: Matrix) -> None:
-        while len(rows) + self._room >= int(self._trees[0].header[tree_layout.CAPACITY]):
+        while len(rows) + self._room >= self._trees[0].capacity:
             for tree in self._trees:
                 grow(tree)
-        self._roots[side] = aligned(np.asarray(rows, dtype=np.float64))
-        self._fields[layout.START_ROWS + side] = self._roots[side].ctypes.data
+        self._search.put(**{("start_rows", "goal_rows")[side]: aligned(np.asarray(rows, dtype=np.float64))})
 
 
 def _search_table(
-    motions: FastMotions, trees: list[Table], held: int, box: tuple[Vector, Vector], numbers: Vector
-) -> Table:
+    motions: FastMotions, trees: list[TreeTable], held: int, box: tuple[Vector, Vector]
+) -> ConstrainedTable:
     """The table of a search; fields that are not named here are numbers that the kernels set."""
-    dof = motions.dof
-    fields: dict[int, int | NDArray[Any]] = dict.fromkeys(range(layout.FIELD_COUNT), 0)
-    fields |= {layout.MOTIONS: motions.address, layout.HELD: held, layout.NUMBERS: numbers}
-    fields |= {layout.START_TREE + side: tree.address for side, tree in enumerate(trees)}
-    fields |= {layout.LOWER: np.asarray(box[0]), layout.UPPER: np.asarray(box[1])}
-    fields |= {layout.INVERSE_BASES: whole_lanes(np.array(inverse_bases(dof)))}
-    fields |= {place: whole_lanes(np.zeros(dof)) for place in (layout.ROW, layout.AIM, layout.POINT)}
-    fields |= {layout.ROW_VALUES: np.zeros(motions.joints), layout.QUERY: np.zeros(dof, dtype=np.float32)}
-    made = table(fields)
+    none = whole_lanes(np.zeros(motions.dof))
+    made = packed(
+        ConstrainedTable,
+        motions=motions.table,
+        start_tree=trees[0],
+        goal_tree=trees[1],
+        held=held,
+        lower=np.asarray(box[0]),
+        upper=np.asarray(box[1]),
+        inverse_bases=whole_lanes(np.array(inverse_bases(motions.dof))),
+        row=none,
+        row_values=np.zeros(motions.joints),
+        aim=none,
+        query=np.zeros(motions.dof, dtype=np.float32),
+        point=none,
+    )
     if motions.identity:
-        made.header[layout.ROW_VALUES] = made.header[layout.ROW]
+        made.put(row_values=made.row)
     return made

@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.kernels.search.crdt import layout as crdt_layout
-from rrtik_ompl.kernels.search.crdt.accessors import dof_in, extension_row, order_of, rule_of
+from rrtik_ompl.kernels.search.crdt.accessors import dof_in, extension_row, rule_of
 from rrtik_ompl.kernels.search.crdt.layout import CrdtTable
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import field, int_at, set_double, set_int
-from rrtik_ompl.kernels.simd.random_kernels import next_share_at
+from rrtik_ompl.kernels.simd.random_kernels import next_share
 
 
 @inlined
 def draw(search: CrdtTable) -> Any:
     """The next number of the stream, from 0 to 1, less than 1."""
-    return next_share_at(search, crdt_layout.RANDOM)
+    return next_share(search)
 
 
 @inlined
@@ -25,28 +24,28 @@ def sample(search: CrdtTable) -> None:
         low = rule_of(search, crdt_layout.SAMPLE_LOWER, axis)
         high = rule_of(search, crdt_layout.SAMPLE_UPPER, axis)
         share = draw(search)
-        set_double(extension_row(search, crdt_layout.TARGET), axis, min(low + share * (high - low), high))
+        extension_row(search, crdt_layout.TARGET)[axis] = min(low + share * (high - low), high)
 
 
 @kernel
 def shuffle(search: CrdtTable) -> None:
     """The axes that may move, in random order."""
-    order, count = order_of(search), field(search, crdt_layout.AXIS_COUNT)
+    order, count = search.order, search.axis_count
     for k in range(count):
-        set_int(order, k, int_at(field(search, crdt_layout.AXES), k))
+        order[k] = search.axes[k]
     for k in range(count - 1, 0, -1):
         other = int(draw(search) * (k + 1))
-        axis = int_at(order, k)
-        set_int(order, k, int_at(order, other))
-        set_int(order, other, axis)
+        axis = order[k]
+        order[k] = order[other]
+        order[other] = axis
 
 
 @inlined
 def to_front(search: CrdtTable, axis: int) -> None:
     """Let an axis go first and the others keep their order."""
-    order, k = order_of(search), 0
-    while int_at(order, k) != axis:
+    order, k = search.order, 0
+    while order[k] != axis:
         k += 1
     for place in range(k, 0, -1):
-        set_int(order, place, int_at(order, place - 1))
-    set_int(order, 0, axis)
+        order[place] = order[place - 1]
+    order[0] = axis

@@ -11,14 +11,10 @@ from rrtik_ompl.kernels.layout import COLLIDING, FREE, UNDECIDED
 from rrtik_ompl.kernels.search.crdt import layout as crdt_layout
 from rrtik_ompl.kernels.search.crdt.accessors import (
     dof_in,
-    edge_count_of,
     edge_end,
     edge_start,
     extension_row,
-    motions_of,
-    order_of,
     rule_of,
-    verdicts_of,
 )
 from rrtik_ompl.kernels.search.crdt.draws import draw, shuffle, to_front
 from rrtik_ompl.kernels.search.crdt.layout import BACK, BETWEEN, BEYOND, ONWARD, CrdtTable, CrdtTreeTable
@@ -28,12 +24,10 @@ from rrtik_ompl.kernels.search.crdt.tree_kernels import (
     crdt_parent_of,
     read_vertex,
     set_crdt_parent,
-    size_of,
 )
 from rrtik_ompl.kernels.search.motions.motion_kernels import check_motion, resolves
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, copy_row
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, field, int_at, set_double, set_field, set_int
 
 
 @inlined
@@ -42,7 +36,7 @@ def hold_idle_axes(search: CrdtTable, tree: CrdtTreeTable, near: int) -> None:
     for axis in range(dof_in(search)):
         chance = rule_of(search, crdt_layout.CHANCE, axis)
         if chance < 1.0 and draw(search) >= chance:
-            set_double(extension_row(search, crdt_layout.TARGET), axis, coordinate(tree, near, axis))
+            extension_row(search, crdt_layout.TARGET)[axis] = coordinate(tree, near, axis)
 
 
 @inlined
@@ -57,14 +51,14 @@ def remembered_axis(search: CrdtTable, tree: CrdtTreeTable, vertex: int, parent:
 @kernel
 def add_edge(search: CrdtTable, axis: int, start: Any, end: Any) -> None:
     """Put an edge along an axis through the current row on the list."""
-    count, dof = edge_count_of(search), dof_in(search)
+    count, dof = search.edge_count, dof_in(search)
     current = extension_row(search, crdt_layout.CURRENT)
     first, second = edge_start(search, count), edge_end(search, count)
     copy_row(dof, current, first)
     copy_row(dof, current, second)
-    set_double(first, axis, start)
-    set_double(second, axis, end)
-    set_field(search, crdt_layout.EDGE_COUNT, count + 1)
+    first[axis] = start
+    second[axis] = end
+    search.edge_count += 1
 
 
 @inlined
@@ -98,22 +92,22 @@ def lay_out(search: CrdtTable, tree: CrdtTreeTable, near: int, exactly: bool) ->
     if parent != crdt_layout.ROOT:  # a root has no direction to remember
         to_front(search, remembered_axis(search, tree, near, parent))
     read_vertex(tree, dof_in(search), near, current)
-    set_field(search, crdt_layout.NEAR, near)
-    set_field(search, crdt_layout.TURN, ONWARD)
-    set_field(search, crdt_layout.FIRST_EDGES, 0)
-    set_field(search, crdt_layout.EDGE_COUNT, 0)
-    set_field(search, crdt_layout.COMPLETE, 1)
+    search.near = near
+    search.turn = ONWARD
+    search.first_edges = 0
+    search.edge_count = 0
+    search.complete = 1
     legs = 0
-    for k in range(field(search, crdt_layout.AXIS_COUNT)):
-        axis = int_at(order_of(search), k)
-        here, there = double_at(current, axis), double_at(extension_row(search, crdt_layout.TARGET), axis)
+    for k in range(search.axis_count):
+        axis = search.order[k]
+        here, there = current[axis], extension_row(search, crdt_layout.TARGET)[axis]
         came_from = here if legs > 0 or parent == crdt_layout.ROOT else coordinate(tree, parent, axis)
         turn = turning(came_from, here, there)
         if here == there:
             continue
         if shortest_piece(turn, came_from, here, there) < rule_of(search, crdt_layout.SMALLEST_MOVE, axis):
             if exactly:
-                set_field(search, crdt_layout.COMPLETE, 0)
+                search.complete = 0
                 break
             continue
         if turn in (ONWARD, BETWEEN):
@@ -121,9 +115,9 @@ def lay_out(search: CrdtTable, tree: CrdtTreeTable, near: int, exactly: bool) ->
         if turn in (BETWEEN, BEYOND):  # the edge to the vertex is split, or left out
             add_edge(search, axis, came_from, there)
         if legs == 0:
-            set_field(search, crdt_layout.TURN, turn)
-            set_field(search, crdt_layout.FIRST_EDGES, edge_count_of(search))
-        set_double(current, axis, there)
+            search.turn = turn
+            search.first_edges = search.edge_count
+        current[axis] = there
         legs += 1
 
 
@@ -131,11 +125,11 @@ def lay_out(search: CrdtTable, tree: CrdtTreeTable, near: int, exactly: bool) ->
 def check_edge(search: CrdtTable, start: Configuration, end: Configuration) -> int:
     """Check the motion between two configurations as the world does, whatever its direction."""
     for axis in range(dof_in(search)):
-        a, b = double_at(start, axis), double_at(end, axis)
+        a, b = start[axis], end[axis]
         lower, upper = rule_of(search, crdt_layout.LIMIT_LOWER, axis), rule_of(search, crdt_layout.LIMIT_UPPER, axis)
         if min(a, b) < lower or max(a, b) > upper:
             return COLLIDING
-    motions = motions_of(search)
+    motions = search.motions
     answer: int = check_motion(motions, start, end, resolves(motions))
     return answer
 
@@ -143,15 +137,15 @@ def check_edge(search: CrdtTable, start: Configuration, end: Configuration) -> i
 @kernel
 def check_extension(search: CrdtTable) -> int:
     """Check the edges of the extension up to the first that is not free; returns how many want an answer."""
-    count, open_, resolve = edge_count_of(search), 0, resolves(motions_of(search))
+    count, open_, resolve = search.edge_count, 0, resolves(search.motions)
     for edge in range(count):
         verdict = check_edge(search, edge_start(search, edge), edge_end(search, edge))
         if verdict == UNDECIDED:
             verdict = UNDECIDED if resolve else COLLIDING
             open_ += 1 if resolve else 0
-        set_int(verdicts_of(search), edge, verdict)
+        search.verdicts[edge] = verdict
         if verdict == COLLIDING:
-            set_field(search, crdt_layout.EDGE_COUNT, edge + 1)
+            search.edge_count = edge + 1
             break
     return open_
 
@@ -160,7 +154,7 @@ def check_extension(search: CrdtTable) -> int:
 def count_free(search: CrdtTable) -> int:
     """How many edges at the beginning of the extension are free."""
     free = 0
-    while free < edge_count_of(search) and int_at(verdicts_of(search), free) == FREE:
+    while free < search.edge_count and search.verdicts[free] == FREE:
         free += 1
     return free
 
@@ -168,10 +162,10 @@ def count_free(search: CrdtTable) -> int:
 @kernel
 def add_free_edges(search: CrdtTable, tree: CrdtTreeTable) -> int:
     """Add the free leading part of the extension to the tree; returns what was achieved."""
-    count, first = edge_count_of(search), field(search, crdt_layout.FIRST_EDGES)
-    near, turn = field(search, crdt_layout.NEAR), field(search, crdt_layout.TURN)
-    dof, known, free = dof_in(search), size_of(tree), count_free(search)
-    set_field(search, crdt_layout.CHECKED, field(search, crdt_layout.CHECKED) + min(free + 1, count))
+    count, first = search.edge_count, search.first_edges
+    near, turn = search.near, search.turn
+    dof, known, free = dof_in(search), tree.size, count_free(search)
+    search.checked += min(free + 1, count)
     vertex = near
     if free >= first:
         parent = crdt_parent_of(tree, near)
@@ -183,7 +177,7 @@ def add_free_edges(search: CrdtTable, tree: CrdtTreeTable) -> int:
                 set_crdt_parent(tree, near, vertex)
         for edge in range(first, free):
             vertex = add_crdt_vertex(tree, dof, edge_end(search, edge), vertex)
-    set_field(search, crdt_layout.LAST, vertex)
-    if free == count and field(search, crdt_layout.COMPLETE) != 0:
+    search.last = vertex
+    if free == count and search.complete != 0:
         return crdt_layout.REACHED
-    return crdt_layout.TRAPPED if size_of(tree) == known else crdt_layout.ADVANCED
+    return crdt_layout.TRAPPED if tree.size == known else crdt_layout.ADVANCED

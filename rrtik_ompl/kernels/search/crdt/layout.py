@@ -1,11 +1,9 @@
-"""The tables of C-RDT searches, whose trees move one coordinate an edge: what each field is, and the states' words."""
+"""The tables of C-RDT searches, whose trees move one coordinate an edge, and the words for their states."""
 
 from __future__ import annotations
 
-from typing import NewType
-
-CrdtTable = NewType("CrdtTable", int)  # of the table of a search
-CrdtTreeTable = NewType("CrdtTreeTable", int)  # of the table of a tree
+from rrtik_ompl.kernels.record import Doubles, Ints, Record
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration, MotionTable
 
 ROOT = -1
 
@@ -16,28 +14,58 @@ TRAPPED, ADVANCED, REACHED = range(3)
 # What a search does next.
 BEGIN, GROW, MEET, CHOOSE_GOAL, REACH_GOAL = range(5)
 
-# Tree: coordinates are runs of CAPACITY float64, one run for each coordinate; parents int32.
-SIZE, CAPACITY, COORDINATES, PARENTS = range(4)
 
-# Search: the motion table of the world; RULES: rows of float64, see below; the axes that may move.
-MOTIONS, RULES, AXES, AXIS_COUNT = range(4)
-# Its progress. CHECKED: edges.
-RANDOM, ITERATIONS, ITERATION_LIMIT, NEXT, CHECKED = range(4, 9)
-# Its trees, which of them grows, and the vertex of that one which the other is to meet.
-TREE, OTHER_TREE, GROWING, MET = range(9, 13)
-# Its extension from vertex NEAR: rows of float64, see below; the axes in their ORDER; how the first leg turns; the
-# number of edges, and of those that belong to the first leg; whether it is COMPLETE; what was found of each edge; the
-# LAST vertex.
-EXTENSION, NEAR, ORDER, TURN, FIRST_EDGES, EDGE_COUNT, COMPLETE, VERDICTS, LAST = range(13, 22)
-# Memory of the search for the nearest vertex. Goals of a single tree, and GOAL_TOLERANCE, one float64: the square of
-# how near to a goal a vertex tries to reach it; which vertex tries which of them next.
-NEAREST, GOALS, GOAL_TOLERANCE, GOAL_COUNT, VERTEX, VERTEX_END, GOAL, FIELD_COUNT = range(22, 30)
+class CrdtTreeTable(Record):
+    """A tree."""
 
-# Rows of RULES: limits of a valid configuration, then what CrdtRules says.
+    size: int  # vertices
+    capacity: int  # for which there is room
+    coordinates: Doubles  # runs of ``capacity``, one for each coordinate
+    parents: Ints
+
+
+class CrdtTable(Record):
+    """A search."""
+
+    motions: MotionTable  # of the world
+    rules: Configuration  # rows, see below
+    axes: Ints  # that may move
+    axis_count: int
+    random: int  # state
+    iterations: int
+    iteration_limit: int
+    next: int  # what the search does next
+    checked: int  # edges
+    tree: CrdtTreeTable
+    other_tree: CrdtTreeTable
+    growing: int  # which tree
+    met: int  # the vertex of that one which the other is to meet
+
+    # The extension from a vertex.
+    extension: Configuration  # rows, see below
+    near: int  # the vertex
+    order: Ints  # of the axes
+    turn: int  # how the first leg turns
+    first_edges: int  # those that belong to the first leg
+    edge_count: int
+    complete: int  # whether it leads to its target
+    verdicts: Ints  # what was found of each edge
+    last: int  # vertex that it has led to
+
+    nearest: Doubles  # memory of the search for the nearest vertex
+    goals: Configuration  # of a single tree
+    goal_tolerance: float  # square of how near to a goal a vertex tries to reach it
+    goal_count: int
+    vertex: int  # the one that tries to reach a goal next
+    vertex_end: int  # the one after the last that does
+    goal: int  # that it tries
+
+
+# Rows of the rules: limits of a valid configuration, then what CrdtRules says.
 LIMIT_LOWER, LIMIT_UPPER, SAMPLE_LOWER, SAMPLE_UPPER, SCALE, SMALLEST_MOVE, CHANCE, RULE_COUNT = range(8)
 
-# Rows of EXTENSION: the target, the configuration that the extension has reached, the starts of as many edges as there
-# are coordinates and one more, then their ends.
+# Rows of the extension: the target, the configuration that the extension has reached, the starts of as many edges as
+# there are coordinates and one more, then their ends.
 TARGET, CURRENT, EDGES = range(3)
 
 # The first leg: a new direction; back into the last edge, beyond its beginning, exactly to its beginning.

@@ -17,12 +17,13 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import PlannerError
 from rrtik_ompl.kernels.layout import COLLIDING, FREE, UNDECIDED
 from rrtik_ompl.kernels.search.crdt import layout as crdt_layout
+from rrtik_ompl.kernels.search.crdt.layout import CrdtTable, CrdtTreeTable
 from rrtik_ompl.kernels.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.kernels.search.crdt.tree_memory import TreeMemory
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import PlannedTable, Table, TablePlan
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
 
 FIRST_CAPACITY = 256  # vertices
@@ -63,25 +64,24 @@ class CrdtSearch:
         self._trees = [TreeMemory(rows, vertices) for rows in roots]
         aims = np.zeros((0, motions.dof)) if goals is None else goals
         self._table = _search_table(motions, world.robot, rules, aims)
-        header = self._table.header
-        header[crdt_layout.RANDOM] = seed
-        header[crdt_layout.ITERATION_LIMIT] = NO_LIMIT if limit is None else limit
-        header[crdt_layout.NEXT] = crdt_layout.BEGIN if goals is None else crdt_layout.CHOOSE_GOAL
-        header[crdt_layout.VERTEX_END] = 0 if goals is None else len(roots[0])
-        self._table[crdt_layout.GOAL_TOLERANCE][:] = tolerance * tolerance
-        for side, tree in enumerate(self._trees):
-            header[crdt_layout.TREE + side] = tree.address
+        self._table.random = seed
+        self._table.iteration_limit = NO_LIMIT if limit is None else limit
+        self._table.next = crdt_layout.BEGIN if goals is None else crdt_layout.CHOOSE_GOAL
+        self._table.vertex_end = 0 if goals is None else len(roots[0])
+        self._table.goal_tolerance = tolerance * tolerance
+        for name, tree in zip(("tree", "other_tree"), self._trees, strict=False):
+            self._table.put(**{name: tree.table})
         self._budget = FIRST_BUDGET
 
     @property
-    def tables(self) -> tuple[PlannedTable, tuple[Table, ...]]:
+    def tables(self) -> tuple[CrdtTable, tuple[CrdtTreeTable, ...]]:
         """What the kernels read: the table of the search, and those of its trees."""
         return self._table, tuple(tree.table for tree in self._trees)
 
     @property
     def iterations(self) -> int:
         """Samples drawn so far."""
-        return self._field(crdt_layout.ITERATIONS)
+        return self._table.iterations
 
     @property
     def vertices(self) -> int:
@@ -91,7 +91,7 @@ class CrdtSearch:
     @property
     def motions(self) -> int:
         """Edges that were checked so far."""
-        return self._field(crdt_layout.CHECKED)
+        return self._table.checked
 
     def advance(self, stop: Callable[[], Any]) -> bool:
         """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
@@ -107,14 +107,14 @@ class CrdtSearch:
 
     def meeting(self) -> tuple[Matrix, Matrix]:
         """The branch of each of two trees from its root to the vertex at which they met, shapes (k, n)."""
-        met, other = self._field(crdt_layout.MET), self._field(crdt_layout.LAST)
-        if self._field(crdt_layout.GROWING) == 0:  # the turns have changed since
+        met, other = self._table.met, self._table.last
+        if self._table.growing == 0:  # the turns have changed since
             met, other = other, met
         return self._trees[0].branch(met), self._trees[1].branch(other)
 
     def ending(self) -> Matrix:
         """The branch of a single tree from its root to the goal that it reached, shape (k, n)."""
-        return self._trees[0].branch(self._field(crdt_layout.LAST))
+        return self._trees[0].branch(self._table.last)
 
     def tree(self, number: int) -> Matrix:
         """The vertices of a tree, shape (size, n)."""
@@ -143,9 +143,9 @@ class CrdtSearch:
 
     def _answer(self) -> None:
         """Ask the world about the edges that the kernels left undecided."""
-        verdicts = self._table[crdt_layout.VERDICTS].view(np.int32)[: self._field(crdt_layout.EDGE_COUNT)]
+        verdicts = self._table.verdicts.view(np.int32)[: self._table.edge_count]
         asked = np.flatnonzero(verdicts == UNDECIDED)
-        rows = self._table[crdt_layout.EXTENSION].reshape(-1, self._motions.dof)[crdt_layout.EDGES :]
+        rows = self._table.extension.reshape(-1, self._motions.dof)[crdt_layout.EDGES :]
         starts, ends = np.split(rows, 2)
         free = self._world.motion_valid_batch(starts[asked], ends[asked])
         verdicts[asked] = np.where(free, FREE, COLLIDING)
@@ -162,37 +162,34 @@ class CrdtSearch:
         elif seconds > MAX_PAUSE:
             self._budget = max(1, self._budget // 2)
 
-    def _field(self, place: int) -> int:
-        return int(self._table.header[place])
 
-
-def _search_table(motions: FastMotions, robot: Robot, rules: CrdtRules, goals: Matrix) -> PlannedTable:
+def _search_table(motions: FastMotions, robot: Robot, rules: CrdtRules, goals: Matrix) -> CrdtTable:
     """The table of a search; fields that are not set here are set later, by the search or its kernels."""
-    table = PlannedTable(_plan(motions.dof, len(rules.axes), len(goals)))
-    table.header[crdt_layout.MOTIONS] = motions.address
+    table = CrdtTable(PlannedTable(_plan(motions.dof, len(rules.axes), len(goals))))
+    table.put(motions=motions.table)
     limits = robot.lower - LIMIT_TOLERANCE, robot.upper + LIMIT_TOLERANCE
     rows = (*limits, rules.lower, rules.upper, rules.scale, rules.smallest_move, rules.chance)
-    table[crdt_layout.RULES][:] = np.concatenate(rows)
-    table[crdt_layout.AXES].view(np.int32)[: len(rules.axes)] = rules.axes
-    table[crdt_layout.GOALS][:] = goals.ravel()
+    table.rules[:] = np.concatenate(rows)
+    table.axes.view(np.int32)[: len(rules.axes)] = rules.axes
+    table.goals[:] = goals.ravel()
     return table
 
 
 @lru_cache(maxsize=64)
 def _plan(dof: int, axes: int, goals: int) -> TablePlan:
     """Where the arrays of a search lie; the first one is read in whole lanes."""
-    arrays = {
-        crdt_layout.NEAREST: 2 * WIDTH,
-        crdt_layout.RULES: crdt_layout.RULE_COUNT * dof,
-        crdt_layout.EXTENSION: (crdt_layout.EDGES + 2 * (dof + 1)) * dof,
-        crdt_layout.AXES: _words(axes),
-        crdt_layout.ORDER: _words(dof),
-        crdt_layout.VERDICTS: _words(dof + 1),
-        crdt_layout.GOALS: goals * dof,
-        crdt_layout.GOAL_TOLERANCE: 1,
-    }
-    numbers = {place: 0 for place in range(crdt_layout.FIELD_COUNT) if place not in arrays}
-    return TablePlan(arrays, numbers | {crdt_layout.AXIS_COUNT: axes, crdt_layout.GOAL_COUNT: goals})
+    return sizes_of(
+        CrdtTable,
+        nearest=2 * WIDTH,
+        rules=crdt_layout.RULE_COUNT * dof,
+        extension=(crdt_layout.EDGES + 2 * (dof + 1)) * dof,
+        axes=_words(axes),
+        order=_words(dof),
+        verdicts=_words(dof + 1),
+        goals=goals * dof,
+        axis_count=axes,
+        goal_count=goals,
+    )
 
 
 def _words(integers: int) -> int:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.kernels.search.crdt import layout as crdt_layout
-from rrtik_ompl.kernels.tables.memory import aligned, table
+from rrtik_ompl.kernels.search.crdt.layout import CrdtTreeTable
+from rrtik_ompl.kernels.tables.memory import aligned, packed
 
 
 class TreeMemory:
@@ -28,7 +29,7 @@ class TreeMemory:
         count, self._dof = roots.shape
         while capacity < count + self._dof:
             capacity *= 2
-        self.table = table({crdt_layout.SIZE: count, crdt_layout.CAPACITY: capacity, **self._arrays(capacity)})
+        self.table = packed(CrdtTreeTable, size=count, capacity=capacity, **self._arrays(capacity))
         self._runs[:, :count] = roots.T
         self._parents[:count] = crdt_layout.ROOT
         self.address = self.table.address
@@ -36,7 +37,7 @@ class TreeMemory:
     @property
     def size(self) -> int:
         """Number of vertices."""
-        return int(self.table.header[crdt_layout.SIZE])
+        return self.table.size
 
     @property
     def vertices(self) -> Matrix:
@@ -62,25 +63,23 @@ class TreeMemory:
     def grow(self) -> None:
         """Give the tree twice the room."""
         vertices, parents = self.vertices, self._parents[: self.size]
-        capacity = 2 * int(self.table.header[crdt_layout.CAPACITY])
-        for place, larger in self._arrays(capacity).items():
-            self.table.arrays[place] = roomy = aligned(larger)
-            self.table.header[place] = roomy.ctypes.data
-        self.table.header[crdt_layout.CAPACITY] = capacity
+        capacity = 2 * self.table.capacity
+        self.table.put(**{name: aligned(larger) for name, larger in self._arrays(capacity).items()})
+        self.table.capacity = capacity
         self._runs[:, : self.size] = vertices.T
         self._parents[: self.size] = parents
 
     @property
     def _runs(self) -> Matrix:
         """Coordinates, shape (n, capacity)."""
-        return self.table[crdt_layout.COORDINATES].reshape(self._dof, -1)
+        return self.table.coordinates.reshape(self._dof, -1)
 
     @property
     def _parents(self) -> NDArray[Any]:
-        return self.table[crdt_layout.PARENTS]
+        return self.table.parents
 
-    def _arrays(self, capacity: int) -> dict[int, NDArray[Any]]:
+    def _arrays(self, capacity: int) -> dict[str, NDArray[Any]]:
         return {
-            crdt_layout.COORDINATES: np.zeros(self._dof * capacity),
-            crdt_layout.PARENTS: np.zeros(capacity, dtype=np.int32),
+            "coordinates": np.zeros(self._dof * capacity),
+            "parents": np.zeros(capacity, dtype=np.int32),
         }

@@ -1,26 +1,34 @@
-"""The motion table of a world: what each field is, and by what rule a straight motion is divided into steps."""
+"""The motion table of a world, and by what rule a straight motion is divided into steps."""
 
 from __future__ import annotations
 
-from typing import NewType
-
-from rrtik_ompl.kernels.record import Doubles
-
-MotionTable = NewType("MotionTable", int)  # of a motion table
+from rrtik_ompl.kernels.layout import JointValues, WorldTable
+from rrtik_ompl.kernels.proof.layout import ProofTable
+from rrtik_ompl.kernels.record import Doubles, Record
 
 
 class Configuration(Doubles):
     """Rows of one number for each coordinate."""
 
 
-# WORLD: the tables of the checks · joint values are GAIN @ q + OFFSET, shapes (JOINTS, DOF) and (JOINTS,)
-# WEIGHTS: no point of the arm moves farther than WEIGHTS @ |b - a| [m] from a to b · NUMBERS: float64, see below
-# ENDS: memory for the joint values of both ends of a motion · RESOLVE: 1 if doubtful motions are resolved, by the
-# narrow phase and what it leaves undecided by the world; 0 in a conservative world · PROOF: the table of proofs of a
-# world where only proven motions count as free, else 0
-WORLD, DOF, JOINTS, GAIN, OFFSET, WEIGHTS, NUMBERS, ENDS, RESOLVE, PROOF = range(10)
+class MotionTable(Record):
+    """What a check of motions needs.
 
-# A motion takes WEIGHTS @ |b - a| / RESOLUTION [m] steps, or STEPS_PER_UNIT times its Euclidean length if those are
-# more, rounded up.
-RESOLUTION, STEPS_PER_UNIT = range(2)
+    A motion takes ``weights @ |b - a| / resolution`` [m] steps, or ``steps_per_unit`` times its Euclidean length if
+    those are more, rounded up.
+    """
+
+    world: WorldTable  # the tables of the checks
+    dof: int
+    joints: int
+    gain: Doubles  # joint values are gain @ q + offset, shape (joints, dof)
+    offset: Doubles
+    weights: Doubles  # no point of the arm moves farther than weights @ |b - a| [m] from a to b
+    resolution: float  # [m]
+    steps_per_unit: float
+    ends: JointValues  # memory for those of both ends of a motion
+    resolve: int  # 1 if doubtful motions are resolved; 0 in a conservative world
+    proof: ProofTable  # of a world where only proven motions count as free, else 0
+
+
 STEP_TOLERANCE = 1e-9  # [steps] by which a motion may be longer than its whole number of steps

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, positive
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels import FastWorld
-from rrtik_ompl.kernels.search.motions import motion_layout
-from rrtik_ompl.kernels.search.motions.motion_layout import STEP_TOLERANCE
-from rrtik_ompl.kernels.tables.memory import table
+from rrtik_ompl.kernels.search.motions.motion_layout import STEP_TOLERANCE, MotionTable
+from rrtik_ompl.kernels.tables.memory import packed
 
 MotionsFree: TypeAlias = Callable[[Matrix, Matrix], Mask]  # as MotionQueries.motion_valid_batch
 
@@ -91,19 +90,18 @@ class FastMotions:
         self.resolution, self._steps_per_unit = positive(resolution, "resolution"), steps_per_unit
         self._weights = finite_array(weights, (self.dof,), "weights")
         self.identity = matrix.shape == (joints, joints) and bool((matrix == np.eye(joints)).all() and not shift.any())
-        self.table = table(
-            {
-                motion_layout.WORLD: fast.address,
-                motion_layout.DOF: self.dof,
-                motion_layout.JOINTS: joints,
-                motion_layout.GAIN: np.ascontiguousarray(matrix),
-                motion_layout.OFFSET: shift,
-                motion_layout.WEIGHTS: self._weights,
-                motion_layout.NUMBERS: np.array([self.resolution, steps_per_unit]),
-                motion_layout.ENDS: np.zeros((2, joints)),
-                motion_layout.RESOLVE: int(resolve),
-                motion_layout.PROOF: 0,
-            }
+        self.table = packed(
+            MotionTable,
+            world=fast.address,
+            dof=self.dof,
+            joints=joints,
+            gain=matrix,
+            offset=shift,
+            weights=self._weights,
+            resolution=self.resolution,
+            steps_per_unit=steps_per_unit,
+            ends=np.zeros((2, joints)),
+            resolve=int(resolve),
         )
         self.address = self.table.address
 
@@ -132,7 +130,7 @@ class FastMotions:
     def make_ready(self) -> None:
         """To be called before kernels that ask for proofs: others may have proven with another clearance meanwhile."""
         if self._proof is not None:
-            self.table.header[motion_layout.PROOF] = self._proof()
+            self.table.put(proof=self._proof())
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond this table or those of the checks."""

@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from rrtik_ompl.kernels.checks.check_kernels import inner_collision
 from rrtik_ompl.kernels.checks.kinematics import forward_kinematics
-from rrtik_ompl.kernels.layout import COLLIDING, FREE, DoubleArray, IntArray, JointValues, WorldTable
+from rrtik_ompl.kernels.layout import COLLIDING, FREE, JointValues, WorldTable
 from rrtik_ompl.kernels.proof.accessors import node_frames
 from rrtik_ompl.kernels.proof.layout import NODES, OPEN, ProofTable
 from rrtik_ompl.kernels.proof.proof_kernels import apart, begin_motion, prove_motion, visit
-from rrtik_ompl.kernels.search.motions import motion_layout
+from rrtik_ompl.kernels.record import Doubles, Ints
 from rrtik_ompl.kernels.search.motions.motion_kernels import (
     check_motion,
-    dof_of,
-    ends_of,
-    joints_of,
     resolves,
     set_joint_values,
-    world_of,
 )
 from rrtik_ompl.kernels.search.motions.motion_layout import MotionTable
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, row_at
-from rrtik_ompl.kernels.simd.access import field_reader
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import bits, double_at, lane_numbers, set_double, set_int, set_wide_lanes
+from rrtik_ompl.kernels.simd.lanes import bits, lane_numbers, set_wide_lanes
 from rrtik_ompl.kernels.tables.accessors import arm_of, joint_count_of, joint_row, scratch_of, values_of
 
 LOOKS = 2  # blocks of configurations, spread over a motion, that are looked at before it is proven
-
-proof_of: Callable[[MotionTable], ProofTable] = field_reader(motion_layout.PROOF)
 
 
 @kernel
@@ -41,7 +33,7 @@ def seen_colliding(world: WorldTable, start: JointValues, end: JointValues) -> b
     for block in range(LOOKS):
         share = (lane_numbers() * float(LOOKS) + float(block)) / float(LOOKS * WIDTH - 1)
         for joint in range(joints):
-            set_wide_lanes(values, joint, (1.0 - share) * double_at(start, joint) + share * double_at(end, joint))
+            set_wide_lanes(values, joint, (1.0 - share) * start[joint] + share * end[joint])
         forward_kinematics(arm_of(world), scratch)
         if inner_collision(world, every, block >= 0) != 0:
             return True
@@ -61,8 +53,8 @@ def open_at(proof: ProofTable, start: JointValues, end: JointValues, pair: int, 
 @inlined
 def both_ends(motions: MotionTable, start: Configuration, end: Configuration) -> Any:
     """The joint values of both ends of a motion."""
-    values = ends_of(motions)
-    others = joint_row(values, joints_of(motions), 1)
+    values = motions.ends
+    others = joint_row(values, motions.joints, 1)
     set_joint_values(motions, start, values)
     set_joint_values(motions, end, others)
     return values, others
@@ -71,47 +63,47 @@ def both_ends(motions: MotionTable, start: Configuration, end: Configuration) ->
 @kernel
 def judge_motion(motions: MotionTable, start: Configuration, end: Configuration, resolve: bool) -> int:
     """As check_motion, but FREE or not where only proven motions count as free."""
-    proof = proof_of(motions)
+    proof = motions.proof
     if proof == 0:
         checked: int = check_motion(motions, start, end, resolve)
         return checked
     values, others = both_ends(motions, start, end)
-    if seen_colliding(world_of(motions), values, others):
+    if seen_colliding(motions.world, values, others):
         return COLLIDING
     pair, _ = prove_motion(proof, values, others)
     return FREE if pair < 0 else COLLIDING
 
 
 @kernel
-def judge_near(motions: MotionTable, start: Configuration, end: Configuration, hint: DoubleArray) -> int:
+def judge_near(motions: MotionTable, start: Configuration, end: Configuration, hint: Doubles) -> int:
     """As judge_motion; the hint is where a motion near by was not proven, a pair and a place, and is looked at first.
 
     A new failure is noted there. Its pair is -1 if none is known.
     """
-    proof = proof_of(motions)
+    proof = motions.proof
     if proof == 0:
         checked: int = check_motion(motions, start, end, resolves(motions))
         return checked
     values, others = both_ends(motions, start, end)
-    pair = int(double_at(hint, 0))
-    if pair >= 0 and open_at(proof, values, others, pair, double_at(hint, 1)):
+    pair = int(hint[0])
+    if pair >= 0 and open_at(proof, values, others, pair, hint[1]):
         return COLLIDING
-    if seen_colliding(world_of(motions), values, others):
+    if seen_colliding(motions.world, values, others):
         return COLLIDING
     pair, place = prove_motion(proof, values, others)
     if pair < 0:
         return FREE
-    set_double(hint, 0, float(pair))
-    set_double(hint, 1, place)
+    hint[0] = float(pair)
+    hint[1] = place
     return COLLIDING
 
 
 @entry
-def judge(motions: MotionTable, starts: Configuration, ends: Configuration, count: int, answers: IntArray) -> int:
+def judge(motions: MotionTable, starts: Configuration, ends: Configuration, count: int, answers: Ints) -> int:
     """Check motions between rows of two arrays; int32 answers. Returns how many are free."""
-    free, dof = 0, dof_of(motions)
+    free, dof = 0, motions.dof
     for k in range(count):
         answer = judge_motion(motions, row_at(starts, dof, k), row_at(ends, dof, k), True)
-        set_int(answers, k, answer)
+        answers[k] = answer
         free += 1 if answer == FREE else 0
     return free

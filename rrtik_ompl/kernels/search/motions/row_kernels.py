@@ -8,7 +8,6 @@ import numpy as np
 
 from rrtik_ompl.kernels.search.motions.motion_layout import Configuration
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, set_double
 from rrtik_ompl.kernels.simd.records import row_at
 
 __all__ = ["Configuration", "copy_row", "distance", "row_at"]
@@ -18,7 +17,7 @@ __all__ = ["Configuration", "copy_row", "distance", "row_at"]
 def copy_row(length: int, source: Any, sink: Any) -> None:
     """Copy ``length`` numbers from one address to another."""
     for k in range(length):
-        set_double(sink, k, double_at(source, k))
+        sink[k] = source[k]
 
 
 @kernel
@@ -26,6 +25,6 @@ def distance(dof: int, one: Configuration, two: Configuration) -> float:
     """Euclidean distance of two configurations."""
     total = 0.0
     for k in range(dof):
-        gap = double_at(two, k) - double_at(one, k)
+        gap = two[k] - one[k]
         total += gap * gap
     return np.sqrt(total)  # type: ignore[no-any-return]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +12,6 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, MotionsFree
 from rrtik_ompl.kernels.search.roadmap import layout
 from rrtik_ompl.kernels.search.roadmap.memory import make_room, roadmap_table
-from rrtik_ompl.kernels.search.tree_layout import ROWS, SIZE
 from rrtik_ompl.kernels.search.tree_memory import tree_table
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
@@ -61,15 +59,13 @@ class KernelGraph:
         self._vertices = tree_table(self._dof, joints, FIRST_VERTICES)
         halves = 2 * near * FIRST_VERTICES
         self._table = roadmap_table(motions, self._vertices, box, near, halves, resolve=ask is not None)
-        header: Any = self._table.header
-        self._fields = memoryview(header)  # numpy takes ten times as long for one number
         self._kernels.seed_samples(self._table.address, int(seed) & (2**63 - 1))
         self._ends = aligned(np.zeros(self._dof)).reshape(1, self._dof)
 
     @property
     def size(self) -> int:
         """Number of vertices."""
-        return self._fields[layout.MAPPED]
+        return self._table.mapped
 
     @property
     def rows(self) -> Matrix:
@@ -80,13 +76,13 @@ class KernelGraph:
     def edges(self) -> NDArray[np.int32]:
         """Pairs of vertices, shape (m, 2)."""
         self._kernels.forget_query(self._table.address)
-        return self._table[layout.TO][: self._fields[layout.HALVES]].reshape(-1, 2)[:, ::-1].copy()
+        return self._table.to[: self._table.halves].reshape(-1, 2)[:, ::-1].copy()
 
     @property
     def states(self) -> NDArray[np.int32]:
         """What is known of the edges, shape (m,): UNKNOWN, SURE, DOUBTFUL or BLOCKED."""
         self._kernels.forget_query(self._table.address)
-        return self._table[layout.STATES][: self._fields[layout.HALVES] // 2].copy()
+        return self._table.states[: self._table.halves // 2].copy()
 
     def restore(self, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32]) -> None:
         """Fill an empty roadmap with what another one gave; for states None nothing is known of the edges.
@@ -96,11 +92,11 @@ class KernelGraph:
         """
         if self.size or len(edges) != len(states) or (len(edges) and not 0 <= edges.min() <= edges.max() < len(rows)):
             raise InputError("roadmap: its edges do not fit its vertices")
-        make_room(self._table, self._vertices, len(rows), 2 * len(edges))
+        make_room(self._table, len(rows), 2 * len(edges))
         self._kernels.insert(self._table.address, self._place_of(rows), len(rows))
         pairs = aligned(np.ascontiguousarray(edges, dtype=np.int32))
         self._kernels.connect(self._table.address, pairs.ctypes.data, len(edges))
-        self._table[layout.STATES][: len(edges)] = states
+        self._table.states[: len(edges)] = states
 
     def grow(self, wanted: int, stop: Callable[[], object]) -> int:
         """Add free samples until there are ``wanted`` more, or it is time to stop; how many were added."""
@@ -108,21 +104,21 @@ class KernelGraph:
         added = 0
         while added < wanted and not stop():
             more = min(wanted - added, SAMPLES_IN_CALL)
-            make_room(self._table, self._vertices, *self._enough(more))
+            make_room(self._table, *self._enough(more))
             added += self._kernels.grow(self._table.address, more, SAMPLES_IN_CALL)
         return added
 
     def learn(self, path: Matrix) -> int:
         """Make the rows of a free path, shape (k, n), vertices; how many, up to the first one outside the box."""
         self._kernels.forget_query(self._table.address)
-        halves = self._fields[layout.HALVES] + 2 * (self._near + 1) * len(path)
-        make_room(self._table, self._vertices, self.size + len(path), halves)
+        halves = self._table.halves + 2 * (self._near + 1) * len(path)
+        make_room(self._table, self.size + len(path), halves)
         return self._kernels.learn(self._table.address, self._place_of(path), len(path))
 
     def check(self, stop: Callable[[], object]) -> None:
         """Check all edges that nobody has looked at, until it is time to stop."""
         self._kernels.forget_query(self._table.address)
-        edges = self._fields[layout.HALVES] // 2
+        edges = self._table.halves // 2
         for first in range(0, edges, EDGES_IN_CALL):
             if stop():
                 return
@@ -145,7 +141,7 @@ class KernelGraph:
         """
         counts = len(starts), len(goals)
         halves = 2 * (self._near + counts[0]) * sum(counts)
-        make_room(self._table, self._vertices, self.size + sum(counts), self._fields[layout.HALVES] + halves)
+        make_room(self._table, self.size + sum(counts), self._table.halves + halves)
         address, place = self._table.address, self._place_of(np.concatenate([starts, goals]))
         outside = self._kernels.pose(address, place, *counts)
         if outside >= 0:
@@ -161,8 +157,8 @@ class KernelGraph:
     def statistics(self) -> dict[str, int | float]:
         """Counts since the roadmap was made."""
         self._kernels.forget_query(self._table.address)
-        edges, checked = self._fields[layout.HALVES] // 2, self._fields[layout.CHECKED]
-        return {"vertices": self.size, "edges": edges, "motions": checked, "iterations": self._fields[layout.SAMPLES]}
+        edges, checked = self._table.halves // 2, self._table.checked
+        return {"vertices": self.size, "edges": edges, "motions": checked, "iterations": self._table.samples}
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond the memory of the roadmap or what it works on."""
@@ -170,15 +166,15 @@ class KernelGraph:
 
     def _answered(self) -> int:
         """Decide what the kernels ask; the next status."""
-        count = self._fields[layout.ASKED]
-        halves = self._table[layout.QUESTIONS][:count]
-        to, rows = self._table[layout.TO], self._rows()
+        count = self._table.asked
+        halves = self._table.questions[:count]
+        to, rows = self._table.to, self._rows()
         free = np.zeros(count, dtype=bool) if self._ask is None else self._ask(rows[to[halves ^ 1]], rows[to[halves]])
         mask = sum(1 << k for k in np.flatnonzero(free).tolist())
         return self._kernels.answer(self._table.address, mask - (1 << 64 if mask >> 63 else 0))
 
     def _path(self) -> Matrix:
-        vertex, to, came = self._fields[layout.MEETING], self._table[layout.TO], self._table[layout.CAME]
+        vertex, to, came = self._table.meeting, self._table.to, self._table.came
         found = [vertex]
         while (half := int(came[vertex])) >= 0:
             vertex = int(to[half ^ 1])
@@ -186,12 +182,12 @@ class KernelGraph:
         return self._rows()[found[::-1]]
 
     def _rows(self) -> Matrix:
-        count = int(self._vertices.header[SIZE])
-        return self._vertices[ROWS][: count * self._dof].reshape(count, self._dof)
+        count = self._vertices.size
+        return self._vertices.rows[: count * self._dof].reshape(count, self._dof)
 
     def _enough(self, more: int) -> tuple[int, int]:
         """Vertices and halves that there have to be room for, to add some vertices; room is doubled."""
-        halves, room = self._fields[layout.HALVES] + 2 * self._near * more, len(self._table[layout.TO])
+        halves, room = self._table.halves + 2 * self._near * more, len(self._table.to)
         return self.size + more, halves if halves <= room else 2 * room
 
     def _place_of(self, rows: Matrix) -> int:

@@ -19,8 +19,8 @@ free the query begins again, with all that is known by then.
 
 from __future__ import annotations
 
+from rrtik_ompl.kernels.record import Ints
 from rrtik_ompl.kernels.search.box_kernels import copy_inside
-from rrtik_ompl.kernels.search.motions.motion_kernels import dof_of
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, row_at
 from rrtik_ompl.kernels.search.roadmap import layout
 from rrtik_ompl.kernels.search.roadmap.graph_kernels import (
@@ -31,29 +31,22 @@ from rrtik_ompl.kernels.search.roadmap.graph_kernels import (
     join,
     join_near,
     length_of,
-    motions_of,
     place_row,
     row_is_free,
-    sample_of,
     tail_of,
-    vertices_of,
 )
 from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, SURE, UNKNOWN, RoadmapTable
 from rrtik_ompl.kernels.search.roadmap.query_kernels import ask_or_finish, pop, reach
-from rrtik_ompl.kernels.search.tree_kernels import size_of
-from rrtik_ompl.kernels.search.tree_layout import LIVE, SIZE
-from rrtik_ompl.kernels.simd.access import count_up
 from rrtik_ompl.kernels.simd.compiled import entry, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, field, int_at, set_double, set_field, set_int
-from rrtik_ompl.kernels.simd.random_kernels import next_point_at, next_share_at, start_points_at
+from rrtik_ompl.kernels.simd.random_kernels import next_point, next_share, start_points
 
 
 @entry
 def seed_samples(roadmap: RoadmapTable, seed: int) -> int:
     """Choose the first sample."""
-    set_field(roadmap, layout.RANDOM, seed)
-    next_share_at(roadmap, layout.RANDOM)
-    return start_points_at(roadmap, layout.RANDOM, field(roadmap, layout.POINT), dof_of(motions_of(roadmap)))
+    roadmap.random = seed
+    next_share(roadmap)
+    return start_points(roadmap, roadmap.point, roadmap.motions.dof)
 
 
 @entry
@@ -62,21 +55,21 @@ def grow(roadmap: RoadmapTable, wanted: int, samples: int) -> int:
 
     There must be room, and no query in the roadmap. Returns how many were added.
     """
-    dof, row, added = dof_of(motions_of(roadmap)), sample_of(roadmap), 0
-    point, bases = field(roadmap, layout.POINT), field(roadmap, layout.INVERSE_BASES)
+    dof, row, added = roadmap.motions.dof, roadmap.row, 0
+    point, bases = roadmap.point, roadmap.inverse_bases
     while added < wanted and samples > 0:
         samples -= 1
-        count_up(roadmap, layout.SAMPLES)
-        next_point_at(roadmap, layout.RANDOM, point, bases, dof)
+        roadmap.samples += 1
+        next_point(roadmap, point, bases, dof)
         for k in range(dof):
-            low, high = double_at(field(roadmap, layout.LOWER), k), double_at(field(roadmap, layout.UPPER), k)
-            set_double(row, k, low + (high - low) * double_at(point, k))
+            low, high = roadmap.lower[k], roadmap.upper[k]
+            row[k] = low + (high - low) * point[k]
         place_row(roadmap)
         if row_is_free(roadmap):
-            before = size_of(vertices_of(roadmap))
+            before = roadmap.vertices.size
             join_near(roadmap, add_row(roadmap), before)
             added += 1
-    set_field(roadmap, layout.MAPPED, size_of(vertices_of(roadmap)))
+    roadmap.mapped = roadmap.vertices.size
     return added
 
 
@@ -86,8 +79,8 @@ def insert(roadmap: RoadmapTable, rows: Configuration, count: int) -> int:
     for k in range(count):
         load(roadmap, rows, k)
         add_row(roadmap)
-    total: int = size_of(vertices_of(roadmap))
-    set_field(roadmap, layout.MAPPED, total)
+    total: int = roadmap.vertices.size
+    roadmap.mapped = total
     return total
 
 
@@ -100,21 +93,21 @@ def learn(roadmap: RoadmapTable, rows: Configuration, count: int) -> int:
     for k in range(count):
         if not load(roadmap, rows, k):
             return k
-        before = size_of(vertices_of(roadmap))
+        before = roadmap.vertices.size
         vertex = add_row(roadmap)
         join_near(roadmap, vertex, before)
         if k > 0:
             join(roadmap, before - 1, vertex)
-        set_field(roadmap, layout.MAPPED, before + 1)
+        roadmap.mapped = before + 1
     return count
 
 
 @entry
-def connect(roadmap: RoadmapTable, pairs: int, count: int) -> int:
+def connect(roadmap: RoadmapTable, pairs: Ints, count: int) -> int:
     """Add edges between pairs of vertices, int32 at an address; there must be room. Returns HALVES."""
     for k in range(count):
-        join(roadmap, int_at(pairs, 2 * k), int_at(pairs, 2 * k + 1))
-    halves: int = field(roadmap, layout.HALVES)
+        join(roadmap, pairs[2 * k], pairs[2 * k + 1])
+    halves: int = roadmap.halves
     return halves
 
 
@@ -130,8 +123,8 @@ def check_edges(roadmap: RoadmapTable, first: int, count: int) -> int:
 @kernel
 def load(roadmap: RoadmapTable, rows: Configuration, k: int) -> bool:
     """Set ROW to a row at an address; False if that is outside the box."""
-    dof, row = dof_of(motions_of(roadmap)), sample_of(roadmap)
-    lower, upper = field(roadmap, layout.LOWER), field(roadmap, layout.UPPER)
+    dof, row = roadmap.motions.dof, roadmap.row
+    lower, upper = roadmap.lower, roadmap.upper
     inside = copy_inside(dof, row_at(rows, dof, k), lower, upper, row)
     place_row(roadmap)
     return inside
@@ -140,12 +133,13 @@ def load(roadmap: RoadmapTable, rows: Configuration, k: int) -> bool:
 @entry
 def forget_query(roadmap: RoadmapTable) -> int:
     """Take starts and goals out of the roadmap."""
-    while field(roadmap, layout.HALVES) > 0 and max(
-        head_of(roadmap, field(roadmap, layout.HALVES) - 1), tail_of(roadmap, field(roadmap, layout.HALVES) - 1)
-    ) >= field(roadmap, layout.MAPPED):
+    while (
+        roadmap.halves > 0
+        and max(head_of(roadmap, roadmap.halves - 1), tail_of(roadmap, roadmap.halves - 1)) >= roadmap.mapped
+    ):
         drop_last_edge(roadmap)
-    set_field(vertices_of(roadmap), SIZE, field(roadmap, layout.MAPPED))
-    set_field(vertices_of(roadmap), LIVE, field(roadmap, layout.MAPPED))
+    roadmap.vertices.size = roadmap.mapped
+    roadmap.vertices.live = roadmap.mapped
     return 0
 
 
@@ -156,8 +150,8 @@ def pose(roadmap: RoadmapTable, rows: Configuration, starts: int, goals: int) ->
     Returns -1, or the number of a row that is outside the box.
     """
     forget_query(roadmap)
-    mapped = field(roadmap, layout.MAPPED)
-    set_field(roadmap, layout.STARTS, starts)
+    mapped = roadmap.mapped
+    roadmap.starts = starts
     for k in range(starts + goals):
         if not load(roadmap, rows, k):
             return k
@@ -171,33 +165,33 @@ def pose(roadmap: RoadmapTable, rows: Configuration, starts: int, goals: int) ->
 @entry
 def begin(roadmap: RoadmapTable) -> int:
     """Begin the search for a path between the starts and the goals in the roadmap."""
-    for vertex in range(size_of(vertices_of(roadmap))):
-        set_int(field(roadmap, layout.CAME), vertex, layout.UNSEEN)
-        set_double(field(roadmap, layout.AHEAD), vertex, layout.NOT_COMPUTED)
-    set_field(roadmap, layout.HEAP_SIZE, 0)
-    set_field(roadmap, layout.ASKED, 0)
-    for start in range(field(roadmap, layout.STARTS)):
-        reach(roadmap, field(roadmap, layout.MAPPED) + start, layout.ROOT, 0.0)
+    for vertex in range(roadmap.vertices.size):
+        roadmap.came[vertex] = layout.UNSEEN
+        roadmap.ahead[vertex] = layout.NOT_COMPUTED
+    roadmap.heap_size = 0
+    roadmap.asked = 0
+    for start in range(roadmap.starts):
+        reach(roadmap, roadmap.mapped + start, layout.ROOT, 0.0)
     return layout.RUNNING
 
 
 @entry
 def search_on(roadmap: RoadmapTable, budget: int) -> int:
     """Search on until a goal is reached, at most ``budget`` halves; returns the status."""
-    goals = field(roadmap, layout.MAPPED) + field(roadmap, layout.STARTS)
+    goals = roadmap.mapped + roadmap.starts
     while budget > 0:
         budget -= 1
-        if field(roadmap, layout.HEAP_SIZE) == 0:
+        if roadmap.heap_size == 0:
             return layout.EXHAUSTED
         half = pop(roadmap)
         head, tail = head_of(roadmap, half), tail_of(roadmap, half)
-        if int_at(field(roadmap, layout.CAME), head) != layout.UNSEEN:
+        if roadmap.came[head] != layout.UNSEEN:
             continue
         if checked_state(roadmap, half) == BLOCKED:
             continue
-        reach(roadmap, head, half, double_at(field(roadmap, layout.COSTS), tail) + length_of(roadmap, half))
+        reach(roadmap, head, half, roadmap.costs[tail] + length_of(roadmap, half))
         if head >= goals:
-            set_field(roadmap, layout.MEETING, head)
+            roadmap.meeting = head
             return ask_or_finish(roadmap)
     return layout.RUNNING
 
@@ -206,9 +200,9 @@ def search_on(roadmap: RoadmapTable, budget: int) -> int:
 def answer(roadmap: RoadmapTable, mask: int) -> int:
     """Use the answers for the halves that were asked for, bit by bit, 1 for free; returns the status."""
     broken = False
-    for k in range(field(roadmap, layout.ASKED)):
-        free, edge = (mask >> k) & 1, int_at(field(roadmap, layout.QUESTIONS), k) >> 1
-        set_int(field(roadmap, layout.STATES), edge, SURE if free else BLOCKED)
+    for k in range(roadmap.asked):
+        free, edge = (mask >> k) & 1, roadmap.questions[k] >> 1
+        roadmap.states[edge] = SURE if free else BLOCKED
         broken = broken or not free
     return begin(roadmap) if broken else ask_or_finish(roadmap)
 
@@ -216,7 +210,7 @@ def answer(roadmap: RoadmapTable, mask: int) -> int:
 @entry
 def doubt(roadmap: RoadmapTable) -> int:
     """Forget what is known of the edges; returns how many there are."""
-    edges: int = field(roadmap, layout.HALVES) >> 1
+    edges: int = roadmap.halves >> 1
     for edge in range(edges):
-        set_int(field(roadmap, layout.STATES), edge, UNKNOWN)
+        roadmap.states[edge] = UNKNOWN
     return edges

@@ -10,19 +10,20 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.search.roadmap import layout
-from rrtik_ompl.kernels.search.tree_layout import CAPACITY
+from rrtik_ompl.kernels.search.roadmap.layout import RoadmapTable
+from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.search.tree_memory import grow
 from rrtik_ompl.kernels.simd.halton import inverse_bases
-from rrtik_ompl.kernels.tables.memory import Table, aligned, table, whole_lanes
+from rrtik_ompl.kernels.tables.memory import aligned, packed, whole_lanes
 
-_BY_VERTEX = {layout.HEADS: np.int32, layout.COSTS: np.float64, layout.AHEAD: np.float64, layout.CAME: np.int32}
-_BY_HALF = {layout.TO: np.int32, layout.NEXT: np.int32, layout.HEAP: np.int32, layout.KEYS: np.float64}
-_BY_EDGE = {layout.LENGTHS: np.float64, layout.STATES: np.int32}
+_BY_VERTEX = {"heads": np.int32, "costs": np.float64, "ahead": np.float64, "came": np.int32}
+_BY_HALF = {"to": np.int32, "next": np.int32, "heap": np.int32, "keys": np.float64}
+_BY_EDGE = {"lengths": np.float64, "states": np.int32}
 
 
 def roadmap_table(
-    motions: FastMotions, vertices: Table, box: tuple[Vector, Vector], near: int, halves: int, *, resolve: bool
-) -> Table:
+    motions: FastMotions, vertices: TreeTable, box: tuple[Vector, Vector], near: int, halves: int, *, resolve: bool
+) -> RoadmapTable:
     """The table of an empty roadmap.
 
     Args:
@@ -33,37 +34,44 @@ def roadmap_table(
         halves: How many halves of edges there is room for, an even number.
         resolve: Whether undecided motions are asked for.
     """
-    dof, room = motions.dof, int(vertices.header[CAPACITY])
-    fields: dict[int, int | NDArray[Any]] = dict.fromkeys(range(layout.FIELD_COUNT), 0)
-    fields |= {layout.MOTIONS: motions.address, layout.VERTICES: vertices.address}
-    fields |= {layout.RESOLVE: int(resolve), layout.NEAR: near}
-    fields |= {layout.LOWER: box[0], layout.UPPER: box[1], layout.ROW_VALUES: np.zeros(motions.joints)}
-    fields |= {layout.INVERSE_BASES: whole_lanes(np.array(inverse_bases(dof)))}
-    fields |= {place: whole_lanes(np.zeros(dof)) for place in (layout.ROW, layout.POINT)}
-    fields |= {layout.QUERY: np.zeros(dof, dtype=np.float32)}
-    fields |= {layout.NEAR_VERTICES: np.zeros(near, dtype=np.int32)}
-    fields |= {layout.NEAR_SQUARES: np.zeros(near, dtype=np.float32)}
-    fields |= {layout.QUESTIONS: np.zeros(layout.MAX_QUESTIONS, dtype=np.int32)}
-    made = table(fields | _arrays(room, halves))
+    dof = motions.dof
+    made = packed(
+        RoadmapTable,
+        motions=motions.table,
+        vertices=vertices,
+        lower=box[0],
+        upper=box[1],
+        inverse_bases=whole_lanes(np.array(inverse_bases(dof))),
+        resolve=int(resolve),
+        row=whole_lanes(np.zeros(dof)),
+        row_values=np.zeros(motions.joints),
+        query=np.zeros(dof, dtype=np.float32),
+        point=whole_lanes(np.zeros(dof)),
+        near=near,
+        near_vertices=np.zeros(near, dtype=np.int32),
+        near_squares=np.zeros(near, dtype=np.float32),
+        questions=np.zeros(layout.MAX_QUESTIONS, dtype=np.int32),
+        **_arrays(vertices.capacity, halves),
+    )
     if motions.identity:
-        made.header[layout.ROW_VALUES] = made.header[layout.ROW]
+        made.put(row_values=made.row)
     return made
 
 
-def make_room(roadmap: Table, vertices: Table, rows: int, halves: int) -> None:
+def make_room(roadmap: RoadmapTable, rows: int, halves: int) -> None:
     """Let there be room for so many vertices and halves; addresses of the tables stay."""
-    while int(vertices.header[CAPACITY]) < rows:
-        grow(vertices)
-    for place, larger in _arrays(int(vertices.header[CAPACITY]), max(halves, len(roadmap[layout.TO]))).items():
-        kept = roadmap[place]
+    while roadmap.vertices.capacity < rows:
+        grow(roadmap.vertices)
+    for name, larger in _arrays(roadmap.vertices.capacity, max(halves, len(roadmap.to))).items():
+        kept = getattr(roadmap, name)
         if len(larger) > len(kept):
-            roadmap.arrays[place] = roomy = aligned(larger)
+            roomy = aligned(larger)
             roomy[: len(kept)] = kept
-            roadmap.header[place] = roomy.ctypes.data
+            roadmap.put(**{name: roomy})
 
 
-def _arrays(vertices: int, halves: int) -> dict[int, NDArray[Any]]:
-    found: dict[int, NDArray[Any]] = {}
+def _arrays(vertices: int, halves: int) -> dict[str, NDArray[Any]]:
+    found: dict[str, NDArray[Any]] = {}
     for size, kinds in ((vertices, _BY_VERTEX), (halves, _BY_HALF), (halves // 2, _BY_EDGE)):
-        found |= {place: np.zeros(size, dtype=kind) for place, kind in kinds.items()}
+        found |= {name: np.zeros(size, dtype=kind) for name, kind in kinds.items()}
     return found

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.search.taut import layout
+from rrtik_ompl.kernels.search.taut.layout import TightenTable
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 
 FIRST_STEP = 0.3  # of what straightens a bend
 CHECKS_PER_CALL = 64  # of the kernel, until the caller may stop it
@@ -35,21 +36,21 @@ class Tightening:
         if kernels is None or len(waypoints) < 2 or not motions.fast.covered(motions.joint_values(waypoints)):
             raise InputError("waypoints to pull taut: expected a route of two or more that kernels can check")
         self._kernels, self._motions, self._dof = kernels, motions, dof
-        self._table = made = PlannedTable(_plan(len(waypoints), dof))
-        made.header[[layout.MOTIONS, layout.RANDOM]] = motions.address, seed % 2**62
-        made[layout.ROUTE][:], made[layout.STEPS][:], made[layout.HINTS][:] = waypoints.ravel(), FIRST_STEP, -1.0
+        self._table = made = TightenTable(PlannedTable(_plan(len(waypoints), dof)))
+        made.put(motions=motions.table, random=seed % 2**62)
+        made.route[:] = waypoints.ravel()
+        made.steps[:] = FIRST_STEP
+        made.hints[:] = -1.0
 
     @property
     def waypoints(self) -> Matrix:
         """The route as it is now, shape (k, dof); a copy."""
-        flat: Vector = self._table[layout.ROUTE]
-        count = int(self._table.header[layout.COUNT])
-        return flat[: count * self._dof].reshape(-1, self._dof).copy()
+        return self._table.route[: self._table.count * self._dof].reshape(-1, self._dof).copy()
 
     @property
     def checks(self) -> int:
         """How many motions have been checked."""
-        return int(self._table.header[layout.CHECKS])
+        return self._table.checks
 
     def run(self, checks: int, *, stop: Callable[[], bool] | None = None) -> bool:
         """Go on until so many motions have been checked since the beginning, nothing moves, or ``stop`` says so.
@@ -75,7 +76,5 @@ class Tightening:
 @lru_cache(maxsize=256)
 def _plan(count: int, dof: int) -> TablePlan:
     """The table of a route of so many waypoints."""
-    arrays = {layout.ROUTE: count * dof, layout.POINT: dof, layout.STEPS: count}
-    arrays[layout.HINTS] = 2 * layout.HINT_SIZE * count
-    numbers = {layout.MOTIONS: 0, layout.COUNT: count, layout.RANDOM: 0, layout.BEND: 1, layout.CHECKS: 0}
-    return TablePlan(arrays, {**numbers, layout.SWEEPS: 0, layout.MOVED: 0})
+    hints = 2 * layout.HINT_SIZE * count
+    return sizes_of(TightenTable, route=count * dof, point=dof, steps=count, hints=hints, count=count, bend=1)
