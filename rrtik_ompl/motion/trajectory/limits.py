@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector, dimensions, finite_array, frozen, number_rows, whole_number
-from rrtik_ompl.base.copies import as_value, in_one_line
+from rrtik_ompl.base.copies import as_value, changed, in_one_line
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.model.robot import Robot
 
@@ -122,7 +122,8 @@ class RateLimits:
             InputError: If they are for another number of joints.
         """
         self._fits(whole_number(count, "number of joints", 1))
-        return RateLimits(*(np.broadcast_to(row, (count,)) for row in (self.velocity, self.acceleration, self.jerk)))
+        rows = {"velocity": self.velocity, "acceleration": self.acceleration, "jerk": self.jerk}
+        return changed(self, **{name: frozen(np.broadcast_to(row, (count,))) for name, row in rows.items()})
 
     def slowing(self, velocity: Vector, acceleration: Vector, jerk: Vector | None = None) -> float:
         """Factor by which a motion with these peaks must be slowed to keep the limits; 1 if it keeps them already.
