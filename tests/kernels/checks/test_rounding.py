@@ -19,10 +19,10 @@ pytestmark = pytest.mark.kernels
 @pytest.mark.parametrize("name", ARMS)
 def test_rounding_never_decides_at_the_very_contact(name):
     at_contact = 0
-    for seed in range(how_many(4, 1)):
+    for seed in range(how_many(4, 2)):
         case = Case(name, seed, most_balls=8)
         for covers, inner, wrong in ((case.outer, False, FREE), (case.inner, True, COLLIDING)):
-            A, B = case.sample(200), case.sample(200)
+            A, B = (case.sample(how_many(200, 100)) for _ in range(2))
             first = case.meetings(A, covers, inner=inner).any(axis=1)
             crossing = first != case.meetings(B, covers, inner=inner).any(axis=1)
             clear, touching = (np.where(first[:, None] == flag, A, B)[crossing] for flag in (False, True))
