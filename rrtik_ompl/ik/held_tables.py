@@ -13,9 +13,11 @@ from rrtik_ompl.constraints.residuals import DAMPING, LARGEST_STEP, STEPS, proje
 from rrtik_ompl.ik.serial_chain import limb_table, pose_numbers
 from rrtik_ompl.ik.tip_columns import frame_columns
 from rrtik_ompl.kernels.ik import ik_layout
+from rrtik_ompl.kernels.ik.ik_layout import CallTable, LimbTable
 from rrtik_ompl.kernels.search.constrained import layout
+from rrtik_ompl.kernels.search.constrained.layout import HeldTable, RegionTable
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import Table, aligned, record, table
+from rrtik_ompl.kernels.tables.memory import aligned, packed, record
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
 
@@ -33,27 +35,28 @@ class HeldTables:
             tolerances are small.
     """
 
-    def __init__(self, robot: Robot, constraints: HeldRegions, limbs: list[Table]) -> None:
+    def __init__(self, robot: Robot, constraints: HeldRegions, limbs: list[LimbTable]) -> None:
         self.regions, self._limbs = constraints.regions, limbs
         dof, made = robot.dof, [_region_tables(*pair) for pair in zip(constraints.regions, limbs, strict=True)]
         addresses = [region.address for region, _ in made]
         self._parts = [part for parts in made for part in parts]
-        numbers = np.array([1.0 / reach_of(robot), PER_RADIAN, DAMPING, LARGEST_STEP])
-        self.held = table(
-            {
-                layout.COUNT: len(addresses),
-                layout.REGIONS: np.array(addresses, dtype=np.int64),
-                layout.HELD_DOF: dof,
-                layout.HELD_LOWER: np.asarray(robot.lower),
-                layout.HELD_UPPER: np.asarray(robot.upper),
-                layout.HELD_NUMBERS: numbers,
-                layout.COLUMNS: np.zeros(ik_layout.TWIST_NUMBERS * dof),
-                layout.SQUARE: np.zeros(dof * dof),
-                layout.CHANGE: np.zeros(dof),
-                layout.ERROR: np.zeros(ik_layout.TWIST_NUMBERS),
-                layout.WEIGHTS: np.zeros(ik_layout.TWIST_NUMBERS),
-                layout.NODE: np.zeros(dof),
-            }
+        self.held = packed(
+            HeldTable,
+            count=len(addresses),
+            regions=np.array(addresses, dtype=np.int64),
+            dof=dof,
+            lower=np.asarray(robot.lower),
+            upper=np.asarray(robot.upper),
+            per_metre=1.0 / reach_of(robot),
+            per_radian=PER_RADIAN,
+            damping=DAMPING,
+            largest_step=LARGEST_STEP,
+            columns=np.zeros(ik_layout.TWIST_NUMBERS * dof),
+            square=np.zeros(dof * dof),
+            change=np.zeros(dof),
+            error=np.zeros(ik_layout.TWIST_NUMBERS),
+            weights=np.zeros(ik_layout.TWIST_NUMBERS),
+            node=np.zeros(dof),
         )
         self.address = self.held.address
         self.shortest = min((_shortest_step(region) for region in constraints.regions), default=SHORTEST_STEP)
@@ -91,33 +94,22 @@ def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:
 
 
 @lru_cache(maxsize=64)
-def _limb_of(robot: Robot, joint: int, placement: bytes) -> Table | None:
+def _limb_of(robot: Robot, joint: int, placement: bytes) -> LimbTable | None:
     """The joints that move a frame, given by its pose in that of a joint."""
     return limb_table(robot, frame_columns(robot, joint, np.frombuffer(placement).reshape(4, 4)))
 
 
-def _region_tables(region: HeldRegion, limb: Table) -> tuple[Table, Table]:
+def _region_tables(region: HeldRegion, limb: LimbTable) -> tuple[RegionTable, CallTable]:
     """The table of a region, and the memory of its frames."""
-    joints = int(limb.header[ik_layout.JOINTS])
-    fixed = limb[ik_layout.FIXED].reshape(-1, ik_layout.POSE_NUMBERS)[0]
+    fixed = limb.fixed.reshape(-1, ik_layout.POSE_NUMBERS)[0]
     first = np.eye(4)
     first[:3, :3], first[:3, 3] = fixed[:9].reshape(3, 3), fixed[9:]
-    fields = dict.fromkeys(range(ik_layout.DONE + 1), 0)
-    call = table(
-        fields
-        | {
-            ik_layout.FIRST: pose_numbers((region.T_w_world @ first)[None]).ravel(),
-            ik_layout.FRAMES: np.zeros(ik_layout.POSE_NUMBERS * (joints + 1)),
-        }
+    call = packed(
+        CallTable,
+        first=pose_numbers((region.T_w_world @ first)[None]).ravel(),
+        frames=np.zeros(ik_layout.POSE_NUMBERS * (limb.joints + 1)),
     )
-    made = table(
-        {
-            layout.LIMB: limb.address,
-            layout.CALL: call.address,
-            layout.TURNING: int(region.turning),
-            layout.RECORD: _record(region),
-        }
-    )
+    made = packed(RegionTable, limb=limb, call=call, turning=int(region.turning), record=_record(region))
     return made, call
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +11,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, frozen
 from rrtik_ompl.ik.reference_descent import DAMPING, DAMPING_SHARE, LARGEST_STEP, PER_CHORD, SHARE_GROWTH, STALLED
 from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
-from rrtik_ompl.kernels.ik import ik_layout
-from rrtik_ompl.kernels.tables.memory import Table, table
+from rrtik_ompl.kernels.ik.ik_layout import LimbTable
+from rrtik_ompl.kernels.tables.memory import aligned, packed
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.tip_distance import reach_of
 
@@ -36,49 +35,44 @@ def seeds_of(robot: Robot) -> Seeds:
 
 
 @lru_cache(maxsize=64)
-def limb_of(robot: Robot) -> Table | None:
+def limb_of(robot: Robot) -> LimbTable | None:
     """The table of a robot's limb without seeds; None if a joint hangs on several numbers of q."""
     return limb_table(robot, tip_columns(robot))
 
 
-def limb_table(robot: Robot, tip: TipColumns) -> Table | None:
+def limb_table(robot: Robot, tip: TipColumns) -> LimbTable | None:
     """The table of the joints that move a frame, without seeds; None if one of them hangs on several numbers of q."""
     if (np.count_nonzero(tip.gain, axis=1) > 1).any():
         return None
     columns = np.argmax(np.abs(tip.gain), axis=1)
-    numbers = [1.0 / reach_of(robot), PER_CHORD, DAMPING, DAMPING_SHARE, SHARE_GROWTH, LARGEST_STEP, STALLED]
-    return table(
-        {
-            ik_layout.JOINTS: len(columns),
-            ik_layout.DOF: robot.dof,
-            ik_layout.FIXED: pose_numbers(tip.fixed),
-            ik_layout.SLIDING: tip.prismatic.astype(np.int32),
-            ik_layout.COLUMN: columns.astype(np.int32),
-            ik_layout.GAIN: tip.gain[np.arange(len(columns)), columns],
-            ik_layout.OFFSET: tip.offset,
-            ik_layout.LOWER: np.asarray(robot.lower),
-            ik_layout.UPPER: np.asarray(robot.upper),
-            ik_layout.SEED_COUNT: 0,
-            ik_layout.SEEDS: 0,
-            ik_layout.SEED_TIPS: 0,
-            ik_layout.NUMBERS: np.array(numbers),
-        }
+    return packed(
+        LimbTable,
+        joints=len(columns),
+        dof=robot.dof,
+        fixed=pose_numbers(tip.fixed),
+        sliding=tip.prismatic.astype(np.int32),
+        column=columns.astype(np.int32),
+        gain=tip.gain[np.arange(len(columns)), columns],
+        offset=tip.offset,
+        lower=np.asarray(robot.lower),
+        upper=np.asarray(robot.upper),
+        per_metre=1.0 / reach_of(robot),
+        per_chord=PER_CHORD,
+        damping=DAMPING,
+        share=DAMPING_SHARE,
+        share_growth=SHARE_GROWTH,
+        largest_step=LARGEST_STEP,
+        stalled=STALLED,
     )
 
 
 @lru_cache(maxsize=64)
-def seeded_limb_of(robot: Robot) -> Table | None:
+def seeded_limb_of(robot: Robot) -> LimbTable | None:
     """The same with seeds."""
-    bare, seeds = limb_of(robot), seeds_of(robot)
-    if bare is None:
-        return None
-    fields: dict[int, Any] = {place: bare.arrays.get(place, int(number)) for place, number in enumerate(bare.header)}
-    fields |= {
-        ik_layout.SEED_COUNT: len(seeds.q),
-        ik_layout.SEEDS: seeds.q,
-        ik_layout.SEED_TIPS: pose_numbers(seeds.tips),
-    }
-    return table(fields)
+    limb, seeds = limb_table(robot, tip_columns(robot)), seeds_of(robot)
+    if limb is not None:
+        limb.put(seed_count=len(seeds.q), seeds=aligned(seeds.q), seed_tips=aligned(pose_numbers(seeds.tips)))
+    return limb
 
 
 def pose_numbers(poses: NDArray[np.float64]) -> Matrix:

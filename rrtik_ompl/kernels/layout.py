@@ -31,6 +31,10 @@ ProbeTable = NewType("ProbeTable", int)
 BoundTable = NewType("BoundTable", int)
 
 
+class Configuration(Doubles):
+    """Rows of one number for each coordinate."""
+
+
 class JointValues(Doubles):
     """Rows of one number for each joint."""
 

@@ -13,11 +13,12 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
 from rrtik_ompl.ik.analytic.reference_branches import mountings, reference_branches
 from rrtik_ompl.ik.serial_chain import limb_of, pose_numbers
-from rrtik_ompl.kernels.ik import branch_layout, ik_layout
-from rrtik_ompl.kernels.ik.branch_layout import BRANCHES, DOF
+from rrtik_ompl.kernels.ik import branch_layout
+from rrtik_ompl.kernels.ik.branch_layout import BRANCHES, DOF, ArmTable, CallTable
+from rrtik_ompl.kernels.record import WORD
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import WORD, PlannedTable, Table, TablePlan, table
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, packed, sizes_of
 from rrtik_ompl.model.robot import FEW, LIMIT_TOLERANCE, Robot
 
 UNBOUNDED_ANGLE = 1e300  # limits of continuous joints: kernels know no infinity
@@ -86,10 +87,9 @@ def valid_branches(robot: Robot, form: AnalyticSolver, pose: Matrix, hint: Vecto
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Arm:
-    """Its table, the table that this one points at, and calls for one pose with a hint that nobody uses now."""
+    """Its table, and calls for one pose with a hint that nobody uses now."""
 
-    table: Table
-    limb: Table
+    table: ArmTable
     spare: list[_Call] = field(default_factory=list)
 
 
@@ -97,20 +97,21 @@ class _Arm:
 def _arm_of(robot: Robot, form: AnalyticSolver) -> _Arm | None:
     """None if forward kinematics in kernels does not know such a limb."""
     limb = limb_of(robot)
-    if limb is None or limb.header[ik_layout.JOINTS] != DOF or limb[ik_layout.SLIDING].any():
+    if limb is None or limb.joints != DOF or limb.sliding.any():
         return None
     placements = np.array([np.eye(4) if each is None else each for each in mountings(robot, form)])
     from_world, to_frame = pose_numbers(placements)
-    fields: dict[int, int | NDArray[Any]] = {
-        branch_layout.FROM_WORLD: from_world,
-        branch_layout.TO_FRAME: to_frame,
-        branch_layout.NUMBERS: np.array(form.numbers),
-        branch_layout.LOWEST: np.maximum(robot.lower - LIMIT_TOLERANCE, -UNBOUNDED_ANGLE),
-        branch_layout.HIGHEST: np.minimum(robot.upper + LIMIT_TOLERANCE, UNBOUNDED_ANGLE),
-        branch_layout.TURNING: ((robot.lower < -np.pi) | (robot.upper > np.pi)).astype(np.int32),
-        branch_layout.LIMB: limb.address,
-    }
-    return _Arm(table(fields), limb)
+    table = packed(
+        ArmTable,
+        from_world=from_world,
+        to_frame=to_frame,
+        numbers=np.array(form.numbers),
+        lowest=np.maximum(robot.lower - LIMIT_TOLERANCE, -UNBOUNDED_ANGLE),
+        highest=np.minimum(robot.upper + LIMIT_TOLERANCE, UNBOUNDED_ANGLE),
+        turning=((robot.lower < -np.pi) | (robot.upper > np.pi)).astype(np.int32),
+        limb=limb,
+    )
+    return _Arm(table)
 
 
 class _Call:
@@ -119,46 +120,43 @@ class _Call:
     def __init__(self, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool) -> None:
         self._count, self._shape = len(poses), (BRANCHES, WIDTH * _blocks(len(poses)))
         self._checked = int(check)
-        self._memory = memory = PlannedTable(_plan_of(len(poses), hints is not None, check))
-        self.address = memory.address
-        memory[branch_layout.POSES].reshape(poses.shape)[:] = poses
-        memory[branch_layout.SLACK][:] = slack
+        self._table = table = CallTable(PlannedTable(_plan_of(len(poses), hints is not None, check)))
+        self.address = table.address
+        table.poses.reshape(poses.shape)[:] = poses
+        table.slack = slack
         if hints is not None:
-            memory[branch_layout.NEAR].reshape(hints.shape)[:] = hints
+            table.near.reshape(hints.shape)[:] = hints
 
     def begin(self, pose: Matrix, hint: Vector) -> None:
         """Put another pose and hint in place of the only ones."""
-        self._memory[branch_layout.POSES].reshape(pose.shape)[:] = pose
-        self._memory[branch_layout.NEAR][:] = hint
+        self._table.poses.reshape(pose.shape)[:] = pose
+        self._table.near[:] = hint
 
     def valid_rows(self) -> Matrix | None:
         """Of the only pose the branches inside the limits, shape (k, dof); None if it is to be answered otherwise."""
         if self.odd[0]:
             return None
-        memory = self._memory
-        q = memory[branch_layout.Q].reshape(DOF, *self._shape)[:, :, 0]
-        real, fits = (memory[place].view(np.bool_)[::WIDTH] for place in (branch_layout.REAL, branch_layout.FITS))
+        table = self._table
+        q = table.q.reshape(DOF, *self._shape)[:, :, 0]
+        real, fits = (flags.view(np.bool_)[::WIDTH] for flags in (table.real, table.fits))
         rows: Matrix = q.T[real & fits]
         return rows
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond an array."""
-        return self._memory.intact()
+        return self._table.intact()
 
     @property
     def odd(self) -> NDArray[np.bool_]:
         """Which targets are to be answered otherwise, shape (m,)."""
-        return self._memory[branch_layout.ODD].view(np.bool_)[: self._count]
+        return self._table.odd.view(np.bool_)[: self._count]
 
     def answers(self) -> list[NDArray[Any]]:
         """As of `reference_branches`."""
-        memory, own = self._memory, slice(self._count)
-        q = memory[branch_layout.Q].reshape(DOF, *self._shape)[:, :, own]
-        residuals = memory[branch_layout.RESIDUALS].reshape(2 * self._checked, *self._shape)[:, :, own]
-        real, fits = (
-            memory[place].view(np.bool_).reshape(self._shape)[:, own]
-            for place in (branch_layout.REAL, branch_layout.FITS)
-        )
+        table, own = self._table, slice(self._count)
+        q = table.q.reshape(DOF, *self._shape)[:, :, own]
+        residuals = table.residuals.reshape(2 * self._checked, *self._shape)[:, :, own]
+        real, fits = (flags.view(np.bool_).reshape(self._shape)[:, own] for flags in (table.real, table.fits))
         return [q, real, real & fits, np.zeros(self._count, dtype=np.uint8), residuals]
 
 
@@ -166,18 +164,19 @@ class _Call:
 def _plan_of(count: int, hinted: bool, check: bool) -> TablePlan:
     blocks = _blocks(count)
     lanes = WIDTH * blocks
-    arrays = {
-        branch_layout.Q: DOF * BRANCHES * lanes,
-        branch_layout.RESIDUALS: 2 * BRANCHES * lanes if check else 0,
-        branch_layout.SCRATCH: branch_layout.SCRATCH_LANES * WIDTH,
-        branch_layout.POSES: branch_layout.MATRIX_NUMBERS * count,
-        branch_layout.NEAR: DOF * count if hinted else 0,
-        branch_layout.SLACK: 1,
-        branch_layout.REAL: BRANCHES * lanes // WORD,
-        branch_layout.FITS: BRANCHES * lanes // WORD,
-        branch_layout.ODD: -(-lanes // WORD),
-    }
-    return TablePlan(arrays, {branch_layout.ROWS: count, branch_layout.BLOCKS: blocks})
+    return sizes_of(
+        CallTable,
+        q=DOF * BRANCHES * lanes,
+        residuals=2 * BRANCHES * lanes if check else 0,
+        scratch=branch_layout.SCRATCH_LANES * WIDTH,
+        poses=branch_layout.MATRIX_NUMBERS * count,
+        near=DOF * count if hinted else 0,
+        real=BRANCHES * lanes // WORD,
+        fits=BRANCHES * lanes // WORD,
+        odd=-(-lanes // WORD),
+        rows=count,
+        blocks=blocks,
+    )
 
 
 def _blocks(count: int) -> int:

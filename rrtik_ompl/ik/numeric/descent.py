@@ -10,9 +10,8 @@ from rrtik_ompl.ik.goal_rows import goal_rows
 from rrtik_ompl.ik.numeric.kernel_call import KernelCall, spare_calls
 from rrtik_ompl.ik.reference_descent import farness, walk_plainly
 from rrtik_ompl.ik.serial_chain import SEEDS, limb_of, seeded_limb_of, seeds_of
-from rrtik_ompl.kernels.ik.ik_layout import KERNELS
+from rrtik_ompl.kernels.ik.ik_layout import KERNELS, LimbTable
 from rrtik_ompl.kernels.simd.library import Library, library
-from rrtik_ompl.kernels.tables.memory import Table
 from rrtik_ompl.model.goal import TipGoal
 from rrtik_ompl.model.robot import Robot
 
@@ -67,7 +66,7 @@ class SearchOfOne:
         steps: Taken by all starts together.
     """
 
-    def __init__(self, kernels: Library, limb: Table, aim: Matrix, near: Vector) -> None:
+    def __init__(self, kernels: Library, limb: LimbTable, aim: Matrix, near: Vector) -> None:
         self._kernels, self._limb, self.steps = kernels, limb, 0
         try:
             self._call = spare_calls(limb).pop()

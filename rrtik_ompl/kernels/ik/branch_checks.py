@@ -7,49 +7,32 @@ from typing import Any
 from rrtik_ompl.kernels.ik import branch_layout, ik_layout
 from rrtik_ompl.kernels.ik.branch_accessors import (
     answer,
-    fits_of,
     frame_column,
     frame_origin,
     frame_row,
-    from_world_of,
-    highest_of,
     hint_of,
-    limb_of,
     load_target,
     load_target_origin,
-    lowest_of,
     matrix_entry,
-    near_of,
     pose_of,
-    q_of,
-    residuals_of,
-    row_count_of,
-    scratch_of,
     set_lane,
     set_placed_entry,
     set_placed_origin,
     target_column,
     target_origin,
     target_row,
-    to_frame_of,
-    turning_of,
 )
-from rrtik_ompl.kernels.ik.branch_layout import ArmTable, CallTable, Frame, Lanes
+from rrtik_ompl.kernels.ik.branch_layout import ArmTable, CallTable, Frame
 from rrtik_ompl.kernels.ik.ik_accessors import (
-    column_of,
-    fixed_of,
-    gain_of,
     next_pose,
-    offset_of,
     pose_column,
     pose_origin,
     pose_row,
 )
+from rrtik_ompl.kernels.record import Doubles
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
-    double_at,
     floor,
-    int_at,
     lane_numbers,
     set_truths,
     set_wide_lanes,
@@ -58,6 +41,7 @@ from rrtik_ompl.kernels.simd.lanes import (
     square_root,
     wide_lanes_at,
 )
+from rrtik_ompl.kernels.simd.records import exists
 from rrtik_ompl.kernels.simd.wide_angles import TAU, arc_sine, wide_sine_and_cosine, within_half_turn
 
 MAX_COORDINATE = 1e9  # [m] squares of what is farther away could leave the numbers; it is out of reach all the same
@@ -66,31 +50,31 @@ MAX_COORDINATE = 1e9  # [m] squares of what is farther away could leave the numb
 @kernel
 def load(arm: ArmTable, call: CallTable, block: int) -> None:
     """Read a block of targets and place them; behind the last target come copies of it."""
-    scratch = scratch_of(call)
+    scratch = call.scratch
     for lane in range(WIDTH):
-        row = min(WIDTH * block + lane, row_count_of(call) - 1)
+        row = min(WIDTH * block + lane, call.rows - 1)
         pose = pose_of(call, row)
         for k in range(3):
             for column in range(3):
                 load_target(scratch, lane, k, column, matrix_entry(pose, k, column))
             value = min(max(matrix_entry(pose, k, 3), -MAX_COORDINATE), MAX_COORDINATE)
             load_target_origin(scratch, lane, k, value)
-        if near_of(call) != 0:
+        if exists(call.near):
             for joint in range(branch_layout.DOF):
                 set_lane(scratch, branch_layout.HINT + joint, lane, hint_of(call, row, joint))
     place_targets(arm, scratch)
 
 
 @inlined
-def place_targets(arm: ArmTable, scratch: Lanes) -> None:
+def place_targets(arm: ArmTable, scratch: Doubles) -> None:
     """T_base_frame of T_world_tip."""
-    before, after = from_world_of(arm), to_frame_of(arm)
+    before, after = arm.from_world, arm.to_frame
     for row in range(3):
         a, b, c = turned_row(before, row, scratch)
         o = along(
             frame_row(before, row), target_origin(scratch, 0), target_origin(scratch, 1), target_origin(scratch, 2)
         )
-        o = o + double_at(before, branch_layout.ORIGIN + row)
+        o = o + before[branch_layout.ORIGIN + row]
         for k in range(3):
             set_placed_entry(scratch, row, k, along(frame_column(after, k), a, b, c))
         lever = along(frame_origin(after), a, b, c)
@@ -104,7 +88,7 @@ def along(vector: Any, x: Any, y: Any, z: Any) -> Any:
 
 
 @inlined
-def turned_row(frame: Frame, row: int, scratch: Lanes) -> Any:
+def turned_row(frame: Frame, row: int, scratch: Doubles) -> Any:
     """A row of a rotation times the rotation of the target as given."""
     own = frame_row(frame, row)
     first, second, third = target_column(scratch, 0), target_column(scratch, 1), target_column(scratch, 2)
@@ -120,7 +104,7 @@ def check_branches(arm: ArmTable, call: CallTable, block: int) -> None:
     """Turn the branches of a block into the limits, say which fit, and measure them."""
     for branch in range(branch_layout.BRANCHES):
         hold(arm, call, branch, block)
-        if residuals_of(call) != 0:
+        if exists(call.residuals):
             measure(arm, call, branch, block)
 
 
@@ -129,45 +113,45 @@ def hold(arm: ArmTable, call: CallTable, branch: int, block: int) -> None:
     """Turn joints by full turns into their limits, towards the hint where they allow it; which configurations fit."""
     fits = lane_numbers() >= 0.0
     for joint in range(branch_layout.DOF):
-        low, high = double_at(lowest_of(arm), joint), double_at(highest_of(arm), joint)
+        low, high = arm.lowest[joint], arm.highest[joint]
         place = answer(call, joint, branch, block)
-        value = wide_lanes_at(q_of(call), place)
-        if int_at(turning_of(arm), joint) != 0:
+        value = wide_lanes_at(call.q, place)
+        if arm.turning[joint] != 0:
             near = spread_wide(0.0)
-            if near_of(call) != 0:
-                near = wide_lanes_at(scratch_of(call), branch_layout.HINT + joint)
+            if exists(call.near):
+                near = wide_lanes_at(call.scratch, branch_layout.HINT + joint)
             value = near + within_half_turn(value - near)
             value = value + TAU * floor(smaller(high - value, 0.0) * (1.0 / TAU))
             value = value - TAU * floor(smaller(value - low, 0.0) * (1.0 / TAU))
-            set_wide_lanes(q_of(call), place, value)
+            set_wide_lanes(call.q, place, value)
         fits = fits & (value >= low) & (value <= high)
-    set_truths(fits_of(call), WIDTH * answer(call, 0, branch, block), fits)
+    set_truths(call.fits, WIDTH * answer(call, 0, branch, block), fits)
 
 
 @inlined
 def measure(arm: ArmTable, call: CallTable, branch: int, block: int) -> None:
     """Distance and angle between the target and where a branch brings the tip."""
-    limb, scratch = limb_of(arm), scratch_of(call)
+    limb, scratch = arm.limb, call.scratch
     for joint in range(branch_layout.DOF):
-        column = int_at(column_of(limb), joint)
-        value = wide_lanes_at(q_of(call), answer(call, column, branch, block))
-        value = value * double_at(gain_of(limb), joint) + double_at(offset_of(limb), joint)
+        column = limb.column[joint]
+        value = wide_lanes_at(call.q, answer(call, column, branch, block))
+        value = value * limb.gain[joint] + limb.offset[joint]
         sine, cosine = wide_sine_and_cosine(value)
         set_wide_lanes(scratch, branch_layout.SINES + joint, sine)
         set_wide_lanes(scratch, branch_layout.COSINES + joint, cosine)
     away, turned = spread_wide(0.0), spread_wide(0.0)
     for row in range(3):
-        x, y, z, o = row_of_tip(fixed_of(limb), scratch, row)
+        x, y, z, o = row_of_tip(limb.fixed, scratch, row)
         a, b, c = target_row(scratch, row)
         x, y, z, o = x - a, y - b, z - c, o - target_origin(scratch, row)
         away, turned = away + o * o, turned + (x * x + y * y + z * z)
     angle = 2.0 * arc_sine(smaller(square_root(turned * 0.125), 1.0))
-    set_wide_lanes(residuals_of(call), answer(call, 0, branch, block), square_root(away))
-    set_wide_lanes(residuals_of(call), answer(call, 1, branch, block), angle)
+    set_wide_lanes(call.residuals, answer(call, 0, branch, block), square_root(away))
+    set_wide_lanes(call.residuals, answer(call, 1, branch, block), angle)
 
 
 @inlined
-def row_of_tip(fixed: ik_layout.Pose, scratch: Lanes, row: int) -> Any:
+def row_of_tip(fixed: ik_layout.Pose, scratch: Doubles, row: int) -> Any:
     """A row of the tip's frame: of its three axes and its origin. All joints turn about their z."""
     first, start = pose_row(fixed, row), pose_origin(fixed, row)
     x, y, z, o = spread_wide(first[0]), spread_wide(first[1]), spread_wide(first[2]), spread_wide(start)

@@ -11,14 +11,8 @@ from typing import Any
 from rrtik_ompl.kernels.ik import branch_layout
 from rrtik_ompl.kernels.ik.branch_accessors import (
     answer,
-    block_count_of,
-    number,
-    odd_of,
     placed_entry,
     placed_origin,
-    q_of,
-    real_of,
-    slack_of,
 )
 from rrtik_ompl.kernels.ik.branch_checks import check_branches, load
 from rrtik_ompl.kernels.ik.branch_layout import ArmTable, CallTable
@@ -60,8 +54,8 @@ def two_links(first: float, second: float, x: Any, y: Any) -> Any:
 @inlined
 def put(call: CallTable, branch: int, block: int, raw: Any, q: Any) -> None:
     """Write a branch: its joint values, and which targets it reaches by the cosine of the elbow's turn."""
-    real, out = absolute(raw) <= 1.0 + branch_layout.REACH_TOLERANCE, q_of(call)
-    set_truths(real_of(call), WIDTH * answer(call, 0, branch, block), real)
+    real, out = absolute(raw) <= 1.0 + branch_layout.REACH_TOLERANCE, call.q
+    set_truths(call.real, WIDTH * answer(call, 0, branch, block), real)
     set_wide_lanes(out, answer(call, 0, branch, block), q[0])
     set_wide_lanes(out, answer(call, 1, branch, block), q[1])
     set_wide_lanes(out, answer(call, 2, branch, block), q[2])
@@ -73,8 +67,8 @@ def put(call: CallTable, branch: int, block: int, raw: Any, q: Any) -> None:
 @inlined
 def parallel_side(arm: ArmTable, call: CallTable, block: int, side: int, theta1: Any, c: Any, s: Any) -> Any:
     """Four branches of an arm of parallel axes, its azimuth known; the sine h, and which triangles do not close."""
-    a1, a2, d6 = number(arm, branch_layout.A1), number(arm, branch_layout.A2), number(arm, branch_layout.D6)
-    a3, a4 = number(arm, branch_layout.A3), number(arm, branch_layout.A4)
+    a1, a2, d6 = arm.numbers[branch_layout.A1], arm.numbers[branch_layout.A2], arm.numbers[branch_layout.D6]
+    a3, a4 = arm.numbers[branch_layout.A3], arm.numbers[branch_layout.A4]
     uz, wz = placed_entry(call, 2, 0), placed_entry(call, 2, 2)
     x, s5 = in_plane(placed_entry(call, 0, 2), placed_entry(call, 1, 2), c, s)
     along, across = in_plane(placed_entry(call, 0, 0), placed_entry(call, 1, 0), c, s)
@@ -106,7 +100,7 @@ def solve_parallel(arm: ArmTable, call: CallTable, block: int) -> None:
 
     Branches are (front, back) x (near, far) x (up, down).
     """
-    d6, slack = number(arm, branch_layout.D6), slack_of(call)
+    d6, slack = arm.numbers[branch_layout.D6], call.slack
     px, py = (
         placed_origin(call, 0) - d6 * placed_entry(call, 0, 2),
         placed_origin(call, 1) - d6 * placed_entry(call, 1, 2),
@@ -124,7 +118,7 @@ def solve_parallel(arm: ArmTable, call: CallTable, block: int) -> None:
     )
     odd = (away < max(branch_layout.SINGULAR, slack)) | (h < larger(normal, slack))
     odd = odd | ((h < branch_layout.UNSURE) & (missed | missed_too))
-    set_truths(odd_of(call), WIDTH * block, odd)
+    set_truths(call.odd, WIDTH * block, odd)
 
 
 @inlined
@@ -150,9 +144,9 @@ def ball_wrist(call: CallTable, block: int, branch: int, raw: Any, arm_angles: A
 @inlined
 def ball_side(arm: ArmTable, call: CallTable, block: int, side: int, theta1: Any, radius: Any, short: Any) -> Any:
     """Four branches of an arm with a ball wrist, its azimuth known; which have a straight wrist."""
-    base, a2 = number(arm, branch_layout.SHOULDER), number(arm, branch_layout.UPPER_ARM)
-    forearm, bend = number(arm, branch_layout.FOREARM), number(arm, branch_layout.BEND)
-    slack, branch = slack_of(call), 4 * side
+    base, a2 = arm.numbers[branch_layout.SHOULDER], arm.numbers[branch_layout.UPPER_ARM]
+    forearm, bend = arm.numbers[branch_layout.FOREARM], arm.numbers[branch_layout.BEND]
+    slack, branch = call.slack, 4 * side
     up, down, turn, raw = two_links(a2, forearm, radius, placed_origin(call, 2) - base)
     raw = choose(short, spread_wide(2.0), raw)
     s, c = wide_sine_and_cosine(theta1)
@@ -167,7 +161,7 @@ def solve_ball(arm: ArmTable, call: CallTable, block: int) -> None:
 
     Branches are (front, back) x (up, down) x (near, flip).
     """
-    px, py, d3 = placed_origin(call, 0), placed_origin(call, 1), number(arm, branch_layout.ASIDE)
+    px, py, d3 = placed_origin(call, 0), placed_origin(call, 1), arm.numbers[branch_layout.ASIDE]
     square = px * px + py * py - d3 * d3
     radius = square_root(choose(square < branch_layout.SHOULDER_ROOT, spread_wide(0.0), square))
     heading, aside, short = (
@@ -177,13 +171,13 @@ def solve_ball(arm: ArmTable, call: CallTable, block: int) -> None:
     )
     odd = ball_side(arm, call, block, 0, within_half_turn(heading + aside), radius, short)
     odd = odd | ball_side(arm, call, block, 1, within_half_turn(heading + HALF_TURN - aside), -radius, short)
-    set_truths(odd_of(call), WIDTH * block, odd)
+    set_truths(call.odd, WIDTH * block, odd)
 
 
 @entry
 def parallel_axes(arm: ArmTable, call: CallTable) -> int:
     """Answer all targets of a call; see :func:`solve_parallel`."""
-    for block in range(block_count_of(call)):
+    for block in range(call.blocks):
         load(arm, call, block)
         solve_parallel(arm, call, block)
         check_branches(arm, call, block)
@@ -193,7 +187,7 @@ def parallel_axes(arm: ArmTable, call: CallTable) -> int:
 @entry
 def ball_arm(arm: ArmTable, call: CallTable) -> int:
     """Answer all targets of a call; see :func:`solve_ball`."""
-    for block in range(block_count_of(call)):
+    for block in range(call.blocks):
         load(arm, call, block)
         solve_ball(arm, call, block)
         check_branches(arm, call, block)

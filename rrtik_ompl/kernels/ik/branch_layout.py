@@ -1,26 +1,51 @@
-"""The tables of closed forms in kernels: what each field is, and the bounds that both forms of one arm go by.
-
-Kernels read by the named functions of :mod:`rrtik_ompl.kernels.ik.branch_accessors`.
-"""
+"""The tables of closed forms in kernels, and the bounds that both forms of one arm go by."""
 
 from __future__ import annotations
 
-from typing import NewType
+from rrtik_ompl.kernels.ik.ik_layout import LimbTable
+from rrtik_ompl.kernels.layout import Configuration
+from rrtik_ompl.kernels.record import Doubles, Ints, Record
 
 KERNELS = "ik.branch_kernels"  # their library
 BRANCHES, DOF = 8, 6
 
-# Addresses.
-ArmTable = NewType("ArmTable", int)
-CallTable = NewType("CallTable", int)
-Frame = NewType("Frame", int)  # 12 numbers: the rotation row by row, then the origin
-Matrices = NewType("Matrices", int)  # of 4 x 4 numbers, row by row
-Lanes = NewType("Lanes", int)  # wide lanes
 
-# Arm. FROM_WORLD: T_base_world, TO_FRAME: T_tip_frame, frames · NUMBERS: what its kernel takes, see below · LOWEST,
-# HIGHEST: limits with their tolerance · TURNING: int32, whether a joint's limits go beyond half a turn · LIMB: address
-# of the table of `ik_layout` that forward kinematics reads
-FROM_WORLD, TO_FRAME, NUMBERS, LOWEST, HIGHEST, TURNING, LIMB = range(7)
+class Frame(Doubles):
+    """12 numbers: the rotation row by row, then the origin."""
+
+
+class Matrices(Doubles):
+    """Of 4 x 4 numbers, row by row."""
+
+
+class ArmTable(Record):
+    """An arm of a closed form."""
+
+    from_world: Frame  # T_base_world
+    to_frame: Frame  # T_tip_frame
+    numbers: Doubles  # what its kernel takes, see below
+    lowest: Doubles  # limits with their tolerance
+    highest: Doubles
+    turning: Ints  # whether a joint's limits go beyond half a turn
+    limb: LimbTable  # that forward kinematics reads
+
+
+class CallTable(Record):
+    """What one call works on. Answers are by target, WIDTH times ``blocks`` of them."""
+
+    rows: int  # targets
+    blocks: int  # of WIDTH targets, the last one filled up
+    poses: Matrices  # T_world_tip
+    near: Configuration  # hints, may be absent
+    slack: float  # see `AnalyticSolver`
+    q: Doubles  # joint values, joint by joint of each branch
+    real: Ints  # truth values, a byte each: whether each branch reaches the target
+    fits: Ints  # likewise: whether it is inside the limits
+    odd: Ints  # likewise: whether the answer is not to be used
+    residuals: Doubles  # of each branch its distance, then of each its angle; may be absent
+    scratch: Doubles  # see below
+
+
 # Numbers of an arm of parallel axes: of its DH table.
 A1, A2, A3, A4, D6 = range(5)
 # Numbers of an arm with a ball wrist: height of the shoulder, a2, d3 of the DH table, and the forearm from elbow to
@@ -31,13 +56,6 @@ SHOULDER, UPPER_ARM, ASIDE, FOREARM, BEND = range(5)
 ROTATION, ORIGIN = 0, 9
 FRAME_NUMBERS = 12
 MATRIX_SIDE, MATRIX_NUMBERS = 4, 16
-
-# Call. ROWS: targets; BLOCKS: of WIDTH of them, the last one filled up · POSES: T_world_tip, matrices · NEAR:
-# configurations, 0: none · SLACK: one number, see `AnalyticSolver` · the answers, targets last, WIDTH times BLOCKS of
-# them: Q: joint values, joint by joint of each branch; REAL, FITS: of each branch, whether it reaches the target and
-# whether it is inside the limits; ODD: whether the answer is not to be used; RESIDUALS: of each branch its distance,
-# then of each its angle (0: not wanted) · SCRATCH: see below
-ROWS, BLOCKS, POSES, NEAR, SLACK, Q, REAL, FITS, ODD, RESIDUALS, SCRATCH = range(11)
 
 # Scratch memory, in wide lanes: TARGET as given and FRAME as the closed form wants it, the joint values of the HINT,
 # SINES and COSINES of the joints.

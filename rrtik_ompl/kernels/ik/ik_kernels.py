@@ -12,44 +12,20 @@ from typing import Any
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.ik.ik_accessors import (
     aim_at,
-    aim_bytes_of,
-    change_of,
     column_at,
-    columns_of,
-    configuration_at,
-    dof_of,
-    error_of,
-    farness_of,
     free_turn_of,
-    lower_of,
     near_at,
-    next_of,
-    next_start_at,
-    number,
-    number_of_next,
-    patience_of,
     pose_at,
     pose_entry,
     pose_origin,
-    q_of,
-    reached_of,
-    row_count_of,
-    seed_count_of,
-    seed_tips_of,
-    seeds_of,
-    set_next,
     set_square,
-    set_steps_done,
     square_at,
-    square_of,
-    step_limit_of,
-    steps_done_of,
-    upper_of,
 )
 from rrtik_ompl.kernels.ik.ik_kinematics import differentiate, measure, move_tip, see_from, weigh
-from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, Aim, CallTable, Configuration, LimbTable, Twist
+from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, Aim, CallTable, LimbTable, Twist
+from rrtik_ompl.kernels.layout import Configuration
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, set_double, set_int
+from rrtik_ompl.kernels.simd.records import row_at
 
 UNBOUNDED_RESIDUAL = 1e300  # without unit
 
@@ -57,43 +33,43 @@ UNBOUNDED_RESIDUAL = 1e300  # without unit
 @inlined
 def along(a: Twist, b: Twist) -> Any:
     """Dot product of six numbers."""
-    total = double_at(a, 0) * double_at(b, 0)
+    total = a[0] * b[0]
     for k in range(1, TWIST_NUMBERS):
-        total += double_at(a, k) * double_at(b, k)
+        total += a[k] * b[k]
     return total
 
 
 @kernel
 def hold_at_limits(limb: LimbTable, call: CallTable, q: Configuration) -> None:
     """Leave joints out that are at a limit and would be driven beyond it: their columns become 0."""
-    for k in range(dof_of(limb)):
-        column, value = column_at(columns_of(call), k), double_at(q, k)
-        pull = along(column, error_of(call))
-        low, high = value <= double_at(lower_of(limb), k), value >= double_at(upper_of(limb), k)
+    for k in range(limb.dof):
+        column, value = column_at(call.columns, k), q[k]
+        pull = along(column, call.error)
+        low, high = value <= limb.lower[k], value >= limb.upper[k]
         if (low and pull < 0.0) or (high and pull > 0.0):
             for axis in range(TWIST_NUMBERS):
-                set_double(column, axis, 0.0)
+                column[axis] = 0.0
 
 
 @kernel
 def fill_square(limb: LimbTable, call: CallTable, damping: float) -> None:
     """The lower half of J J^T + damping."""
-    square = square_of(call)
+    square = call.square
     for a in range(TWIST_NUMBERS):
         for b in range(a + 1):
             set_square(square, a, b, damping if a == b else 0.0)
-    for k in range(dof_of(limb)):
-        column = column_at(columns_of(call), k)
+    for k in range(limb.dof):
+        column = column_at(call.columns, k)
         for a in range(TWIST_NUMBERS):
             for b in range(a + 1):
-                product = double_at(column, a) * double_at(column, b)
+                product = column[a] * column[b]
                 set_square(square, a, b, square_at(square, a, b) + product)
 
 
 @kernel
 def solve_square(call: CallTable) -> None:
     """Replace the residual e by (J J^T + damping)^-1 e: Cholesky's decomposition, the inverse of its diagonal kept."""
-    square, error = square_of(call), error_of(call)
+    square, error = call.square, call.error
     for a in range(TWIST_NUMBERS):
         for b in range(a + 1):
             rest = square_at(square, a, b)
@@ -102,30 +78,30 @@ def solve_square(call: CallTable) -> None:
             inverse = 1.0 / math.sqrt(rest) if a == b else rest * square_at(square, b, b)
             set_square(square, a, b, inverse)
     for a in range(TWIST_NUMBERS):
-        rest = double_at(error, a)
+        rest = error[a]
         for k in range(a):
-            rest -= square_at(square, a, k) * double_at(error, k)
-        set_double(error, a, rest * square_at(square, a, a))
+            rest -= square_at(square, a, k) * error[k]
+        error[a] = rest * square_at(square, a, a)
     for a in range(TWIST_NUMBERS - 1, -1, -1):
-        rest = double_at(error, a)
+        rest = error[a]
         for k in range(a + 1, TWIST_NUMBERS):
-            rest -= square_at(square, k, a) * double_at(error, k)
-        set_double(error, a, rest * square_at(square, a, a))
+            rest -= square_at(square, k, a) * error[k]
+        error[a] = rest * square_at(square, a, a)
 
 
 @kernel
 def step(limb: LimbTable, call: CallTable, q: Configuration) -> None:
     """Move the joints by J^T times what :func:`solve_square` left, no joint too far, none beyond a limit."""
-    change, largest = change_of(call), number(limb, ik_layout.LARGEST_STEP)
+    change, largest = call.change, limb.largest_step
     most = largest
-    for k in range(dof_of(limb)):
-        value = along(column_at(columns_of(call), k), error_of(call))
-        set_double(change, k, value)
+    for k in range(limb.dof):
+        value = along(column_at(call.columns, k), call.error)
+        change[k] = value
         most = max(most, abs(value))
-    for k in range(dof_of(limb)):
-        value = double_at(q, k) + double_at(change, k) * (largest / most)
-        low, high = double_at(lower_of(limb), k), double_at(upper_of(limb), k)
-        set_double(q, k, min(max(value, low), high))
+    for k in range(limb.dof):
+        value = q[k] + change[k] * (largest / most)
+        low, high = limb.lower[k], limb.upper[k]
+        q[k] = min(max(value, low), high)
 
 
 @kernel
@@ -134,29 +110,29 @@ def descend(limb: LimbTable, call: CallTable, aim: Aim, q: Configuration) -> boo
     mark, before, share, patience = (
         UNBOUNDED_RESIDUAL,
         UNBOUNDED_RESIDUAL,
-        number(limb, ik_layout.SHARE),
-        patience_of(call),
+        limb.share,
+        call.patience,
     )
-    for k in range(step_limit_of(call) + 1):
+    for k in range(call.steps + 1):
         tip = move_tip(limb, call, q)
         if measure(call, aim, tip):
             return True
         square = weigh(call)
         if k > 0 and k % patience == 0:
-            if square > number(limb, ik_layout.STALLED) * mark:
+            if square > limb.stalled * mark:
                 return False
             mark = square
-        if k == step_limit_of(call):
+        if k == call.steps:
             return False
         if square > before:
-            share *= number(limb, ik_layout.SHARE_GROWTH)
+            share *= limb.share_growth
         before = square
         differentiate(limb, call, aim, tip)
         hold_at_limits(limb, call, q)
-        fill_square(limb, call, number(limb, ik_layout.DAMPING) + share * square)
+        fill_square(limb, call, limb.damping + share * square)
         solve_square(call)
         step(limb, call, q)
-        set_steps_done(call, steps_done_of(call) + 1)
+        call.done += 1
     return False
 
 
@@ -164,14 +140,14 @@ def descend(limb: LimbTable, call: CallTable, aim: Aim, q: Configuration) -> boo
 def walk(limb: LimbTable, call: CallTable) -> int:
     """Walk from every row of Q towards its goal; returns the most steps that one of them took."""
     most = 0
-    for row in range(row_count_of(call)):
+    for row in range(call.rows):
         aim = aim_at(call, row)
-        if row == 0 or aim_bytes_of(call) > 0:
+        if row == 0 or call.aim_numbers > 0:
             see_from(limb, call, aim)
-        set_steps_done(call, 0)
-        reached = descend(limb, call, aim, configuration_at(q_of(call), dof_of(limb), row))
-        set_int(reached_of(call), row, 1 if reached else 0)
-        most = max(most, steps_done_of(call))
+        call.done = 0
+        reached = descend(limb, call, aim, row_at(call.q, limb.dof, row))
+        call.reached[row] = 1 if reached else 0
+        most = max(most, call.done)
     return most
 
 
@@ -179,9 +155,9 @@ def walk(limb: LimbTable, call: CallTable) -> int:
 def measure_seeds(limb: LimbTable, call: CallTable, aim: Aim) -> None:
     """How far each seed's tip is from a goal, squared and without units."""
     free = free_turn_of(aim)
-    metre, chord = number(limb, ik_layout.PER_METRE), number(limb, ik_layout.PER_CHORD)
-    for seed in range(seed_count_of(limb)):
-        tip = pose_at(seed_tips_of(limb), seed)
+    metre, chord = limb.per_metre, limb.per_chord
+    for seed in range(limb.seed_count):
+        tip = pose_at(limb.seed_tips, seed)
         away, turned = 0.0, 0.0
         for k in range(3):
             way = pose_origin(tip, k) - pose_origin(aim, k)
@@ -190,37 +166,37 @@ def measure_seeds(limb: LimbTable, call: CallTable, aim: Aim) -> None:
                 for row in range(3):
                     turned += pose_entry(tip, row, k) * pose_entry(aim, row, k)
         whole = 3.0 if free == ik_layout.NO_TURN else (0.0 if free == ik_layout.ANY_TURN else 1.0)
-        set_double(farness_of(call), seed, metre * metre * away + chord * chord * (whole - turned))
+        call.farness[seed] = metre * metre * away + chord * chord * (whole - turned)
 
 
 @kernel
 def take_nearest(limb: LimbTable, call: CallTable) -> int:
     """The nearest seed that has not been taken."""
-    farness, best = farness_of(call), 0
-    for seed in range(1, seed_count_of(limb)):
-        if double_at(farness, seed) < double_at(farness, best):
+    farness, best = call.farness, 0
+    for seed in range(1, limb.seed_count):
+        if farness[seed] < farness[best]:
             best = seed
-    set_double(farness, best, UNBOUNDED_RESIDUAL)
+    farness[best] = UNBOUNDED_RESIDUAL
     return best
 
 
 @kernel
 def search(limb: LimbTable, call: CallTable, row: int) -> bool:
     """Walk from the row's next starts until one reaches its goal; whether one does."""
-    dof, aim = dof_of(limb), aim_at(call, row)
-    q, follower = configuration_at(q_of(call), dof, row), next_start_at(next_of(call), row)
+    dof, aim = limb.dof, aim_at(call, row)
+    q = row_at(call.q, dof, row)
     see_from(limb, call, aim)
-    begin, source = number_of_next(follower), near_at(call, row)
-    for start in range(seed_count_of(limb) + 1):
+    begin, source = call.next[row], near_at(call, row)
+    for start in range(limb.seed_count + 1):
         if start == 1:
             measure_seeds(limb, call, aim)
         if start > 0:
-            source = configuration_at(seeds_of(limb), dof, take_nearest(limb, call))
+            source = row_at(limb.seeds, dof, take_nearest(limb, call))
         if start < begin:
             continue
         for k in range(dof):
-            set_double(q, k, double_at(source, k))
-        set_next(follower, start + 1)
+            q[k] = source[k]
+        call.next[row] = start + 1
         if descend(limb, call, aim, q):
             return True
     return False
@@ -230,9 +206,9 @@ def search(limb: LimbTable, call: CallTable, row: int) -> bool:
 def solve(limb: LimbTable, call: CallTable) -> int:
     """For every row go on with its starts until one reaches its goal; returns how many rows did."""
     solved = 0
-    set_steps_done(call, 0)
-    for row in range(row_count_of(call)):
+    call.done = 0
+    for row in range(call.rows):
         reached = 1 if search(limb, call, row) else 0
-        set_int(reached_of(call), row, reached)
+        call.reached[row] = reached
         solved += reached
     return solved

@@ -8,34 +8,29 @@ from typing import Any
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.ik.ik_accessors import (
     box_half,
-    chord_tolerance_of,
     column_at,
-    column_of,
-    columns_of,
-    dof_of,
-    error_of,
-    first_frame_of,
-    fixed_of,
-    frames_of,
     free_turn_of,
-    gain_of,
-    joint_count_of,
     next_pose,
-    number,
-    offset_of,
     pose_column,
     pose_entry,
     pose_origin,
     pose_row,
-    position_tolerance_of,
     set_pose_entry,
     set_pose_origin,
-    sliding_of,
-    weights_of,
 )
-from rrtik_ompl.kernels.ik.ik_layout import ANGULAR, LINEAR, POSE_NUMBERS, TWIST_NUMBERS
+from rrtik_ompl.kernels.ik.ik_layout import (
+    ANGULAR,
+    LINEAR,
+    POSE_NUMBERS,
+    TWIST_NUMBERS,
+    Aim,
+    CallTable,
+    LimbTable,
+    Pose,
+    Twist,
+)
+from rrtik_ompl.kernels.layout import Configuration
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, int_at, set_double
 
 HALF_TURN_COSINE = 1e-12  # cosine of half an angle, below which the turn is a half turn
 
@@ -48,32 +43,32 @@ def dot(vector: Any, x: float, y: float, z: float) -> float:
 
 
 @kernel
-def see_from(limb: ik_layout.LimbTable, call: ik_layout.CallTable, aim: ik_layout.Aim) -> None:
+def see_from(limb: LimbTable, call: CallTable, aim: Aim) -> None:
     """Set the frame before the first joint as seen from the goal, and whether turns count."""
-    first, fixed = first_frame_of(call), fixed_of(limb)
+    first, fixed = call.first, limb.fixed
     for row in range(3):
         x, y, z = pose_column(aim, row)
         for column in range(3):
             set_pose_entry(first, row, column, dot(pose_column(fixed, column), x, y, z))
         away = x * (pose_origin(fixed, 0) - pose_origin(aim, 0)) + y * (pose_origin(fixed, 1) - pose_origin(aim, 1))
         set_pose_origin(first, row, away + z * (pose_origin(fixed, 2) - pose_origin(aim, 2)))
-    weights, turns = weights_of(call), free_turn_of(aim) != ik_layout.ANY_TURN
+    weights, turns = call.weights, free_turn_of(aim) != ik_layout.ANY_TURN
     for k in range(3):
-        set_double(weights, LINEAR + k, number(limb, ik_layout.PER_METRE))
-        set_double(weights, ANGULAR + k, number(limb, ik_layout.PER_CHORD) if turns else 0.0)
+        weights[LINEAR + k] = limb.per_metre
+        weights[ANGULAR + k] = limb.per_chord if turns else 0.0
 
 
 @kernel
-def move_tip(limb: ik_layout.LimbTable, call: ik_layout.CallTable, q: ik_layout.Configuration) -> Any:
+def move_tip(limb: LimbTable, call: CallTable, q: Configuration) -> Any:
     """Frames of all joints, each after its own motion, and of the tip; returns where the tip's frame is."""
-    frame, fixed, columns = frames_of(call), fixed_of(limb), column_of(limb)
+    frame, fixed, columns = call.frames, limb.fixed, limb.column
     for k in range(POSE_NUMBERS):
-        set_double(frame, k, double_at(first_frame_of(call), k))
-    for joint in range(joint_count_of(limb)):
-        value = double_at(gain_of(limb), joint) * double_at(q, int_at(columns, joint))
-        value += double_at(offset_of(limb), joint)
+        frame[k] = call.first[k]
+    for joint in range(limb.joints):
+        value = limb.gain[joint] * q[columns[joint]]
+        value += limb.offset[joint]
         fixed = next_pose(fixed)
-        if int_at(sliding_of(limb), joint) != 0:
+        if limb.sliding[joint] != 0:
             move_joint(frame, fixed, value, 1.0, 0.0)
         else:
             move_joint(frame, fixed, 0.0, math.cos(value), math.sin(value))
@@ -82,7 +77,7 @@ def move_tip(limb: ik_layout.LimbTable, call: ik_layout.CallTable, q: ik_layout.
 
 
 @kernel
-def move_joint(frame: ik_layout.Pose, fixed: ik_layout.Pose, slide: float, cosine: float, sine: float) -> None:
+def move_joint(frame: Pose, fixed: Pose, slide: float, cosine: float, sine: float) -> None:
     """Move a frame along its z and place the next one, a fixed frame away after a turn about z."""
     after = next_pose(frame)
     for row in range(3):
@@ -97,7 +92,7 @@ def move_joint(frame: ik_layout.Pose, fixed: ik_layout.Pose, slide: float, cosin
 
 
 @inlined
-def missing_turn(free: int, tip: ik_layout.Pose) -> Any:
+def missing_turn(free: int, tip: Pose) -> Any:
     """Of the turn that a tip seen from the goal still needs: its axis times its sine, and its cosine."""
     x = 0.5 * (pose_entry(tip, 1, 2) - pose_entry(tip, 2, 1))
     y = 0.5 * (pose_entry(tip, 2, 0) - pose_entry(tip, 0, 2))
@@ -115,52 +110,50 @@ def missing_turn(free: int, tip: ik_layout.Pose) -> Any:
 
 
 @kernel
-def measure(call: ik_layout.CallTable, aim: ik_layout.Aim, tip: ik_layout.Pose) -> bool:
+def measure(call: CallTable, aim: Aim, tip: Pose) -> bool:
     """Set the residual [m; chord] of a tip seen from the goal; whether it is within the tolerances."""
-    error, free, away = error_of(call), free_turn_of(aim), 0.0
+    error, free, away = call.error, free_turn_of(aim), 0.0
     for k in range(3):
         place, slack = pose_origin(tip, k), box_half(aim, k)
         outside = min(max(place, -slack), slack) - place
-        set_double(error, LINEAR + k, outside)
+        error[LINEAR + k] = outside
         away += outside * outside
     x, y, z, cosine = missing_turn(free, tip)
     half = math.sqrt(max(0.5 * (1.0 + cosine), 0.0))
     if half < HALF_TURN_COSINE:  # about an axis that rounding hides: any will do, the next step sees better
         x, y, z, half = (1.0 if free != 0 else 0.0), (1.0 if free == 0 else 0.0), 0.0, 0.5
-    set_double(error, ANGULAR, x / half)
-    set_double(error, ANGULAR + 1, y / half)
-    set_double(error, ANGULAR + 2, z / half)
+    error[ANGULAR] = x / half
+    error[ANGULAR + 1] = y / half
+    error[ANGULAR + 2] = z / half
     turn = (x * x + y * y + z * z) / (half * half)
-    near, small = position_tolerance_of(aim), chord_tolerance_of(aim)
+    near, small = aim[ik_layout.POSITION_TOLERANCE], aim[ik_layout.CHORD_TOLERANCE]
     reached: bool = away <= near * near and turn <= small * small
     return reached
 
 
 @kernel
-def weigh(call: ik_layout.CallTable) -> float:
+def weigh(call: CallTable) -> float:
     """Turn the residual into one without units; its square."""
-    error, weights, square = error_of(call), weights_of(call), 0.0
+    error, weights, square = call.error, call.weights, 0.0
     for k in range(TWIST_NUMBERS):
-        value = double_at(error, k) * double_at(weights, k)
-        set_double(error, k, value)
+        value = error[k] * weights[k]
+        error[k] = value
         square += value * value
     return square
 
 
 @kernel
-def differentiate(
-    limb: ik_layout.LimbTable, call: ik_layout.CallTable, aim: ik_layout.Aim, tip: ik_layout.Pose
-) -> None:
-    """Columns of the Jacobian, weighted like the residual: what one unit of each q does to the tip."""
-    columns, weights, frame = columns_of(call), weights_of(call), frames_of(call)
-    for k in range(TWIST_NUMBERS * dof_of(limb)):
-        set_double(columns, k, 0.0)
+def differentiate(limb: LimbTable, call: CallTable, aim: Aim, tip: Pose) -> None:
+    """Twist of the Jacobian, weighted like the residual: what one unit of each q does to the tip."""
+    columns, weights, frame = call.columns, call.weights, call.frames
+    for k in range(TWIST_NUMBERS * limb.dof):
+        columns[k] = 0.0
     u, v, w = held(call, aim, 0), held(call, aim, 1), held(call, aim, 2)
-    chord, free = double_at(weights, ANGULAR), free_turn_of(aim)
-    for joint in range(joint_count_of(limb)):
+    chord, free = weights[ANGULAR], free_turn_of(aim)
+    for joint in range(limb.joints):
         x, y, z = moved_axis(limb, frame, joint)
-        column = column_at(columns, int_at(column_of(limb), joint))
-        if int_at(sliding_of(limb), joint) != 0:
+        column = column_at(columns, limb.column[joint])
+        if limb.sliding[joint] != 0:
             add(column, LINEAR, u * x, v * y, w * z)
         else:
             a, b, c = swept(frame, tip, x, y, z)
@@ -171,14 +164,14 @@ def differentiate(
 
 
 @inlined
-def moved_axis(limb: ik_layout.LimbTable, frame: ik_layout.Pose, joint: int) -> Any:
+def moved_axis(limb: LimbTable, frame: Pose, joint: int) -> Any:
     """The axis of a joint's frame, as long as what one unit of q makes of the joint."""
-    gain = double_at(gain_of(limb), joint)
+    gain = limb.gain[joint]
     return gain * pose_entry(frame, 0, 2), gain * pose_entry(frame, 1, 2), gain * pose_entry(frame, 2, 2)
 
 
 @inlined
-def swept(frame: ik_layout.Pose, tip: ik_layout.Pose, x: float, y: float, z: float) -> Any:
+def swept(frame: Pose, tip: Pose, x: float, y: float, z: float) -> Any:
     """How the tip's origin moves while a joint's frame turns, with the angular velocity given."""
     a = pose_origin(tip, 0) - pose_origin(frame, 0)
     b = pose_origin(tip, 1) - pose_origin(frame, 1)
@@ -187,14 +180,14 @@ def swept(frame: ik_layout.Pose, tip: ik_layout.Pose, x: float, y: float, z: flo
 
 
 @inlined
-def held(call: ik_layout.CallTable, aim: ik_layout.Aim, axis: int) -> Any:
+def held(call: CallTable, aim: Aim, axis: int) -> Any:
     """The weight of a coordinate of the position: 0 inside the box, where moving along it changes no residual."""
-    inside = box_half(aim, axis) > 0.0 and double_at(error_of(call), LINEAR + axis) == 0.0
-    return 0.0 if inside else double_at(weights_of(call), LINEAR + axis)
+    inside = box_half(aim, axis) > 0.0 and call.error[LINEAR + axis] == 0.0
+    return 0.0 if inside else call.weights[LINEAR + axis]
 
 
 @inlined
-def felt(free: int, tip: ik_layout.Pose, x: float, y: float, z: float) -> Any:
+def felt(free: int, tip: Pose, x: float, y: float, z: float) -> Any:
     """A turn without its part about an axis of the tip that may point anywhere in its own turn."""
     if free == 0 or free == 1 or free == 2:
         a, b, c = pose_column(tip, free)
@@ -204,8 +197,8 @@ def felt(free: int, tip: ik_layout.Pose, x: float, y: float, z: float) -> Any:
 
 
 @inlined
-def add(column: ik_layout.Twist, place: int, x: float, y: float, z: float) -> None:
+def add(column: Twist, place: int, x: float, y: float, z: float) -> None:
     """Add to three numbers of a column."""
-    set_double(column, place, double_at(column, place) + x)
-    set_double(column, place + 1, double_at(column, place + 1) + y)
-    set_double(column, place + 2, double_at(column, place + 2) + z)
+    column[place] += x
+    column[place + 1] += y
+    column[place + 2] += z

@@ -1,48 +1,81 @@
-"""The tables of inverse kinematics in kernels: what each field is, and how a goal is written as a row of numbers.
-
-Kernels read by the named functions of :mod:`rrtik_ompl.kernels.ik.ik_accessors`.
-"""
+"""The tables of inverse kinematics in kernels, and how a goal is written as a row of numbers."""
 
 from __future__ import annotations
 
-from typing import NewType
+from rrtik_ompl.kernels.layout import Configuration
+from rrtik_ompl.kernels.record import Doubles, Ints, Record, Wholes
 
 KERNELS = "ik.ik_kernels"  # their library
 
-# Addresses.
-LimbTable = NewType("LimbTable", int)
-CallTable = NewType("CallTable", int)
-Pose = NewType("Pose", int)
-Aim = NewType("Aim", Pose)
-Configuration = NewType("Configuration", int)
-Columns = NewType("Columns", int)
-Twist = NewType("Twist", int)
-Square = NewType("Square", int)
-Doubles = NewType("Doubles", int)
-Ints = NewType("Ints", int)
-NextStart = NewType("NextStart", int)
 
-# Limb: the joints from the base to the tip, float64. FIXED: poses before each joint and after the last, every joint's
-# axis being z · SLIDING, COLUMN: int32 · joint value = GAIN q[COLUMN] + OFFSET · LOWER, UPPER: limits of q · SEEDS:
-# configurations, SEED_TIPS: poses that they bring the tip to · NUMBERS: see below
-JOINTS, DOF, FIXED, SLIDING, COLUMN, GAIN, OFFSET, LOWER, UPPER, SEED_COUNT, SEEDS, SEED_TIPS, NUMBERS = range(13)
-PER_METRE, PER_CHORD, DAMPING, SHARE, SHARE_GROWTH, LARGEST_STEP, STALLED = range(7)  # the numbers
+class Pose(Doubles):
+    """The rotation row by row, then the origin."""
 
-# Pose (float64): the rotation row by row, then the origin. Twist, a residual or a column of the Jacobian: along, about.
+
+class Aim(Pose):
+    """A goal; see below."""
+
+
+class Twist(Doubles):
+    """A residual or a column of the Jacobian: along, about."""
+
+
+class LimbTable(Record):
+    """The joints from the base to the tip."""
+
+    joints: int
+    dof: int
+    fixed: Pose  # before each joint and after the last, every joint's axis being z
+    sliding: Ints  # whether a joint slides
+    column: Ints  # joint value = gain q[column] + offset
+    gain: Doubles
+    offset: Doubles
+    lower: Configuration  # limits
+    upper: Configuration
+    seed_count: int
+    seeds: Configuration
+    seed_tips: Pose  # where seeds bring the tip to
+    per_metre: float
+    per_chord: float
+    damping: float
+    share: float  # of the squared residual, that is added to the damping
+    share_growth: float
+    largest_step: float
+    stalled: float
+
+
+class CallTable(Record):
+    """What one call of a kernel works on."""
+
+    rows: int  # goals or starts
+    aims: Aim
+    aim_numbers: int  # from one goal to the next; 0: all the same
+    near: Configuration  # postures
+    near_numbers: int  # from one posture to the next
+    q: Configuration  # where each row has come to
+    reached: Ints  # whether that is at its goal
+    next: Wholes  # number of the start that comes next: 0: the posture, k: the k-th nearest seed
+    steps: int  # most of a start
+    patience: int  # steps in which the residual must fall to ``stalled`` of what it was, or the start is given up
+
+    # Scratch memory.
+    first: Pose  # of the frame before the first joint, seen from the goal
+    frames: Pose  # of the joints and the tip
+    columns: Twist  # of the Jacobian
+    error: Twist
+    weights: Twist
+    square: Doubles  # matrix
+    change: Configuration
+    farness: Doubles  # of the seeds
+    done: int  # steps taken
+
+
+# Places of a pose's and of a twist's numbers.
 AXES = 3  # rows of a rotation
 POSE_NUMBERS = 12
 ROTATION, ORIGIN = 0, 9
 TWIST_NUMBERS = 6
 LINEAR, ANGULAR = 0, 3
-
-# Call. ROWS: how many goals or starts · AIMS: goals, AIM_BYTES apart (0: all the same) · NEAR: postures, NEAR_BYTES
-# apart · Q: where each row has come to · REACHED: int32, whether that is at its goal · NEXT: int64, number of the start
-# that comes next (0: the posture, k: the k-th nearest seed) · STEPS: most steps of a start; PATIENCE: steps in which
-# the residual must fall to STALLED of what it was, or the start is given up
-ROWS, AIMS, AIM_BYTES, NEAR, NEAR_BYTES, Q, REACHED, NEXT, STEPS, PATIENCE = range(10)
-# Its scratch memory: FIRST frame seen from the goal, FRAMES of the joints and the tip, COLUMNS of the Jacobian, ERROR,
-# its WEIGHTS, SQUARE matrix, CHANGE of the joints, FARNESS of the seeds; DONE: steps taken
-FIRST, FRAMES, COLUMNS, ERROR, WEIGHTS, SQUARE, CHANGE, FARNESS, DONE = range(10, 19)
 
 # Aim: T_world_tip as a pose, then tolerances [m] and of the chord 2 sin(angle / 2), half sides of the box in the goal
 # frame within which the position is free [m], and what turn is free.

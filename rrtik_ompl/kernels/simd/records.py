@@ -150,6 +150,16 @@ def _row_at(typingctx: Any, array: Any, width: Any, number: Any) -> Any:
 row_at: Callable[[V, int, int], V] = intrinsic(_row_at)  # of an array of rows, numbers in a row, number of the row
 
 
+def table_reader(record: type[Record]) -> Any:
+    """Function (addresses, number) that finds one of several tables, whose addresses an array holds."""
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(pointer(builder, WHOLE, *args), align=8)
+
+    table = RecordType(record)
+    return intrinsic(lambda typingctx, addresses, number: (table(addresses, types.int64), emit))
+
+
 def _exists(typingctx: Any, address: Any) -> Any:
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.icmp_signed("!=", args[0], ir.Constant(WHOLE, 0))

@@ -11,8 +11,9 @@ from rrtik_ompl.ik.numeric.kernel_call import KernelCall
 from rrtik_ompl.ik.serial_chain import limb_of
 from rrtik_ompl.kernels.ik import rail_layout
 from rrtik_ompl.kernels.ik.ik_layout import AIM_FLOATS, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE
+from rrtik_ompl.kernels.ik.rail_layout import RailTable
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.planning.tip_motion.freedom import levers_of, redundant
 from rrtik_ompl.planning.tip_motion.rails import Rail
@@ -32,39 +33,41 @@ def follow(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: L
     call = KernelCall(limb, aim, robot.clamp(q)[None], rail_layout.NEWTON_STEPS, rail_layout.NEWTON_STEPS + 1)
     table = packed_rail(robot, rail, q, tolerance, leaning)
     kernels.follow(limb.address, call.address, table.address)
-    count = int(table.header[rail_layout.COUNT])
-    rows, shares = table[rail_layout.Q].reshape(-1, robot.dof), table[rail_layout.SHARES]
-    return Followed(rows[:count].copy(), shares[:count].copy())
+    count = table.count
+    return Followed(table.q.reshape(-1, robot.dof)[:count].copy(), table.shares[:count].copy())
 
 
-def packed_rail(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> PlannedTable:
+def packed_rail(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> RailTable:
     """The table of one call, see :mod:`rrtik_ompl.kernels.ik.rail_layout`."""
     levers = levers_of(robot)
-    table = PlannedTable(_plan(robot.dof, len(levers)))
-    table[rail_layout.RAIL][:] = rail.numbers()
-    table[rail_layout.Q][: robot.dof] = robot.clamp(q)
-    table[rail_layout.SHARES][0] = 0.0
-    table[rail_layout.LEVERS][:] = levers
-    table[rail_layout.REFERENCE][:] = leaning.reference
-    table[rail_layout.PULL][:] = leaning.pull
-    settings = table[rail_layout.SETTINGS]
-    settings[rail_layout.DEVIATION], settings[rail_layout.CHORD] = tolerance.deviation, tolerance.chord
-    settings[rail_layout.SMALLEST], settings[rail_layout.FIRST_STEP] = SMALLEST_STEP, FIRST_STEP
-    settings[rail_layout.HOMING], settings[rail_layout.MOMENTUM] = float(leaning.homing), float(not redundant(robot))
+    table = RailTable(PlannedTable(_plan(robot.dof, len(levers))))
+    table.rail[:] = rail.numbers()
+    table.q[: robot.dof] = robot.clamp(q)
+    table.shares[0] = 0.0
+    table.levers[:] = levers
+    table.reference[:] = leaning.reference
+    table.pull[:] = leaning.pull
+    table.deviation = tolerance.deviation
+    table.chord = tolerance.chord
+    table.smallest = SMALLEST_STEP
+    table.first_step = FIRST_STEP
+    table.homing = int(leaning.homing)
+    table.momentum = int(not redundant(robot))
     return table
 
 
 @lru_cache(maxsize=64)
 def _plan(dof: int, joints: int) -> TablePlan:
-    arrays = {
-        rail_layout.RAIL: rail_layout.RAIL_NUMBERS,
-        rail_layout.Q: MOST_ROWS * dof,
-        rail_layout.SHARES: MOST_ROWS,
-        rail_layout.LEVERS: joints,
-        rail_layout.REFERENCE: dof,
-        rail_layout.PULL: dof,
-        rail_layout.SETTINGS: rail_layout.SETTING_COUNT,
-        rail_layout.TRIAL: dof,
-        rail_layout.MIDDLE: dof,
-    }
-    return TablePlan(arrays, {rail_layout.CAPACITY: MOST_ROWS, rail_layout.COUNT: 1})
+    return sizes_of(
+        RailTable,
+        rail=rail_layout.RAIL_NUMBERS,
+        q=MOST_ROWS * dof,
+        shares=MOST_ROWS,
+        levers=joints,
+        reference=dof,
+        pull=dof,
+        trial=dof,
+        middle=dof,
+        capacity=MOST_ROWS,
+        count=1,
+    )

@@ -17,7 +17,6 @@ from rrtik_ompl.kernels.search.box_kernels import copy_inside
 from rrtik_ompl.kernels.search.constrained import layout
 from rrtik_ompl.kernels.search.constrained.layout import ConstrainedTable, HeldTable
 from rrtik_ompl.kernels.search.constrained.projection_kernels import project
-from rrtik_ompl.kernels.search.constrained.region_kernels import dof_of as held_dof_of
 from rrtik_ompl.kernels.search.constrained.walk_kernels import (
     UNBOUNDED_DOMAIN,
     nearest_to,
@@ -180,7 +179,7 @@ def project_rows(held: HeldTable, rows: Configuration, count: int, steps: int, r
     """Move rows into the regions; int32 whether each is there. Returns how many are."""
     there = 0
     for k in range(count):
-        arrived = 1 if project(held, row_at(rows, held_dof_of(held), k), steps) else 0
+        arrived = 1 if project(held, row_at(rows, held.dof, k), steps) else 0
         reached[k] = arrived
         there += arrived
     return there

@@ -5,29 +5,48 @@ Regions, measures and bounds are those of :class:`rrtik_ompl.constraints.held_re
 
 from __future__ import annotations
 
-from typing import NewType
-
-from rrtik_ompl.kernels.layout import JointValues
-from rrtik_ompl.kernels.record import Doubles, Floats, Record
-from rrtik_ompl.kernels.search.motions.motion_layout import Configuration, MotionTable
+from rrtik_ompl.kernels.ik.ik_layout import CallTable, LimbTable, Twist
+from rrtik_ompl.kernels.layout import Configuration, JointValues
+from rrtik_ompl.kernels.record import Doubles, Floats, Record, Wholes
+from rrtik_ompl.kernels.search.motions.motion_layout import MotionTable
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
 
 KERNELS = "search.constrained.kernels"  # the library of these searches
 
-HeldTable = NewType("HeldTable", int)
-RegionTable = NewType("RegionTable", int)
-RegionRecord = NewType("RegionRecord", int)
 
-# Held: COUNT addresses of regions in REGIONS · DOF, LOWER, UPPER: of the configurations · HELD_NUMBERS: see below ·
-# scratch memory: COLUMNS, 6 numbers for each coordinate, SQUARE matrix, CHANGE of the coordinates, ERROR and WEIGHTS of
-# a residual, NODE: a configuration
-COUNT, REGIONS, HELD_DOF, HELD_LOWER, HELD_UPPER, HELD_NUMBERS, COLUMNS, SQUARE, CHANGE, ERROR, WEIGHTS = range(11)
-NODE = 11
-PER_METRE, PER_RADIAN, DAMPING, LARGEST_STEP = range(4)  # the numbers
+class HeldTable(Record):
+    """Path constraints."""
 
-# Region: the joints that move its frame (LIMB) and memory for their frames (CALL), as of kernels.ik.ik_layout;
-# what it says of the orientation; its record
-LIMB, CALL, TURNING, RECORD = range(4)
+    count: int  # regions
+    regions: Wholes  # addresses of their tables
+    dof: int
+    lower: Configuration  # limits
+    upper: Configuration
+    per_metre: float
+    per_radian: float
+    damping: float
+    largest_step: float
+    columns: Twist  # scratch memory: 6 numbers for each coordinate
+    square: Doubles  # matrix
+    change: Configuration
+    error: Twist  # residual
+    weights: Twist
+    node: Configuration
+
+
+class RegionRecord(Doubles):
+    """Numbers of a region; see below."""
+
+
+class RegionTable(Record):
+    """A region."""
+
+    limb: LimbTable  # the joints that move its frame
+    call: CallTable  # memory for their frames
+    turning: int  # what it says of the orientation
+    record: RegionRecord
+
+
 FREE_TURN, AXIS, BALL, RANGES = range(4)  # rrtik_ompl.constraints.held_region.Turning
 
 # The record: bounds of the position and of the angles; where the axis has to point; measures up to which a

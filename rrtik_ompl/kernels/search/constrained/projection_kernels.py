@@ -9,21 +9,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rrtik_ompl.kernels.ik.ik_accessors import column_at, column_of, gain_of, joint_count_of, sliding_of
+from rrtik_ompl.kernels.ik.ik_accessors import column_at
 from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, Pose
 from rrtik_ompl.kernels.search.constrained import layout
 from rrtik_ompl.kernels.search.constrained.layout import HeldTable, RegionTable
 from rrtik_ompl.kernels.search.constrained.region_kernels import (
-    columns_of,
-    dof_of,
-    error_of,
-    held_number,
-    limb_of,
     origin_measure,
     place_frame,
-    record_of,
     region_at,
-    region_count_of,
     set_columns,
     set_origin_residual,
     set_turn_residual,
@@ -31,7 +24,6 @@ from rrtik_ompl.kernels.search.constrained.region_kernels import (
 )
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, field, int_at, set_double
 
 HALVINGS = 3  # of a motion, at most
 PATIENCE, STALLED = 8, 0.5  # steps after which the squared residual must be down to this share
@@ -41,21 +33,21 @@ SHARE = 0.5  # of the squared residual, that is added to the damping
 @inlined
 def square_at(held: HeldTable, row: int, column: int) -> Any:
     """An entry of the square matrix."""
-    return double_at(field(held, layout.SQUARE), row * dof_of(held) + column)
+    return held.square[row * held.dof + column]
 
 
 @inlined
 def set_square(held: HeldTable, row: int, column: int, value: float) -> None:
     """Set an entry of the square matrix."""
-    set_double(field(held, layout.SQUARE), row * dof_of(held) + column, value)
+    held.square[row * held.dof + column] = value
 
 
 @kernel
 def clear_sums(held: HeldTable) -> None:
     """Begin a step: no rows yet."""
-    dof = dof_of(held)
+    dof = held.dof
     for a in range(dof):
-        set_double(field(held, layout.CHANGE), a, 0.0)
+        held.change[a] = 0.0
         for b in range(a + 1):
             set_square(held, a, b, 0.0)
 
@@ -64,19 +56,19 @@ def clear_sums(held: HeldTable) -> None:
 def add_rows(held: HeldTable, region: RegionTable, tip: Pose) -> Any:
     """Add a region's rows to the sums J^T J and J^T e; returns |e|^2."""
     set_columns(held, region, tip)
-    columns, error, change = columns_of(held), error_of(held), field(held, layout.CHANGE)
+    columns, error, change = held.columns, held.error, held.change
     total = 0.0
     for k in range(TWIST_NUMBERS):
-        total += double_at(error, k) * double_at(error, k)
-    for a in range(dof_of(held)):
-        column, pull = column_at(columns, a), double_at(change, a)
+        total += error[k] * error[k]
+    for a in range(held.dof):
+        column, pull = column_at(columns, a), change[a]
         for k in range(TWIST_NUMBERS):
-            pull += double_at(column, k) * double_at(error, k)
-        set_double(change, a, pull)
+            pull += column[k] * error[k]
+        change[a] = pull
         for b in range(a + 1):
             other, product = column_at(columns, b), square_at(held, a, b)
             for k in range(TWIST_NUMBERS):
-                product += double_at(column, k) * double_at(other, k)
+                product += column[k] * other[k]
             set_square(held, a, b, product)
     return total
 
@@ -84,7 +76,7 @@ def add_rows(held: HeldTable, region: RegionTable, tip: Pose) -> Any:
 @kernel
 def solve_sums(held: HeldTable, damping: float) -> None:
     """Replace J^T e by (J^T J + damping)^-1 J^T e: Cholesky's decomposition, the inverse of its diagonal kept."""
-    dof, change = dof_of(held), field(held, layout.CHANGE)
+    dof, change = held.dof, held.change
     for a in range(dof):
         for b in range(a + 1):
             rest = square_at(held, a, b) + (damping if a == b else 0.0)
@@ -92,28 +84,28 @@ def solve_sums(held: HeldTable, damping: float) -> None:
                 rest -= square_at(held, a, k) * square_at(held, b, k)
             set_square(held, a, b, 1.0 / math.sqrt(max(rest, damping)) if a == b else rest * square_at(held, b, b))
     for a in range(dof):
-        rest = double_at(change, a)
+        rest = change[a]
         for k in range(a):
-            rest -= square_at(held, a, k) * double_at(change, k)
-        set_double(change, a, rest * square_at(held, a, a))
+            rest -= square_at(held, a, k) * change[k]
+        change[a] = rest * square_at(held, a, a)
     for a in range(dof - 1, -1, -1):
-        rest = double_at(change, a)
+        rest = change[a]
         for k in range(a + 1, dof):
-            rest -= square_at(held, k, a) * double_at(change, k)
-        set_double(change, a, rest * square_at(held, a, a))
+            rest -= square_at(held, k, a) * change[k]
+        change[a] = rest * square_at(held, a, a)
 
 
 @kernel
 def step_on(held: HeldTable, q: Configuration) -> None:
     """Move q by the change, no coordinate too far, none beyond a limit."""
-    change, largest = field(held, layout.CHANGE), held_number(held, layout.LARGEST_STEP)
-    lower, upper = field(held, layout.HELD_LOWER), field(held, layout.HELD_UPPER)
+    change, largest = held.change, held.largest_step
+    lower, upper = held.lower, held.upper
     most = largest
-    for k in range(dof_of(held)):
-        most = max(most, abs(double_at(change, k)))
-    for k in range(dof_of(held)):
-        value = double_at(q, k) + double_at(change, k) * (largest / most)
-        set_double(q, k, min(max(value, double_at(lower, k)), double_at(upper, k)))
+    for k in range(held.dof):
+        most = max(most, abs(change[k]))
+    for k in range(held.dof):
+        value = q[k] + change[k] * (largest / most)
+        q[k] = min(max(value, lower[k]), upper[k])
 
 
 @kernel
@@ -123,7 +115,7 @@ def project(held: HeldTable, q: Configuration, steps: int) -> bool:
     for number in range(steps + 1):
         clear_sums(held)
         total = 0.0
-        for k in range(region_count_of(held)):
+        for k in range(held.count):
             region = region_at(held, k)
             tip = place_frame(region, q)
             set_origin_residual(held, region, tip)
@@ -137,7 +129,7 @@ def project(held: HeldTable, q: Configuration, steps: int) -> bool:
             if total > STALLED * mark:
                 return False
             mark = total
-        solve_sums(held, held_number(held, layout.DAMPING) + SHARE * total)
+        solve_sums(held, held.damping + SHARE * total)
         step_on(held, q)
     return False
 
@@ -162,24 +154,24 @@ def highest(first: float, last: float, bend: float) -> Any:
 @kernel
 def deviation(region: RegionTable, start: Configuration, end: Configuration) -> Any:
     """How far the measures of a straight motion exceed those of its ends, at most: of the origin and of the turn."""
-    limb, record = limb_of(region), record_of(region)
+    limb, record = region.limb, region.record
     origin, before = 0.0, 0.0
-    for joint in range(joint_count_of(limb)):
-        k = int_at(column_of(limb), joint)
-        way = abs(double_at(gain_of(limb), joint) * (double_at(end, k) - double_at(start, k)))
-        turned = way if int_at(sliding_of(limb), joint) == 0 else 0.0
-        origin += way * double_at(record, layout.LEVERS + joint) * (turned + 2.0 * before)
+    for joint in range(limb.joints):
+        k = limb.column[joint]
+        way = abs(limb.gain[joint] * (end[k] - start[k]))
+        turned = way if limb.sliding[joint] == 0 else 0.0
+        origin += way * record[layout.LEVERS + joint] * (turned + 2.0 * before)
         before += turned
-    return origin * 0.125, double_at(record, layout.CURVATURE) * before * before * 0.125
+    return origin * 0.125, record[layout.CURVATURE] * before * before * 0.125
 
 
 @kernel
 def keeps_region(held: HeldTable, number: int, start: Configuration, end: Configuration) -> bool:
     """Whether a straight motion between configurations in a region keeps it: parts of it, ever smaller, are bounded."""
     region = region_at(held, number)
-    node, (origin, turn) = field(held, layout.NODE), deviation(region, start, end)
-    most_origin = double_at(record_of(region), layout.MOST)
-    most_turn = double_at(record_of(region), layout.MOST + 1)
+    node, (origin, turn) = held.node, deviation(region, start, end)
+    most_origin = region.record[layout.MOST]
+    most_turn = region.record[layout.MOST + 1]
     first, last = measures(held, number, start), measures(held, number, end)
     parts = 1
     for _ in range(HALVINGS + 1):
@@ -188,8 +180,8 @@ def keeps_region(held: HeldTable, number: int, start: Configuration, end: Config
             here = last
             if part < parts:
                 share = float(part) / float(parts)
-                for k in range(dof_of(held)):
-                    set_double(node, k, (1.0 - share) * double_at(start, k) + share * double_at(end, k))
+                for k in range(held.dof):
+                    node[k] = (1.0 - share) * start[k] + share * end[k]
                 here = measures(held, number, node)
             if here[0] > most_origin or here[1] > most_turn:
                 return False
@@ -207,6 +199,6 @@ def keeps_region(held: HeldTable, number: int, start: Configuration, end: Config
 def keeps(held: HeldTable, start: Configuration, end: Configuration) -> bool:
     """Whether a straight motion between configurations in all regions keeps them all."""
     kept = True
-    for number in range(region_count_of(held)):
+    for number in range(held.count):
         kept = kept and keeps_region(held, number, start, end)
     return kept

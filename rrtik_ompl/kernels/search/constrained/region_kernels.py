@@ -11,64 +11,45 @@ from typing import Any
 
 from rrtik_ompl.kernels.ik.ik_accessors import (
     column_at,
-    column_of,
-    frames_of,
-    joint_count_of,
     next_pose,
     pose_column,
     pose_entry,
     pose_origin,
-    sliding_of,
 )
 from rrtik_ompl.kernels.ik.ik_kinematics import add, felt, move_tip, moved_axis, swept
-from rrtik_ompl.kernels.ik.ik_layout import ANGULAR, LINEAR, TWIST_NUMBERS, CallTable, Columns, LimbTable, Pose
-from rrtik_ompl.kernels.record import Doubles
+from rrtik_ompl.kernels.ik.ik_layout import ANGULAR, LINEAR, TWIST_NUMBERS, Pose
+from rrtik_ompl.kernels.record import Wholes
 from rrtik_ompl.kernels.search.constrained import layout
 from rrtik_ompl.kernels.search.constrained.layout import HeldTable, RegionRecord, RegionTable
-from rrtik_ompl.kernels.simd.access import field_reader
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, field, int_at, set_double
+from rrtik_ompl.kernels.simd.records import table_reader
 
 TURN = 2.0 * math.pi
 BEHIND = 2.0  # measure of an axis that points more than a quarter turn away
 SMALL = 1e-12  # sine of an angle below which its axis is not known
 STEEPEST = 1e-3  # cosine of the pitch, at least
 
-region_count_of: Callable[[HeldTable], int] = field_reader(layout.COUNT)
-dof_of: Callable[[HeldTable], int] = field_reader(layout.HELD_DOF)
-columns_of: Callable[[HeldTable], Columns] = field_reader(layout.COLUMNS)
-error_of: Callable[[HeldTable], Doubles] = field_reader(layout.ERROR)
-weights_of: Callable[[HeldTable], Doubles] = field_reader(layout.WEIGHTS)
-limb_of: Callable[[RegionTable], LimbTable] = field_reader(layout.LIMB)
-call_of: Callable[[RegionTable], CallTable] = field_reader(layout.CALL)
-turning_of: Callable[[RegionTable], int] = field_reader(layout.TURNING)
-record_of: Callable[[RegionTable], RegionRecord] = field_reader(layout.RECORD)
+
+_region_at: Callable[[Wholes, int], RegionTable] = table_reader(RegionTable)
 
 
 @inlined
 def region_at(held: HeldTable, number: int) -> RegionTable:
     """One of the regions."""
-    region: RegionTable = field(field(held, layout.REGIONS), number)
-    return region
-
-
-@inlined
-def held_number(held: HeldTable, place: int) -> Any:
-    """PER_METRE, PER_RADIAN, DAMPING or LARGEST_STEP."""
-    return double_at(field(held, layout.HELD_NUMBERS), place)
+    return _region_at(held.regions, number)
 
 
 @inlined
 def place_frame(region: RegionTable, q: Any) -> Any:
     """Move the frame of a region to where q brings it; it is seen from the region's own frame."""
-    return move_tip(limb_of(region), call_of(region), q)
+    return move_tip(region.limb, region.call, q)
 
 
 @inlined
 def beyond(record: RegionRecord, tip: Pose, axis: int) -> Any:
     """How far a coordinate of the origin is outside its bounds, with its sign [m]."""
     place = pose_origin(tip, axis)
-    low, high = double_at(record, layout.LOW + axis), double_at(record, layout.HIGH + axis)
+    low, high = record[layout.LOW + axis], record[layout.HIGH + axis]
     return place - min(max(place, low), high)
 
 
@@ -76,9 +57,9 @@ def beyond(record: RegionRecord, tip: Pose, axis: int) -> Any:
 def sine_to_axis(record: RegionRecord, tip: Pose) -> Any:
     """Cross product and dot product of the frame's z axis and the direction where it has to point."""
     x, y, z = pose_column(tip, 2)
-    a = double_at(record, layout.DIRECTION)
-    b = double_at(record, layout.DIRECTION + 1)
-    c = double_at(record, layout.DIRECTION + 2)
+    a = record[layout.DIRECTION]
+    b = record[layout.DIRECTION + 1]
+    c = record[layout.DIRECTION + 2]
     return y * c - z * b, z * a - x * c, x * b - y * a, x * a + y * b + z * c
 
 
@@ -105,7 +86,7 @@ def angle_of(tip: Pose, k: int) -> Any:
 @inlined
 def angle_beyond(record: RegionRecord, tip: Pose, k: int) -> Any:
     """How far roll, pitch or yaw is outside its bounds, the short way round, with its sign [rad]."""
-    low, high = double_at(record, layout.ANGLES_LOW + k), double_at(record, layout.ANGLES_HIGH + k)
+    low, high = record[layout.ANGLES_LOW + k], record[layout.ANGLES_HIGH + k]
     middle = 0.5 * (low + high)
     away = angle_of(tip, k) - middle
     away -= TURN * math.floor((away + math.pi) / TURN)
@@ -116,7 +97,7 @@ def angle_beyond(record: RegionRecord, tip: Pose, k: int) -> Any:
 @kernel
 def origin_measure(region: RegionTable, tip: Pose) -> Any:
     """Distance of the origin from its bounds [m]."""
-    record, square = record_of(region), 0.0
+    record, square = region.record, 0.0
     for k in range(3):
         away = beyond(record, tip, k)
         square += away * away
@@ -126,7 +107,7 @@ def origin_measure(region: RegionTable, tip: Pose) -> Any:
 @kernel
 def turn_measure(region: RegionTable, tip: Pose) -> Any:
     """The measure of the orientation."""
-    turning, record = turning_of(region), record_of(region)
+    turning, record = region.turning, region.record
     if turning == layout.AXIS:
         x, y, z, cosine = sine_to_axis(record, tip)
         return math.sqrt(x * x + y * y + z * z) if cosine > 0.0 else BEHIND
@@ -145,41 +126,41 @@ def turn_measure(region: RegionTable, tip: Pose) -> Any:
 @kernel
 def set_origin_residual(held: HeldTable, region: RegionTable, tip: Pose) -> None:
     """Set the residual of the position and its weights: 0 where the region is kept, or says nothing."""
-    record, measure = record_of(region), origin_measure(region, tip)
-    moves = measure > double_at(record, layout.KEPT)
-    share = 1.0 - double_at(record, layout.AIMED) / measure if moves else 0.0
+    record, measure = region.record, origin_measure(region, tip)
+    moves = measure > record[layout.KEPT]
+    share = 1.0 - record[layout.AIMED] / measure if moves else 0.0
     for k in range(3):
         away = beyond(record, tip, k)
-        weight = held_number(held, layout.PER_METRE) if moves and away != 0.0 else 0.0
-        set_double(weights_of(held), LINEAR + k, weight)
-        set_double(error_of(held), LINEAR + k, -away * share * weight)
+        weight = held.per_metre if moves and away != 0.0 else 0.0
+        held.weights[LINEAR + k] = weight
+        held.error[LINEAR + k] = -away * share * weight
 
 
 @inlined
 def set_turn(held: HeldTable, x: float, y: float, z: float, factor: float, weight: float) -> None:
     """Set the residual of the orientation, a vector times a factor, and one weight for it."""
-    error, weights = error_of(held), weights_of(held)
-    set_double(error, ANGULAR, x * factor * weight)
-    set_double(error, ANGULAR + 1, y * factor * weight)
-    set_double(error, ANGULAR + 2, z * factor * weight)
+    error, weights = held.error, held.weights
+    error[ANGULAR] = x * factor * weight
+    error[ANGULAR + 1] = y * factor * weight
+    error[ANGULAR + 2] = z * factor * weight
     for k in range(3):
-        set_double(weights, ANGULAR + k, weight)
+        weights[ANGULAR + k] = weight
 
 
 @kernel
 def set_turn_residual(held: HeldTable, region: RegionTable, tip: Pose) -> None:
     """Set the residual of the orientation and its weights, likewise."""
-    turning, record, weight = turning_of(region), record_of(region), held_number(held, layout.PER_RADIAN)
+    turning, record, weight = region.turning, region.record, held.per_radian
     set_turn(held, 0.0, 0.0, 0.0, 0.0, 0.0)
     measure = turn_measure(region, tip)
-    if measure <= double_at(record, layout.KEPT + 1):
+    if measure <= record[layout.KEPT + 1]:
         return
-    aimed = double_at(record, layout.AIMED + 1)
+    aimed = record[layout.AIMED + 1]
     if turning == layout.RANGES:
         for k in range(3):
             away = angle_beyond(record, tip, k)
-            set_double(weights_of(held), ANGULAR + k, weight if away != 0.0 else 0.0)
-            set_double(error_of(held), ANGULAR + k, -away * (1.0 - aimed / measure) * weight)
+            held.weights[ANGULAR + k] = weight if away != 0.0 else 0.0
+            held.error[ANGULAR + k] = -away * (1.0 - aimed / measure) * weight
         return
     x, y, z, cosine = sine_to_axis(record, tip) if turning == layout.AXIS else skew_part(tip)
     sine = math.sqrt(x * x + y * y + z * z)
@@ -192,7 +173,7 @@ def set_turn_residual(held: HeldTable, region: RegionTable, tip: Pose) -> None:
 @inlined
 def felt_turn(region: RegionTable, tip: Pose, x: float, y: float, z: float) -> Any:
     """What a turn of the frame changes of the orientation's residual."""
-    turning = turning_of(region)
+    turning = region.turning
     if turning == layout.AXIS:
         x, y, z = felt(2, tip, x, y, z)
     elif turning == layout.RANGES:
@@ -207,16 +188,16 @@ def felt_turn(region: RegionTable, tip: Pose, x: float, y: float, z: float) -> A
 @kernel
 def set_columns(held: HeldTable, region: RegionTable, tip: Pose) -> None:
     """Set the weighted columns of the Jacobian of a region's residual."""
-    columns, weights, limb = columns_of(held), weights_of(held), limb_of(region)
-    for k in range(dof_of(held) * TWIST_NUMBERS):
-        set_double(columns, k, 0.0)
-    frame = frames_of(call_of(region))
-    u, v, w = double_at(weights, LINEAR), double_at(weights, LINEAR + 1), double_at(weights, LINEAR + 2)
-    r, s, t = double_at(weights, ANGULAR), double_at(weights, ANGULAR + 1), double_at(weights, ANGULAR + 2)
-    for joint in range(joint_count_of(limb)):
+    columns, weights, limb = held.columns, held.weights, region.limb
+    for k in range(held.dof * TWIST_NUMBERS):
+        columns[k] = 0.0
+    frame = region.call.frames
+    u, v, w = weights[LINEAR], weights[LINEAR + 1], weights[LINEAR + 2]
+    r, s, t = weights[ANGULAR], weights[ANGULAR + 1], weights[ANGULAR + 2]
+    for joint in range(limb.joints):
         x, y, z = moved_axis(limb, frame, joint)
-        column = column_at(columns, int_at(column_of(limb), joint))
-        if int_at(sliding_of(limb), joint) != 0:
+        column = column_at(columns, limb.column[joint])
+        if limb.sliding[joint] != 0:
             add(column, LINEAR, u * x, v * y, w * z)
         else:
             a, b, c = swept(frame, tip, x, y, z)

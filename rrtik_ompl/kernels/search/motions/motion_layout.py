@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from rrtik_ompl.kernels.layout import JointValues, WorldTable
+from rrtik_ompl.kernels.layout import Configuration, JointValues, WorldTable
 from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.record import Doubles, Record
 
-
-class Configuration(Doubles):
-    """Rows of one number for each coordinate."""
+__all__ = ["STEP_TOLERANCE", "Configuration", "MotionTable"]
 
 
 class MotionTable(Record):
