@@ -14,8 +14,8 @@ from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.connect_keeping import Searched, kept_search, solve_each
 from rrtik_ompl.kernels.search.connect_layout import KERNELS
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
+from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.search.tree_memory import certain_tree
-from rrtik_ompl.kernels.tables.memory import Table
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.inspection.graph import Tree, without
 from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect, straight_path
@@ -163,7 +163,7 @@ def python_rules(
     return ConnectRules(lower, upper, *lengths, balanced=True, max_iterations=max_iterations)
 
 
-def sound_tree(tree: Table) -> Tree:
+def sound_tree(tree: TreeTable) -> Tree:
     """The vertices of a tree in kernels to which certain motions lead, and their parents."""
     return without(*certain_tree(tree))
 
