@@ -36,7 +36,7 @@ def checked_step_counts(counts: ArrayLike, count: int) -> NDArray[np.int32]:
     Raises:
         InputError: If one is not a positive integer, or they are not as many.
     """
-    values = counts if isinstance(counts, np.ndarray) and counts.dtype == np.float64 else None
+    values = counts if isinstance(counts, np.ndarray) and counts.dtype.kind in "if" else None
     if values is None or values.shape != (count,):
         values = finite_array(counts, (count,), "steps of motions")
     if len(values) and (values.min() < 1.0 or values.max() > MOST_STEPS or not np.array_equal(values, values.round())):
