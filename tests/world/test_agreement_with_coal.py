@@ -59,9 +59,9 @@ def short_sweeps(world, rng, count):
 def test_on_many_configurations_the_world_says_what_coal_says(name, dented_cube):
     robot = load_robot(name)
     rng, free = np.random.default_rng(11), []
-    for _ in range(how_many(6, 2)):
+    for _ in range(how_many(6, 3)):
         world = World(robot, surroundings(robot, rng, dented_cube))
-        Q = short_sweeps(world, rng, how_many(800, 150))
+        Q = short_sweeps(world, rng, how_many(800, 100))
         ours, coals = world.valid_batch(Q), free_by_coal(world, Q)
         for q in Q[ours != coals]:
             assert abs(world.clearance(q)) < CONTACT
