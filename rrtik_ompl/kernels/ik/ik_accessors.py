@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any, TypeAlias
 
 from rrtik_ompl.kernels.ik import ik_layout
-from rrtik_ompl.kernels.record import Doubles
 from rrtik_ompl.kernels.simd.compiled import inlined
 from rrtik_ompl.kernels.simd.records import row_at
 
@@ -91,15 +90,3 @@ def set_pose_entry(pose: ik_layout.Pose, row: int, column: int, value: float) ->
 def set_pose_origin(pose: ik_layout.Pose, axis: int, value: float) -> None:
     """Set a coordinate of a pose's origin."""
     pose[ik_layout.ORIGIN + axis] = value
-
-
-@inlined
-def square_at(square: Doubles, row: int, column: int) -> Any:
-    """An entry of the square matrix."""
-    return square[ik_layout.TWIST_NUMBERS * row + column]
-
-
-@inlined
-def set_square(square: Doubles, row: int, column: int, value: float) -> None:
-    """Set an entry of the square matrix."""
-    square[ik_layout.TWIST_NUMBERS * row + column] = value

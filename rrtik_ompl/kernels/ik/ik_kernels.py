@@ -6,10 +6,10 @@ go on beyond it are left out of a step. :mod:`rrtik_ompl.ik.reference_descent` i
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from rrtik_ompl.kernels.ik import ik_layout
+from rrtik_ompl.kernels.ik.cholesky import ANY_PIVOT, solve_in_place
 from rrtik_ompl.kernels.ik.ik_accessors import (
     aim_at,
     column_at,
@@ -18,8 +18,6 @@ from rrtik_ompl.kernels.ik.ik_accessors import (
     pose_at,
     pose_entry,
     pose_origin,
-    set_square,
-    square_at,
 )
 from rrtik_ompl.kernels.ik.ik_kinematics import differentiate, measure, move_tip, see_from, weigh
 from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, Aim, CallTable, LimbTable, Twist
@@ -54,39 +52,22 @@ def hold_at_limits(limb: LimbTable, call: CallTable, q: Configuration) -> None:
 @kernel
 def fill_square(limb: LimbTable, call: CallTable, damping: float) -> None:
     """The lower half of J J^T + damping."""
-    square = call.square
     for a in range(TWIST_NUMBERS):
+        row = row_at(call.square, TWIST_NUMBERS, a)
         for b in range(a + 1):
-            set_square(square, a, b, damping if a == b else 0.0)
+            row[b] = damping if a == b else 0.0
     for k in range(limb.dof):
         column = column_at(call.columns, k)
         for a in range(TWIST_NUMBERS):
+            row = row_at(call.square, TWIST_NUMBERS, a)
             for b in range(a + 1):
-                product = column[a] * column[b]
-                set_square(square, a, b, square_at(square, a, b) + product)
+                row[b] += column[a] * column[b]
 
 
 @kernel
 def solve_square(call: CallTable) -> None:
-    """Replace the residual e by (J J^T + damping)^-1 e: Cholesky's decomposition, the inverse of its diagonal kept."""
-    square, error = call.square, call.error
-    for a in range(TWIST_NUMBERS):
-        for b in range(a + 1):
-            rest = square_at(square, a, b)
-            for k in range(b):
-                rest -= square_at(square, a, k) * square_at(square, b, k)
-            inverse = 1.0 / math.sqrt(rest) if a == b else rest * square_at(square, b, b)
-            set_square(square, a, b, inverse)
-    for a in range(TWIST_NUMBERS):
-        rest = error[a]
-        for k in range(a):
-            rest -= square_at(square, a, k) * error[k]
-        error[a] = rest * square_at(square, a, a)
-    for a in range(TWIST_NUMBERS - 1, -1, -1):
-        rest = error[a]
-        for k in range(a + 1, TWIST_NUMBERS):
-            rest -= square_at(square, k, a) * error[k]
-        error[a] = rest * square_at(square, a, a)
+    """Replace the residual e by (J J^T + damping)^-1 e."""
+    solve_in_place(call.square, TWIST_NUMBERS, call.error, ANY_PIVOT)
 
 
 @kernel

@@ -132,5 +132,5 @@ def test_an_array_that_takes_the_place_of_another_is_guarded_too():
 
 @pytest.mark.parametrize("make", [lambda: packed(Inner, numbr=1), lambda: sizes_of(Inner, rows=3)])
 def test_a_field_that_is_not_declared_is_refused(make):
-    with pytest.raises((AttributeError, KeyError), match="numbr|rows"):
+    with pytest.raises((AttributeError, KeyError), match=r"numbr|rows"):
         make()

@@ -6,9 +6,9 @@ Sources: damped Gauss-Newton steps on all regions at once [22, 23]; the bound on
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
+from rrtik_ompl.kernels.ik.cholesky import solve_in_place
 from rrtik_ompl.kernels.ik.ik_accessors import column_at
 from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, Pose
 from rrtik_ompl.kernels.search.constrained import layout
@@ -24,22 +24,11 @@ from rrtik_ompl.kernels.search.constrained.region_kernels import (
 )
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
+from rrtik_ompl.kernels.simd.records import row_at
 
 HALVINGS = 3  # of a motion, at most
 PATIENCE, STALLED = 8, 0.5  # steps after which the squared residual must be down to this share
 SHARE = 0.5  # of the squared residual, that is added to the damping
-
-
-@inlined
-def square_at(held: HeldTable, row: int, column: int) -> Any:
-    """An entry of the square matrix."""
-    return held.square[row * held.dof + column]
-
-
-@inlined
-def set_square(held: HeldTable, row: int, column: int, value: float) -> None:
-    """Set an entry of the square matrix."""
-    held.square[row * held.dof + column] = value
 
 
 @kernel
@@ -49,7 +38,7 @@ def clear_sums(held: HeldTable) -> None:
     for a in range(dof):
         held.change[a] = 0.0
         for b in range(a + 1):
-            set_square(held, a, b, 0.0)
+            row_at(held.square, dof, a)[b] = 0.0
 
 
 @kernel
@@ -61,38 +50,25 @@ def add_rows(held: HeldTable, region: RegionTable, tip: Pose) -> Any:
     for k in range(TWIST_NUMBERS):
         total += error[k] * error[k]
     for a in range(held.dof):
-        column, pull = column_at(columns, a), change[a]
+        column, row = column_at(columns, a), row_at(held.square, held.dof, a)
+        pull = change[a]
         for k in range(TWIST_NUMBERS):
             pull += column[k] * error[k]
         change[a] = pull
         for b in range(a + 1):
-            other, product = column_at(columns, b), square_at(held, a, b)
+            other, product = column_at(columns, b), row[b]
             for k in range(TWIST_NUMBERS):
                 product += column[k] * other[k]
-            set_square(held, a, b, product)
+            row[b] = product
     return total
 
 
 @kernel
 def solve_sums(held: HeldTable, damping: float) -> None:
-    """Replace J^T e by (J^T J + damping)^-1 J^T e: Cholesky's decomposition, the inverse of its diagonal kept."""
-    dof, change = held.dof, held.change
-    for a in range(dof):
-        for b in range(a + 1):
-            rest = square_at(held, a, b) + (damping if a == b else 0.0)
-            for k in range(b):
-                rest -= square_at(held, a, k) * square_at(held, b, k)
-            set_square(held, a, b, 1.0 / math.sqrt(max(rest, damping)) if a == b else rest * square_at(held, b, b))
-    for a in range(dof):
-        rest = change[a]
-        for k in range(a):
-            rest -= square_at(held, a, k) * change[k]
-        change[a] = rest * square_at(held, a, a)
-    for a in range(dof - 1, -1, -1):
-        rest = change[a]
-        for k in range(a + 1, dof):
-            rest -= square_at(held, k, a) * change[k]
-        change[a] = rest * square_at(held, a, a)
+    """Replace J^T e by (J^T J + damping)^-1 J^T e."""
+    for a in range(held.dof):
+        row_at(held.square, held.dof, a)[a] += damping
+    solve_in_place(held.square, held.dof, held.change, damping)
 
 
 @kernel
