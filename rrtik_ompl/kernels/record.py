@@ -102,9 +102,9 @@ class Record:
 
     def put(self, **fields: Any) -> None:
         """Set fields: numbers, tables, and arrays, which are not copied but take the place of those before."""
-        for name in fields.keys() - self.kinds.keys():
-            raise AttributeError(f"{type(self).__name__} has no field {name}")
         for name, value in fields.items():
+            if name not in self.kinds:
+                raise AttributeError(f"{type(self).__name__} has no field {name}")
             setattr(self, name, value)
 
     def intact(self) -> bool:
@@ -127,50 +127,54 @@ def word(kind: Any, number: float) -> int:
     return int(np.float64(number).view(np.int64)) if kind is float else int(number)
 
 
-class _Number:
-    """A field that is a number, in Python."""
-
-    def __init__(self, row: str, place: int) -> None:
-        self._row, self._place = row, place
-
-    def __get__(self, record: Record | None, owner: type) -> Any:
-        return self if record is None else getattr(record, self._row)[self._place]
-
-    def __set__(self, record: Record, number: float) -> None:
-        getattr(record, self._row)[self._place] = number
-
-
-class _Array:
-    """A field that is an array, in Python."""
-
-    def __init__(self, place: int) -> None:
-        self._place = place
-
-    def __get__(self, record: Record | None, owner: type) -> Any:
-        return self if record is None else record.memory[self._place]
-
-    def __set__(self, record: Record, array: Any) -> None:
-        record.memory.arrays[self._place] = array
-        record._wholes[self._place] = array.ctypes.data
-
-
-class _Table:
-    """A field that is another table, in Python; None for no table, whose address is 0."""
-
-    def __init__(self, place: int) -> None:
-        self._place = place
-
-    def __get__(self, record: Record | None, owner: type) -> Any:
-        return self if record is None else record.tables.get(self._place)
-
-    def __set__(self, record: Record, table: Any) -> None:
-        record.tables[self._place] = table
-        record._wholes[self._place] = 0 if table is None else table.address
-
-
-def _member(kind: Any, place: int) -> Any:
+def _member(kind: Any, place: int) -> property:
+    """The field in Python."""
     if holds_array(kind):
-        return _Array(place)
+        return _array(place)
     if holds_table(kind):
-        return _Table(place)
-    return _Number("_doubles" if kind is float else "_wholes", place)
+        return _table(place)
+    return _double(place) if kind is float else _whole(place)
+
+
+def _whole(place: int) -> property:
+    def read(record: Record) -> int:
+        return record._wholes[place]
+
+    def write(record: Record, number: int) -> None:
+        record._wholes[place] = number
+
+    return property(read, write)
+
+
+def _double(place: int) -> property:
+    def read(record: Record) -> float:
+        return record._doubles[place]
+
+    def write(record: Record, number: float) -> None:
+        record._doubles[place] = number
+
+    return property(read, write)
+
+
+def _array(place: int) -> property:
+    def read(record: Record) -> Any:
+        return record.memory[place]
+
+    def write(record: Record, array: Any) -> None:
+        record.memory.arrays[place] = array
+        record._wholes[place] = array.ctypes.data
+
+    return property(read, write)
+
+
+def _table(place: int) -> property:
+    """None for no table, whose address is 0."""
+
+    def read(record: Record) -> Any:
+        return record.tables.get(place)
+
+    def write(record: Record, table: Any) -> None:
+        record.tables[place] = table
+        record._wholes[place] = 0 if table is None else table.address
+
+    return property(read, write)

@@ -221,10 +221,11 @@ class ConnectSearch:
     def _set_roots(self, side: int, rows: Matrix) -> None:
         if rows.ndim != 2 or rows.shape[1] != self._dof or len(rows) == 0:
             raise InputError(f"search: expected starts and goals of shape (k, {self._dof}), got {rows.shape}")
-        if len(rows) > len(self.rows[side]):
+        if len(rows) > len(self._search.goal_rows if side else self._search.start_rows):
             self._make_room(side, 2 * len(rows))
         self._fit_trees(len(rows))
-        self.rows[side][: len(rows)] = rows
+        roots = self._search.goal_rows if side else self._search.start_rows
+        roots[: len(rows)] = rows
 
     def _fit_trees(self, roots: int) -> None:
         while roots >= FIRST_CAPACITY and roots >= self.capacity:

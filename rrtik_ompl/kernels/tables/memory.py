@@ -97,10 +97,15 @@ def packed(kind: type[R], **fields: Any) -> R:
 
     Numbers that are not given are 0, and so are the addresses of arrays and tables that are not there yet.
     """
-    placed: dict[int, Any] = dict.fromkeys(kind.places.values(), 0)
-    placed |= {kind.places[name]: value for name, value in fields.items() if isinstance(value, np.ndarray)}
+    placed: dict[int, Any] = dict.fromkeys(range(len(kind.places)), 0)
+    others = {}
+    for name, value in fields.items():
+        if isinstance(value, np.ndarray):
+            placed[kind.places[name]] = value
+        else:
+            others[name] = value
     made = kind(table(placed))
-    made.put(**{name: value for name, value in fields.items() if not isinstance(value, np.ndarray)})
+    made.put(**others)
     return made
 
 
