@@ -131,6 +131,6 @@ def joined_without_obstacles(problem: rrtik.Problem, seed: int, samples: int) ->
     motions = world.motions
     assert tables is not None
     assert motions is not None
-    search = ConstrainedSearch(motions, tables.address, *problem.robot.finite_range())
+    search = ConstrainedSearch(motions, tables.held, *problem.robot.finite_range())
     ends = problem.start[None], goal_joints(problem)[None]
     return search.solve(*ends, seed, max_iterations=samples, unchecked=True) is not None

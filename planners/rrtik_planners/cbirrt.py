@@ -87,7 +87,7 @@ class CBiRRT(SafePlanner):
     ) -> SearchResult:
         lower, upper = self._box(motions)
         shortest = tables.shortest
-        search = ConstrainedSearch(motions, tables.address, lower, upper, range_=self.range, shortest=shortest)
+        search = ConstrainedSearch(motions, tables.held, lower, upper, range_=self.range, shortest=shortest)
         ask = decider(self._world, checker.motion_valid_batch)
         limit = NO_LIMIT if self.max_iterations is None else self.max_iterations
         seed, first = self.rng.bit_generator.random_raw(), min(limit, PLAIN_SAMPLES)

@@ -47,7 +47,7 @@ def test_nothing_is_said_to_be_apart_that_trees_can_connect(name, kind):
         held = held_regions(robot, Scene(), [region], q)
         rows, there = projected_rows(robot, held, rng.uniform(*box, (8, robot.dof)))
         tables = held_tables(robot, held)
-        search = ConstrainedSearch(world.motions, tables.address, *box)
+        search = ConstrainedSearch(world.motions, tables.held, *box)
         for goal in rows[there & held.held(rows)][:2]:
             if separation(held, q, goal[None]):
                 seen += 1
@@ -89,7 +89,7 @@ def test_a_joint_without_limits_may_go_the_other_way_round(tmp_path):
     tables, side = held_tables(robot, held), np.array([4.0 * np.pi, 3.0, 3.0])
     with pytest.warns(match="no collision geometry"):
         motions = rrtik.World(robot).motions
-    search = ConstrainedSearch(motions, tables.address, -side, side)
+    search = ConstrainedSearch(motions, tables.held, -side, side)
     assert search.solve(start[None], goal[None], 1, max_iterations=5000, unchecked=True) is not None
     assert separation(held, start, goal[None]) == ""
     assert separation(held, start, nearer[None]) == ""

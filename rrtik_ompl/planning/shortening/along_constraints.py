@@ -32,7 +32,7 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
     if tables is None:
         return route
     lower, upper = _box(world, route)
-    search = ConstrainedSearch(motions, tables.address, lower, upper, shortest=tables.shortest)
+    search = ConstrainedSearch(motions, tables.held, lower, upper, shortest=tables.shortest)
     ask = decider(world, world.motion_valid_batch)
     rng, failures = np.random.default_rng(task.seed), 0
     pair = (0, len(route) - 1)

@@ -54,7 +54,7 @@ def test_paths_of_the_trees_keep_the_regions_and_are_free(name):
         tables = held_tables(robot, held)
         rows, there = tables.project(robot.clamp(q + np.random.default_rng(13).normal(0.0, 0.3, (40, robot.dof))))
         ends = rows[there & world.valid_batch(rows)]
-        search = ConstrainedSearch(world.motions, tables.address, *robot.finite_range())
+        search = ConstrainedSearch(world.motions, tables.held, *robot.finite_range())
         path = search.solve(ends[:1], ends[1:], number, ask=world.motion_valid_batch, max_iterations=2000)
         assert search.intact()
         if path is None:
@@ -73,7 +73,7 @@ def test_undecided_motions_go_to_the_world_and_are_cut_off_where_it_says_no():
     tables = held_tables(robot, held)
     rows, there = tables.project(robot.clamp(q + np.random.default_rng(14).normal(0.0, 0.3, (30, robot.dof))))
     ends = rows[there & world.valid_batch(rows)]
-    search = ConstrainedSearch(world.motions, tables.address, *robot.finite_range())
+    search = ConstrainedSearch(world.motions, tables.held, *robot.finite_range())
     asked = []
 
     def refuse(A, B):

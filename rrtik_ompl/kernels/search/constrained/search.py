@@ -12,7 +12,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search import tree_layout
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.constrained import layout
-from rrtik_ompl.kernels.search.constrained.layout import ConstrainedTable
+from rrtik_ompl.kernels.search.constrained.layout import ConstrainedTable, HeldTable
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions, MotionsFree
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.search.tree_memory import grow, tree_table
@@ -35,7 +35,7 @@ class ConstrainedSearch:
 
     Args:
         motions: How motions are checked for collisions.
-        held: The table of the constraints (:class:`rrtik_ompl.ik.held_tables.HeldTables`), which must outlive this.
+        held: The table of the constraints (:class:`rrtik_ompl.ik.held_tables.HeldTables`).
         lower, upper: The box, shape (n,), finite.
         range_: Longest step [unit of the box]; what suits the box if None.
         shortest: Shortest step, likewise.
@@ -47,7 +47,7 @@ class ConstrainedSearch:
     def __init__(
         self,
         motions: FastMotions,
-        held: int,
+        held: HeldTable,
         lower: Vector,
         upper: Vector,
         *,
@@ -216,7 +216,7 @@ class ConstrainedSearch:
 
 
 def _search_table(
-    motions: FastMotions, trees: list[TreeTable], held: int, box: tuple[Vector, Vector]
+    motions: FastMotions, trees: list[TreeTable], held: HeldTable, box: tuple[Vector, Vector]
 ) -> ConstrainedTable:
     """The table of a search; fields that are not named here are numbers that the kernels set."""
     none = whole_lanes(np.zeros(motions.dof))
