@@ -55,7 +55,8 @@ class IkBatch:
     reasons: tuple[str, ...]
     details: tuple[str, ...]
 
-    __reduce__, __repr__ = as_value, in_one_line
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
 
 def solve_ik_batch(
@@ -96,12 +97,15 @@ def solve_ik_batch(
     load_kernels(robot)
     targets = finite_array(poses, (None, 4, 4), "poses")
     posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
-    limit, first_seed = not_negative(seconds, "seconds"), whole_number(seed, "seed")
+    limit = not_negative(seconds, "seconds")
+    first_seed = whole_number(seed, "seed")
     count = cores() if threads is None else whole_number(threads, "threads", 1)
     check_poses(targets, "poses")
+
     share = max(LEAST_SHARE, -(-len(targets) // count))
     how = partial(_solved, robot, targets, method, posture, world, limit, first_seed)
     found = in_threads(how, [slice(k, k + share) for k in range(0, max(len(targets), 1), share)], count)
+
     q, residuals = (np.concatenate([each[k] for each in found]) for k in (0, 1))
     reasons, details = (tuple(line for each in found for line in each[k]) for k in (2, 3))
     return IkBatch(frozen(q), frozen(~np.isnan(q[:, 0]), bool), frozen(residuals), reasons, details)
@@ -118,21 +122,32 @@ def _solved(
     part: slice,
 ) -> tuple[Matrix, Matrix, list[str], list[str]]:
     """The answers for a part of the poses: q, residuals, reasons and details of an :class:`IkBatch`."""
-    begin, method, targets = time.monotonic(), asked, poses[part]
-    q, residuals = np.full((len(targets), robot.dof), np.nan), np.full((len(targets), 2), np.nan)
-    reasons, details = [""] * len(targets), [""] * len(targets)
+    begin = time.monotonic()
+    method = asked
+    targets = poses[part]
+    q = np.full((len(targets), robot.dof), np.nan)
+    residuals = np.full((len(targets), 2), np.nan)
+    reasons = [""] * len(targets)
+    details = [""] * len(targets)
+
     if len(targets):
         method = chosen_method(robot, (PoseGoal(targets[0]),), asked)
     if method == "closed-form" and form_of(robot).kind == "pose":
         _by_closed_form(robot, targets, near, world, q, residuals)
     elif method == "numeric":
         _by_search(robot, targets, near, world, begin + seconds * len(targets), q, residuals)
+
+    # what is left one by one, each with the seed of its place: however many threads there are, answers are the same
     for k in np.flatnonzero(np.isnan(q[:, 0])).tolist():
-        goal, own = PoseGoal(targets[k]), seed + part.start + k
+        goal = PoseGoal(targets[k])
+        own = seed + part.start + k
         result = solve_ik(robot, goal, method=asked, near=near, world=world, seconds=seconds, seed=own)
-        reasons[k], details[k] = result.reason, result.detail
+        reasons[k] = result.reason
+        details[k] = result.detail
         if result.found:
-            q[k], residuals[k] = result.solutions[0], result.residuals[0]
+            q[k] = result.solutions[0]
+            residuals[k] = result.residuals[0]
+
     return q, residuals, reasons, details
 
 
@@ -143,8 +158,10 @@ def _by_closed_form(
     found = branches_of(robot, targets, np.broadcast_to(near, (len(targets), robot.dof)))
     valid = np.array(found.valid)
     valid[valid] = free_of_collision(world, found.branches[valid])
+
     distance = np.linalg.norm(weighted_difference(robot, found.branches, near), axis=2)
     best = np.argmin(np.where(valid, distance, np.inf), axis=1)
+
     done = np.flatnonzero(valid.any(axis=1))
     q[done] = robot.clamp(found.branches[done, best[done]])
     residuals[done] = np.asarray(found.residuals)[done, best[done]]
@@ -160,13 +177,17 @@ def _by_search(
     residuals: Matrix,
 ) -> None:
     """Write solutions into q, shape (m, dof), and residuals, shape (m, 2): targets in collision are tried again."""
-    search, going = Search(robot, pose_rows(targets), near), np.arange(len(targets))
+    search = Search(robot, pose_rows(targets), near)
+    going = np.arange(len(targets))
+
     while len(going) and time.monotonic() < deadline:
         going = going[search.advance(going)]
         free = free_of_collision(world, search.q[going])
-        done, going = going[free], going[~free]
+        done = going[free]
+        going = going[~free]
         found = search.q[done]
         q[done] = np.where(robot.continuous, near + joint_difference(robot, found, near), found)
+
     residuals[:] = _checked(robot, targets, q)
 
 

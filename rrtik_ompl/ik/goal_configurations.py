@@ -10,33 +10,30 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.base.choices import IkMethod
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.constraints.held_region import held_region
+from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.description.joint_weights import weighted_difference
-from rrtik_ompl.ik.held_goals import held_at_goal
-from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.ik.held_tables import projected_onto
+from rrtik_ompl.ik.method_interface import SAME_POSTURE, Target
 from rrtik_ompl.ik.methods import METHODS, leaves_a_curve
 from rrtik_ompl.ik.multi_goals import at_all_tips
 from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
 from rrtik_ompl.ik.numeric.projection import project, projected
 from rrtik_ompl.ik.solve import DRAWS, solve_ik
 from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
-from rrtik_ompl.model.goal import (
-    GoalSet,
-    TipGoal,
-    has_continuous,
-    joint_difference,
-)
+from rrtik_ompl.model.goal import GoalPart, GoalSet, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.robot import Robot, poses
 from rrtik_ompl.world.problem import Problem
 
-STARTS = 48  # of inverse kinematics in one round
+STARTS = 48  # random postures of one round
 PARTS = 6  # of a grasp set, among which the starts of a round are shared out, or to which it is said how near it came
 MAX_ROUNDS = 4  # at most, until one free configuration is found
-LAST_ROUND = 64
+LAST_ROUND = 64  # after which no more configurations come
 NO_LIMIT = 1e9  # [s]; the passes of MB-RRT are counted, some 0.1 to 0.4 s of them
-LEAST_SECONDS = 1e-3
+LEAST_SECONDS = 1e-3  # [s] of MB-RRT when the time is up
 MAX_CONFIGURATIONS = 16  # configurations that one round adds
 LARGEST = 96  # configurations altogether
-SAME_POSTURE = 1e-3  # [rad] or [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +54,11 @@ def goal_configurations(problem: Problem, rng: np.random.Generator, *, all_turns
     """
     search = GoalSearch(problem, rng, all_turns=all_turns)
     return GoalConfigurations(search.first(), search.reason)
+
+
+# First rounds that take all branches of a closed form, in which nothing is random: rows, all that was found, and
+# whether that is all there is. A portfolio, and a path that is being improved, ask for them plan after plan.
+_first_rounds: WeakKeyDictionary[Problem, tuple[Matrix, Matrix, bool]] = WeakKeyDictionary()
 
 
 class GoalSearch:
@@ -84,13 +86,16 @@ class GoalSearch:
 
         ``seconds_left`` says how long there is time: a later round begins only then, and MB-RRT ends with it.
         """
-        self.rows: Matrix = frozen(np.zeros((0, problem.world.robot.dof)))
         q = problem.goal.q
+        self.rows: Matrix = frozen(np.zeros((0, problem.world.robot.dof)))
         self.exhausted = q is not None
-        self._problem, self._rounds, self._found = problem, 0, self.rows
+        self._problem = problem
+        self._rounds = 0
+        self._found = self.rows
         self._seconds_left = seconds_left
         self._unheld = self.rows  # at the goal, whether or not they keep path constraints
         self._certain = False  # whether nothing random was in the first round
+
         if q is not None:
             self.rows = frozen(_turns(problem, q) if all_turns else q[None])
         else:
@@ -105,33 +110,75 @@ class GoalSearch:
 
     def more(self) -> bool:
         """Search for one round more; whether it found any that is new."""
-        goal, world, known = self._problem.goal, self._problem.world, len(self.rows)
         if self.exhausted:
             return False
-        if self._rounds == 0 and self._problem in _first_rounds and isinstance(goal, TipGoal):
-            skip_targets(goal, DRAWS, self._rng)
-            self._rng.integers(2**31)  # the seed of that round
-            self._rounds = 1
-            self.rows, self._found, self.exhausted = _first_rounds[self._problem]
-            return len(self.rows) > 0
-        if isinstance(goal, TipGoal):
-            found = self._round(goal)
-            if self._problem.constraints:
-                self._unheld = np.vstack([self._unheld, found])
-                found = held_at_goal(self._problem, goal, found, self._rng)
-        else:  # of several tips
-            kept = () if world.constraints is None else world.constraints.regions
-            start, scene = self._problem.start, world.scene
-            found = at_all_tips(world.robot, goal, start, self._rng, scene=scene, kept=kept)
+        if self._rounds == 0 and self._problem in _first_rounds:
+            return self._repeat_first_round()
+
+        known = len(self.rows)
+        found = self._at_goal()
         self._rounds += 1
-        free = found[world.checks.free(found)]
-        free = free[world.checks.certified(free)]
+
+        checks = self._problem.world.checks
+        free = found[checks.free(found)]
+        free = free[checks.certified(free)]
         self._found = np.vstack([self._found, found])
         self.rows = frozen(np.vstack([self.rows, _chosen(self._problem, free, self.rows)])[:LARGEST])
         self.exhausted |= self._rounds >= LAST_ROUND or len(self.rows) >= LARGEST
+
         if self._certain and self._rounds == 1 and not self._problem.constraints:
             _first_rounds[self._problem] = self.rows, self._found, self.exhausted
         return len(self.rows) > known
+
+    def _repeat_first_round(self) -> bool:
+        """Take what another search of this problem has found; whether that is any."""
+        goal = self._problem.goal
+        if isinstance(goal, TipGoal):  # the random numbers that the round would draw: later ones stay the same
+            skip_targets(goal, DRAWS, self._rng)
+            self._rng.integers(2**31)
+        self._rounds = 1
+        self.rows, self._found, self.exhausted = _first_rounds[self._problem]
+        return len(self.rows) > 0
+
+    def _at_goal(self) -> Matrix:
+        """Configurations at the goal that keep path constraints, in collision or not, by one round, shape (m, dof)."""
+        world = self._problem.world
+        goal = self._problem.goal
+        if not isinstance(goal, TipGoal):  # of several tips
+            kept = () if world.constraints is None else world.constraints.regions
+            return at_all_tips(world.robot, goal, self._problem.start, self._rng, scene=world.scene, kept=kept)
+
+        found = self._round(goal)
+        if self._problem.constraints:
+            self._unheld = np.vstack([self._unheld, found])
+            found = _held_at_goal(self._problem, goal, found, self._rng)
+        return found
+
+    def _round(self, goal: TipGoal) -> Matrix:
+        """Configurations at the goal, in collision or not, by the method whose turn it is, shape (m, dof)."""
+        problem = self._problem
+        rng = self._rng
+        number = self._rounds
+        robot = problem.world.robot
+        parts = goal.parts
+        drawn = targets(goal, DRAWS, rng)
+        seed = int(rng.integers(2**31))
+        free = any(leaves_freedom(part) for part in parts)
+
+        if _fits("closed-form", robot, drawn) and (number == 0 or (free and number % 2 == 0)):
+            self._certain = not free and len(parts) <= DRAWS
+            self.exhausted = self._certain and not leaves_a_curve(robot, drawn)
+            return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
+
+        if number == 1 and _fits("mb-rrt", robot, drawn):
+            left = max(self._seconds_left(), LEAST_SECONDS)
+            return solve_ik(
+                robot, goal, method="mb-rrt", near=problem.start, world=problem.world, seconds=left, seed=seed
+            ).solutions
+
+        starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
+        starts[0] = problem.start
+        return _walked(robot, goal, starts, number, rng)
 
     @property
     def reason(self) -> str:
@@ -159,52 +206,55 @@ class GoalSearch:
         amounts = [sum(sum(region.outside(q)) for region in constraints.regions) for q in self._unheld]
         return constraints.explain(self._unheld[int(np.argmin(amounts))])
 
-    def _draw(self, goal: TipGoal) -> tuple[list[Target], int]:
-        """The random numbers of a round: targets and a seed."""
-        return list(targets(goal, DRAWS, self._rng)), int(self._rng.integers(2**31))
 
-    def _round(self, goal: TipGoal) -> Matrix:
-        """Configurations at the goal, in collision or not, by the method whose turn it is, shape (m, dof)."""
-        problem, rng, number = self._problem, self._rng, self._rounds
-        robot, parts = problem.world.robot, goal.parts
-        drawn, seed = self._draw(goal)
-        free = any(leaves_freedom(part) for part in parts)
-        if _fits("closed-form", robot, drawn) and (number == 0 or (free and number % 2 == 0)):
-            self._certain = not free and len(parts) <= DRAWS
-            self.exhausted = self._certain and not leaves_a_curve(robot, drawn)
-            return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
-        if number == 1 and _fits("mb-rrt", robot, drawn):
-            left = max(self._seconds_left(), LEAST_SECONDS)
-            return solve_ik(
-                robot, goal, method="mb-rrt", near=problem.start, world=problem.world, seconds=left, seed=seed
-            ).solutions
-        starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
-        starts[0] = problem.start
-        return _walked(robot, goal, starts, number, rng)
+def _turns(problem: Problem, q: Vector) -> Matrix:
+    """The configuration and, for each continuous joint, the same posture reached the other way round."""
+    if not has_continuous(problem.world.robot):
+        return q[None]
+    rows = [np.array(q)]
+    for joint in np.flatnonzero(problem.world.robot.continuous):
+        other = np.array(q)
+        other[joint] += -TAU if other[joint] > problem.start[joint] else TAU
+        rows.append(other)
+    return np.array(rows)
 
 
-# First rounds that take all branches of a closed form, in which nothing is random: rows, all that was found, and
-# whether that is all there is. A portfolio, and a path that is being improved, ask for them plan after plan.
-_first_rounds: WeakKeyDictionary[Problem, tuple[Matrix, Matrix, bool]] = WeakKeyDictionary()
+def _held_at_goal(problem: Problem, goal: TipGoal, found: Matrix, rng: np.random.Generator) -> Matrix:
+    """Configurations at the goal of a problem that keep its path constraints.
+
+    Args:
+        problem: With path constraints.
+        goal: Its goal.
+        found: Configurations at the goal, shape (m, dof). Those that are outside a region are moved into all, along
+            what the goal leaves free.
+        rng: Draws further starts.
+
+    Returns:
+        Shape (k, dof).
+    """
+    constraints = problem.world.constraints
+    if constraints is None:
+        return found
+
+    held = constraints.held(found)
+    starts = np.vstack([found[~held], rng.uniform(*problem.robot.finite_range(), (STARTS, problem.robot.dof))])
+    rows = [found[held]]
+    if not held.all() or len(found) == 0:
+        parts = goal.parts
+        chosen = rng.permutation(len(parts))[:PARTS]
+        rows += [_held_at_part(problem, constraints, parts[k], starts) for k in chosen]
+
+    joined: Matrix = np.vstack(rows)
+    return joined[goal.satisfied(problem.robot, joined)] if len(joined) else joined
 
 
-def _miss(problem: Problem, goal: TipGoal) -> str:
-    """How near the arm came to a goal within its limits, in a line."""
-    robot, regions = problem.world.robot, [part.region() for part in goal.parts]
-    starts = np.random.default_rng(0).uniform(*robot.finite_range(), (STARTS, robot.dof))
-    if len(regions) > PARTS:  # to walk to each of thousands would take minutes
-        places = np.array([(region.T_world_w * region.T_w_tip).translation for region in regions])
-        away = np.linalg.norm(places[:, None] - poses(robot, starts)[:, :3, 3], axis=2).min(axis=1)
-        regions = [regions[k] for k in np.argsort(away, kind="stable")[:PARTS]]
-        goal = GoalSet(regions)
-    starts = starts[: STARTS // len(regions)]
-    ends = np.vstack([project(robot, region, starts) for region in regions])
-    distance, angle = goal.errors(robot, ends)
-    best = np.argmin(goal.distance(robot, ends))
-    if goal.satisfied(robot, ends[best : best + 1])[0]:
-        return "walks from other starts do reach it, so that another seed may find one"
-    away = f"{1e3 * distance[best]:.1f} mm and {np.degrees(angle[best]):.1f} degrees"
-    return f"the nearest one misses it by {away}; is it in reach?"
+def _held_at_part(problem: Problem, constraints: HeldRegions, part: GoalPart, starts: Matrix) -> Matrix:
+    """Configurations moved into all regions and to one part of the goal; those that get there."""
+    try:
+        aim = held_region(problem.robot, problem.world.scene, part.region(), "the goal")
+    except InputError:  # ranges of angles that cannot be held; inverse kinematics alone must do
+        return starts[:0]
+    return projected_onto(problem.robot, HeldRegions((*constraints.regions, aim)), starts)
 
 
 def _fits(method: IkMethod, robot: Robot, drawn: list[Target]) -> bool:
@@ -228,18 +278,6 @@ def _walked_to(robot: Robot, goal: TipGoal, starts: Matrix, rng: np.random.Gener
     return rows[part.satisfied(robot, rows)]
 
 
-def _turns(problem: Problem, q: Vector) -> Matrix:
-    """The configuration and, for each continuous joint, the same posture reached the other way round."""
-    if not has_continuous(problem.world.robot):
-        return q[None]
-    rows = [np.array(q)]
-    for joint in np.flatnonzero(problem.world.robot.continuous):
-        other = np.array(q)
-        other[joint] += -TAU if other[joint] > problem.start[joint] else TAU
-        rows.append(other)
-    return np.array(rows)
-
-
 def _chosen(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
     """At most `MAX_CONFIGURATIONS` rows unlike each other and the known, turned near the start, nearest first.
 
@@ -253,9 +291,32 @@ def _chosen(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
     apart = np.full(len(rows), np.inf)  # largest joint difference from the nearest of those chosen
     for row in known:
         apart = np.minimum(apart, np.abs(joint_difference(robot, turned, row)).max(axis=1))
+
     kept: list[int] = []
     while len(kept) < MAX_CONFIGURATIONS and (apart > SAME_POSTURE).any():
         value = -distance if len(kept) < MAX_CONFIGURATIONS // 2 else apart
         kept.append(int(np.argmax(np.where(apart > SAME_POSTURE, value, -np.inf))))
         apart = np.minimum(apart, np.abs(joint_difference(robot, turned, turned[kept[-1]])).max(axis=1))
     return turned[sorted(kept, key=lambda k: (distance[k], k))]
+
+
+def _miss(problem: Problem, goal: TipGoal) -> str:
+    """How near the arm came to a goal within its limits, in a line."""
+    robot = problem.world.robot
+    regions = [part.region() for part in goal.parts]
+    starts = np.random.default_rng(0).uniform(*robot.finite_range(), (STARTS, robot.dof))
+    if len(regions) > PARTS:  # to walk to each of thousands would take minutes
+        places = np.array([(region.T_world_w * region.T_w_tip).translation for region in regions])
+        away = np.linalg.norm(places[:, None] - poses(robot, starts)[:, :3, 3], axis=2).min(axis=1)
+        regions = [regions[k] for k in np.argsort(away, kind="stable")[:PARTS]]
+        goal = GoalSet(regions)
+
+    starts = starts[: STARTS // len(regions)]
+    ends = np.vstack([project(robot, region, starts) for region in regions])
+    distance, angle = goal.errors(robot, ends)
+    best = np.argmin(goal.distance(robot, ends))
+
+    if goal.satisfied(robot, ends[best : best + 1])[0]:
+        return "walks from other starts do reach it, so that another seed may find one"
+    away = f"{1e3 * distance[best]:.1f} mm and {np.degrees(angle[best]):.1f} degrees"
+    return f"the nearest one misses it by {away}; is it in reach?"

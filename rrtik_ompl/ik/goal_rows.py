@@ -34,6 +34,7 @@ def goal_rows(goal: TipGoal) -> Matrix:
     if not isinstance(goal, GoalSet):
         return _row(goal)[None]
     rows = np.array([_row(member) for member in goal.members])
+    # points and single turns have neither a box nor an axis to choose
     posed = rows[:, FREE_TURN] == NO_TURN
     rows[posed, BOX : BOX + 3] = 0.5 * goal.box
     if goal.free_rotation_axis is not None:
@@ -44,17 +45,24 @@ def goal_rows(goal: TipGoal) -> Matrix:
 def pose_rows(poses: NDArray[np.float64]) -> Matrix:
     """Poses with the tolerances of a `PoseGoal`, shape (k, 4, 4), as rows, shape (k, 18); see `goal_rows`."""
     rows = np.tile(_row(POSE), (len(poses), 1))
-    rows[:, :9], rows[:, 9:12] = poses[:, :3, :3].reshape(-1, 9), poses[:, :3, 3]
+    rows[:, :9] = poses[:, :3, :3].reshape(-1, 9)
+    rows[:, 9:12] = poses[:, :3, 3]
     return rows
 
 
 def _row(goal: TipGoal) -> NDArray[np.float64]:
     if not isinstance(goal, Target):
         raise InputError("goal: no row holds a task-space region; use projection, or targets drawn from it")
-    row = np.zeros(AIM_FLOATS)
     near, turned = goal.tolerances
-    row[:9] = goal.pose.rotation.ravel() if goal.oriented else UPRIGHT
+    row = np.zeros(AIM_FLOATS)
     row[9:12] = goal.point
     row[POSITION_TOLERANCE] = SHARE * near
-    row[CHORD_TOLERANCE], row[FREE_TURN] = (SHARE * turned, NO_TURN) if goal.oriented else (1.0, ANY_TURN)
+    if goal.oriented:
+        row[:9] = goal.pose.rotation.ravel()
+        row[CHORD_TOLERANCE] = SHARE * turned
+        row[FREE_TURN] = NO_TURN
+    else:
+        row[:9] = UPRIGHT
+        row[CHORD_TOLERANCE] = 1.0
+        row[FREE_TURN] = ANY_TURN
     return row

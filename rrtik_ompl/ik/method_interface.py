@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
+from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.model.goal import Target as Target
 from rrtik_ompl.model.goal import TipGoal, has_continuous, joint_difference
@@ -111,7 +112,8 @@ class IkResult:
     method: IkMethod
     seconds: float
 
-    __reduce__, __repr__ = as_value, in_one_line
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
     @property
     def found(self) -> bool:
@@ -121,6 +123,12 @@ class IkResult:
     def nearest(self) -> IkResult:
         """The same with the nearest solution alone."""
         return replace(self, solutions=self.solutions[:1], residuals=self.residuals[:1])
+
+
+def nearest_first(robot: Robot, rows: Matrix, near: Vector) -> NDArray[np.intp]:
+    """Numbers of rows, shape (k, dof), those nearest to a posture first; joints count as their weights say."""
+    away = weighted_difference(robot, rows, near)
+    return np.vecdot(away, away).argsort(kind="stable")
 
 
 def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -38,21 +38,27 @@ def _closed_form_misfit(robot: Robot, target: Target) -> str:
 
 def _closed_form(request: IkRequest) -> IkResponse:
     """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
-    robot, targets = request.robot, request.targets
+    robot = request.robot
+    targets = request.targets
     q = valid_branches(robot, form_of(robot), _matrix(targets[0]), request.near) if len(targets) == 1 else None
     if q is None:
         found = branches_of(robot, *_poses_and_hints(request), check=False)
         q = found.branches[found.valid]
     if len(q) and request.accept(q).any():  # the usual case; forward kinematics checks what is returned
         return IkResponse(q, request.near)
+
+    # none will do: see by forward kinematics which ones are at a goal, and which came nearest
     found = branches_of(robot, *_poses_and_hints(request))
-    rows, owner = found.branches.reshape(-1, robot.dof), np.repeat(np.arange(len(targets)), found.real.shape[1])
+    rows = found.branches.reshape(-1, robot.dof)
+    owner = np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
     near_enough = residuals <= np.array([target.tolerances for target in targets])[owner]
     reaching = near_enough.all(axis=1)
     q = rows[inside_limits(robot, rows) & reaching]
+
     if not request.accept(q).any():
         q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
+
     outside = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)
     best = np.argmin(np.where(reaching, outside, np.inf) if reaching.any() else residuals.sum(axis=1))
     return IkResponse(q, rows[int(best)], singular=leaves_a_curve(robot, targets))

@@ -15,7 +15,7 @@ from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.held_tables import projected_onto
-from rrtik_ompl.ik.method_interface import IkResult, different_rows
+from rrtik_ompl.ik.method_interface import IkResult, different_rows, nearest_first
 from rrtik_ompl.model.goal import Goal, MultiGoal, joint_difference
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
@@ -44,6 +44,7 @@ def at_all_tips(
     regions = goal_regions(robot, scene, goal)
     starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
     starts[0] = near
+
     joined = starts.copy()
     for region in regions:
         own = projected_onto(robot, HeldRegions((region,)), starts)
@@ -53,9 +54,15 @@ def at_all_tips(
         rows = np.append(0, rng.integers(len(own), size=STARTS - 1))  # the nearest ones of all tips first
         moved = _moving(robot, region)
         joined[:, moved] = own[rows][:, moved]
+
     found = projected_onto(robot, HeldRegions((*kept, *regions)), joined)
     there: Matrix = found[goal.satisfied(robot, found)] if len(found) else found
     return there
+
+
+def _moving(robot: Robot, region: HeldRegion) -> NDArray[np.intp]:
+    """Numbers of the joints of q that move the frame of a region."""
+    return np.flatnonzero((robot.chain.gain[region.rows] != 0.0).any(axis=0))
 
 
 def solve_all_tips(
@@ -79,20 +86,24 @@ def solve_all_tips(
         rng: See :func:`at_all_tips`.
         scene: Likewise.
     """
-    begin, rounds = time.monotonic(), 0
-    reason, detail = "time", ""
+    begin = time.monotonic()
+    rounds = 0
+    reason = "time"
+    detail = ""
+
     while rounds == 0 or time.monotonic() < deadline:
         rounds += 1
         found = at_all_tips(robot, goal, near, rng, scene=scene, kept=())
         free = found[accept(found)]
         if len(free):
             turned = joint_difference(robot, free, near)
-            away = weighted_difference(robot, free, near)
-            kept = different_rows(turned, np.vecdot(away, away).argsort(kind="stable"))
+            kept = different_rows(turned, nearest_first(robot, free, near))
             rows = np.where(robot.continuous, near + turned[kept], free[kept])
             return _result(rows, _residuals(robot, goal, rows), "", "", rounds, begin)
         if len(found):
-            reason, detail = "collision", f"{len(found)} configurations reach the goals, all in collision"
+            reason = "collision"
+            detail = f"{len(found)} configurations reach the goals, all in collision"
+
     tips = " and ".join(f"'{frame}'" for frame in goal.frames)
     detail = detail or f"no configuration with {tips} at their goals in {rounds} rounds; are they in reach?"
     return _result(np.zeros((0, robot.dof)), np.zeros((0, 2)), reason, detail, rounds, begin)
@@ -109,8 +120,3 @@ def _residuals(robot: Robot, goal: MultiGoal, rows: Matrix) -> Matrix:
 def _result(rows: Matrix, residuals: Matrix, reason: str, detail: str, rounds: int, begin: float) -> IkResult:
     spent = time.monotonic() - begin
     return IkResult(frozen(rows), frozen(residuals), reason, detail, rounds, PROJECTION, spent)
-
-
-def _moving(robot: Robot, region: HeldRegion) -> NDArray[np.intp]:
-    """Numbers of the joints of q that move the frame of a region."""
-    return np.flatnonzero((robot.chain.gain[region.rows] != 0.0).any(axis=0))

@@ -63,10 +63,13 @@ def rate(
     values = robot.configuration(q)
     wanted = finite_array(twist, (6,), "twist")
     extra = np.zeros(robot.dof) if bias is None else robot.configuration(bias, "bias")
+
     jacobian = robot.jacobian_batch(values[None])[0]
     reach = float(np.linalg.norm(robot.chain.placement[1:, :3, 3], axis=1).sum()) or 1.0
     units = np.array([1.0 / reach] * 3 + [1.0] * 3)
-    low, high = values <= robot.lower + LIMIT_TOLERANCE, values >= robot.upper - LIMIT_TOLERANCE
+
+    low = values <= robot.lower + LIMIT_TOLERANCE
+    high = values >= robot.upper - LIMIT_TOLERANCE
     free = np.ones(robot.dof, dtype=bool)
     while True:  # each round holds at least one joint more; held joints do not move, so it ends
         qdot, smallest = _damped(jacobian * units[:, None] * free, wanted * units, extra * free, damping, near)
@@ -74,6 +77,7 @@ def rate(
         if not blocked.any():
             break
         free &= ~blocked
+
     scale = 1.0 / max(1.0, float(np.max(np.abs(qdot) / robot.velocity)))
     names = tuple(name for name, is_free in zip(robot.joint_names, free, strict=True) if not is_free)
     return Rate(frozen(qdot * scale), frozen(jacobian @ (qdot * scale)), smallest, scale, names)
@@ -84,6 +88,7 @@ def _damped(J: Matrix, twist: Vector, bias: Vector, damping: float, near: float)
     U, s, Vt = np.linalg.svd(J)
     square = np.where(s < near, (1.0 - (s / near) ** 2) * damping**2, 0.0)
     inverse = np.divide(s, s * s + square, out=np.zeros_like(s), where=s > LOST)
+
     kept = np.zeros(len(Vt))
     kept[: len(s)] = s * inverse  # share of each direction that the twist has taken
     V = Vt.T

@@ -17,12 +17,11 @@ from rrtik_ompl.model.tip_distance import reach_of
 PER_CHORD = 0.3  # weight of a turn (its chord 2 sin(angle / 2)) where the position counts in reaches
 DAMPING = 1e-9  # the constant part, in units of the squared residual
 DAMPING_SHARE = 0.1  # of the squared residual, which goes into the damping
-SHARE_GROWTH = (
-    4.0  # of that share after a step that led away: it was too bold, as it is in front of what is out of reach
-)
+# of that share after a step that led away: it was too bold, as it is in front of what is out of reach
+SHARE_GROWTH = 4.0
 LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one step
 STALLED = 0.5  # a start whose squared residual has not fallen to this share in some steps is given up
-HALF_TURN_COSINE = 1e-12
+HALF_TURN_COSINE = 1e-12  # of half the angle: below this the skew part says nothing of the axis
 
 
 def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: int) -> tuple[Matrix, Mask, int]:
@@ -31,22 +30,32 @@ def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: in
     Returns:
         Where the rows have come to, whether that is at their goals, shape (m,), and the most steps taken.
     """
-    Q, aims = np.clip(Q, robot.lower, robot.upper), np.broadcast_to(aims, (len(Q), aims.shape[1]))
-    reached, going = np.zeros(len(Q), dtype=bool), np.arange(len(Q))
-    mark, before, share = np.full(len(Q), np.inf), np.full(len(Q), np.inf), np.full(len(Q), DAMPING_SHARE)
+    Q = np.clip(Q, robot.lower, robot.upper)
+    aims = np.broadcast_to(aims, (len(Q), aims.shape[1]))
+    reached = np.zeros(len(Q), dtype=bool)
+    going = np.arange(len(Q))
+    mark = np.full(len(Q), np.inf)
+    before = np.full(len(Q), np.inf)
+    share = np.full(len(Q), DAMPING_SHARE)
     weights = np.repeat([1.0 / reach_of(robot), PER_CHORD], 3)
+
     for step in range(steps + 1):
         error, felt, there = residuals(aims[going], poses(robot, Q[going]))
         reached[going] = there
         error = error * weights
         square = (error * error).sum(axis=1)
+
         kept = ~there
         if step > 0 and step % patience == 0:
             kept &= square <= STALLED * mark[going]
             mark[going] = square
-        going, error, felt, square = going[kept], error[kept], felt[kept], square[kept]
+        going = going[kept]
+        error = error[kept]
+        felt = felt[kept]
+        square = square[kept]
         if len(going) == 0 or step == steps:
             break
+
         share[going[square > before[going]]] *= SHARE_GROWTH
         before[going] = square
         J = _jacobians(robot, aims[going], felt, Q[going]) * weights[:, None]
@@ -54,6 +63,7 @@ def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: in
         Q[going] = np.clip(
             Q[going] + _changes(robot, J, error, DAMPING + share[going] * square, Q[going]), robot.lower, robot.upper
         )
+
     return Q, reached, step
 
 
@@ -64,26 +74,35 @@ def residuals(aims: Matrix, tips: NDArray[np.float64]) -> tuple[Matrix, NDArray[
         The residuals; what of a turn they feel as matrices, shape (m, 3, 3), not the part about an axis of the tip
         that may point anywhere in its own turn; and whether they are within tolerance, shape (m,).
     """
-    turned, free = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1), aims[:, FREE_TURN].astype(int)
+    turned = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
+    free = aims[:, FREE_TURN].astype(int)
     place = (turned @ (tips[:, :3, 3] - aims[:, 9:12])[..., None])[..., 0]
     room = aims[:, BOX : BOX + 3]
     R = turned @ tips[:, :3, :3]
+
     skew = -0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
     cosine = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
     felt = np.tile(np.eye(3), (len(aims), 1, 1))
+
     for axis in range(3):
         rows = free == axis
         own = R[rows, :, axis]
-        skew[rows], cosine[rows] = np.cross(own, np.eye(3)[axis]), own[:, axis]
+        skew[rows] = np.cross(own, np.eye(3)[axis])
+        cosine[rows] = own[:, axis]
         felt[rows] -= own[:, :, None] * own[:, None]
-    skew[free == ANY_TURN], cosine[free == ANY_TURN], felt[free == ANY_TURN] = 0.0, 1.0, 0.0
+    skew[free == ANY_TURN] = 0.0
+    cosine[free == ANY_TURN] = 1.0
+    felt[free == ANY_TURN] = 0.0
+
     half = np.sqrt(np.maximum(0.5 * (1.0 + cosine), 0.0))
-    hidden = (
-        half < HALF_TURN_COSINE
-    )  # half a turn about an axis that rounding hides: any will do, the next step sees better
-    skew[hidden], half[hidden] = np.eye(3)[np.where(free[hidden] == 0, 1, 0)], 0.5
+    # half a turn about an axis that rounding hides: any will do, the next step sees better
+    hidden = half < HALF_TURN_COSINE
+    skew[hidden] = np.eye(3)[np.where(free[hidden] == 0, 1, 0)]
+    half[hidden] = 0.5
+
     error = np.hstack([np.clip(place, -room, room) - place, skew / half[:, None]])
-    away, turn = np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)
+    away = np.linalg.norm(error[:, :3], axis=1)
+    turn = np.linalg.norm(error[:, 3:], axis=1)
     return error, felt, (away <= aims[:, POSITION_TOLERANCE]) & (turn <= aims[:, CHORD_TOLERANCE])
 
 
@@ -100,7 +119,8 @@ def farness(robot: Robot, aims: Matrix, tips: NDArray[np.float64]) -> Matrix:
 
 def _jacobians(robot: Robot, aims: Matrix, felt: NDArray[np.float64], Q: Matrix) -> NDArray[np.float64]:
     """Jacobians in the axes of the goals, turns as far as they are felt, shape (m, 6, dof)."""
-    turned, J = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1), jacobians(robot, Q)
+    turned = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
+    J = jacobians(robot, Q)
     return np.concatenate([turned @ J[:, :3], felt @ turned @ J[:, 3:]], axis=1)
 
 

@@ -39,6 +39,8 @@ def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
     away = math.dist(tip.translation.tolist(), goal.point.tolist())
     if not goal.oriented:
         return away, 0.0
+
+    # sine from the skew part, cosine from the trace: exact for small angles and for large ones
     a, b, c = goal.pose.actInv(tip).rotation.tolist()
     sine = 0.5 * math.hypot(c[1] - b[2], a[2] - c[0], b[0] - a[1])
     return away, math.atan2(sine, 0.5 * (a[0] + b[1] + c[2] - 1.0))
@@ -48,7 +50,8 @@ def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
 def _tip_of(robot: Robot, thread: int) -> tuple[Any, Any, int, bool]:
     """Pinocchio's model, working memory of one thread's own, the tip's number; whether q is as Pinocchio wants it."""
     del thread
-    chain, model = robot.chain, robot.model
+    chain = robot.chain
+    model = robot.model
     plain = model.nq == robot.dof and np.array_equal(chain.gain, np.eye(robot.dof)) and not chain.offset.any()
     return model, working_memory(model), int(model.getFrameId(robot.tip)), plain
 
@@ -104,6 +107,7 @@ def _rotation_vectors(R: NDArray[np.float64]) -> Matrix:
     sine = np.linalg.norm(skew, axis=1)
     angle = np.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0))
     vectors: Matrix = skew * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 1.0)[:, None]
+
     for k in np.flatnonzero(angle > np.pi - NEAR_HALF_TURN):
         vectors[k] = pin.log3(R[k])
     return vectors

@@ -59,6 +59,7 @@ def singularity_report(robot: Robot, q: ArrayLike, *, tolerance: float = RANK_TO
     stopped = limit_active(robot, posture)
     named = form_of(robot).nearness(posture[None]) if has_closed_form(robot) else {}
     near = {case: float(value[0]) for case, value in named.items()}
+
     return SingularityReport(
         singular_values=frozen(values),
         rank=_rank(values, tolerance),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from functools import partial
 from typing import Any, get_args
 
 import numpy as np
@@ -14,28 +13,28 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, not_negative
 from rrtik_ompl.base.choices import IkMethod, one_of
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.description.joint_weights import weighted_difference
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target, different_rows, mid_range_configuration
+from rrtik_ompl.ik.method_interface import (
+    IkRequest,
+    IkResponse,
+    Target,
+    different_rows,
+    mid_range_configuration,
+    nearest_first,
+)
 from rrtik_ompl.ik.method_interface import IkResult as IkResult
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.multi_goals import PROJECTION, solve_all_tips
 from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.residual import error_of_one
 from rrtik_ompl.ik.targets import leaves_freedom, targets
-from rrtik_ompl.model.goal import (
-    TIP_GOALS,
-    MultiGoal,
-    PoseGoal,
-    TipGoal,
-    has_continuous,
-    joint_difference,
-)
+from rrtik_ompl.model.goal import TIP_GOALS, MultiGoal, PoseGoal, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.check_world import check_world
 from rrtik_ompl.world.world import World
 
-SECONDS = 1.0
-METHOD = "inverse kinematics method"
+SECONDS = 1.0  # of a numeric method, unless said otherwise
+METHOD = "inverse kinematics method"  # in messages
 DRAWS = 32  # targets drawn from a goal that leaves freedom; one for each part if it has more parts
 COMPARED = 1_000_000  # rows times parts of a goal at once, some tenths of a second
 DIGITS = 9  # of metres and degrees in a message: less is rounding
@@ -84,26 +83,42 @@ def solve_ik(
     one_of(get_args(IkMethod), method, METHOD)
     require(all, bool, "all")
     load_kernels(robot)
+
     begin = time.monotonic()
-    limit, random = not_negative(seconds, "seconds"), RandomStream(seed)
+    limit = not_negative(seconds, "seconds")
+    random = RandomStream(seed)
     posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
+
+    def accept(Q: Matrix) -> Mask:
+        return free_of_collision(world, Q)
+
     if isinstance(goal, MultiGoal):
         if method not in ("auto", PROJECTION):
-            raise InputError(f"method '{one_of(get_args(IkMethod), method, METHOD)}' is for one tip; use {PROJECTION}")
-        scene, accepted = Scene() if world is None else world.scene, partial(free_of_collision, world)
-        found = solve_all_tips(robot, goal, posture, accepted, begin + limit, random.rng, scene=scene)
+            raise InputError(f"method '{method}' is for one tip; use {PROJECTION}")
+        scene = Scene() if world is None else world.scene
+        found = solve_all_tips(robot, goal, posture, accept, begin + limit, random.rng, scene=scene)
         return found if all else found.nearest()
+
     goal = _tip_goal(goal)
     drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, max(DRAWS, len(goal.parts)), random.rng))
     name = chosen_method(robot, drawn, method)
     if method == "auto" and name == "numeric":
         name = _walker(goal)
 
-    def accept(Q: Matrix) -> Mask:
-        return free_of_collision(world, Q)
-
     request = IkRequest(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
     return _solved(request, name, method == "auto", begin)
+
+
+def free_of_collision(world: World | None, Q: Matrix) -> Mask:
+    """Which configurations, shape (k, dof), are free: by the fast check first, then by the independent one.
+
+    All are if there is no world.
+    """
+    if world is None or len(Q) == 0:
+        return ~np.zeros(len(Q), dtype=bool)  # in a third of the time of numpy's own ones
+    free = np.array(world.checks.free(Q))
+    free[free] = world.checks.certified(Q[free])
+    return free
 
 
 def _tip_goal(goal: TipGoal | ArrayLike | pin.SE3) -> TipGoal:
@@ -112,36 +127,6 @@ def _tip_goal(goal: TipGoal | ArrayLike | pin.SE3) -> TipGoal:
     if not isinstance(taken, TipGoal):
         require(taken, TIP_GOALS, "goal", "inverse kinematics needs a goal of the tip, such as PoseGoal(T_world_tip)")
     return taken  # type: ignore[no-any-return]
-
-
-def _solved(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> IkResult:
-    """The answer of a method; if it has none and was chosen by "auto", of the one that walks to the goal."""
-    robot, goal = request.robot, request.goal
-    answer = METHODS[name].run(request)
-    nearest = None if request.all else _nearest(request, answer.q)
-    if nearest is not None:
-        return IkResult(*nearest, "", "", answer.iterations, name, time.monotonic() - begin)
-    q, residuals, free = _reaching(request, answer.q)
-    walked = _draws(name, goal) or (name == "closed-form" and answer.singular and len(q) == 0)
-    if auto and not free.any() and walked:
-        other = _solved(request, _walker(goal), False, begin)
-        if other.found or _draws(name, goal):  # else the closed form knows better why there is nothing
-            return other
-    turned = joint_difference(robot, q, request.near)
-    (rows,) = free.nonzero()
-    away = weighted_difference(robot, q, request.near)
-    order = rows[np.vecdot(away, away)[rows].argsort(kind="stable")]
-    kept = different_rows(turned, order) if request.all else order[:1]
-    reason, detail = ("", "") if len(kept) else _why(request, answer, name, q)
-    return IkResult(
-        solutions=frozen(np.where(robot.continuous, request.near + turned[kept], q[kept])),
-        residuals=frozen(residuals[kept]),
-        reason=reason,
-        detail=detail,
-        iterations=answer.iterations,
-        method=name,
-        seconds=time.monotonic() - begin,
-    )
 
 
 def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> IkMethod:
@@ -170,16 +155,42 @@ def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> 
     return method
 
 
-def free_of_collision(world: World | None, Q: Matrix) -> Mask:
-    """Which configurations, shape (k, dof), are free: by the fast check first, then by the independent one.
+def _walker(goal: TipGoal) -> IkMethod:
+    """The method for goals with freedom that walks to all of them, not to targets drawn from them."""
+    return "projection" if goal.has_regions else "numeric"
 
-    All are if there is no world.
-    """
-    if world is None or len(Q) == 0:
-        return ~np.zeros(len(Q), dtype=bool)  # in a third of the time of numpy's own ones
-    free = np.array(world.checks.free(Q))
-    free[free] = world.checks.certified(Q[free])
-    return free
+
+def _solved(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> IkResult:
+    """The answer of a method; if it has none and was chosen by "auto", of the one that walks to the goal."""
+    robot = request.robot
+    goal = request.goal
+    answer = METHODS[name].run(request)
+
+    nearest = None if request.all else _nearest(request, answer.q)
+    if nearest is not None:
+        return IkResult(*nearest, "", "", answer.iterations, name, time.monotonic() - begin)
+
+    q, residuals, free = _reaching(request, answer.q)
+    more = _draws(name, goal) or (name == "closed-form" and answer.singular and len(q) == 0)
+    if auto and not free.any() and more:
+        other = _solved(request, _walker(goal), False, begin)
+        if other.found or _draws(name, goal):  # else the closed form knows better why there is nothing
+            return other
+
+    (rows,) = free.nonzero()
+    order = rows[nearest_first(robot, q[rows], request.near)]
+    turned = joint_difference(robot, q, request.near)
+    kept = different_rows(turned, order) if request.all else order[:1]
+    reason, detail = ("", "") if len(kept) else _why(request, answer, name, q)
+    return IkResult(
+        solutions=frozen(np.where(robot.continuous, request.near + turned[kept], q[kept])),
+        residuals=frozen(residuals[kept]),
+        reason=reason,
+        detail=detail,
+        iterations=answer.iterations,
+        method=name,
+        seconds=time.monotonic() - begin,
+    )
 
 
 def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
@@ -187,17 +198,19 @@ def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
 
     It is checked first and alone, for mostly it will do: None if it is not at the goal or not accepted.
     """
-    robot, goal = request.robot, request.goal
+    robot = request.robot
     inside = q  # most often all are, and to clamp them takes twice as long as to see that
     if not ((q >= robot.lower) & (q <= robot.upper)).all():
         inside = robot.clamp(q[inside_limits(robot, q)])
+
     if len(inside) > 1:
         away = weighted_difference(robot, inside, request.near)
         nearest = int(np.vecdot(away, away).argmin())
         inside = inside[nearest : nearest + 1]
-    reaching, residuals = _at_goal(robot, goal, inside)
+    reaching, residuals = _at_goal(robot, request.goal, inside)
     if len(reaching) == 0 or not request.accept(reaching)[0]:
         return None
+
     if has_continuous(robot):
         turned = joint_difference(robot, reaching, request.near)
         reaching = np.where(robot.continuous, request.near + turned, reaching)
@@ -209,30 +222,26 @@ def _reaching(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
 
     The accepted ones, of which the nearest are enough unless all are wanted; if there is none, some of the others.
     """
-    robot, goal = request.robot, request.goal
+    robot = request.robot
+    goal = request.goal
     rows = robot.clamp(q[inside_limits(robot, q)])
-    free, some = request.accept(rows), _block(goal)
+    free = request.accept(rows)
     chosen = rows[free]
-    if not request.all and len(chosen) > some:
-        away = weighted_difference(robot, chosen, request.near)
-        chosen = chosen[np.vecdot(away, away).argsort(kind="stable")]
-    found = []
-    for k in range(0, len(chosen), some):
-        found.append(_at_goal(robot, goal, chosen[k : k + some]))
+    block = _block(goal)
+    if not request.all and len(chosen) > block:
+        chosen = chosen[nearest_first(robot, chosen, request.near)]
+
+    found = [(chosen[:0], np.zeros((0, 2)))]
+    for k in range(0, len(chosen), block):
+        found.append(_at_goal(robot, goal, chosen[k : k + block]))
         if len(found[-1][0]) and not request.all:
             break
-    at, residuals = (
-        (np.concatenate(each) for each in zip(*found, strict=True)) if found else _at_goal(robot, goal, chosen)
-    )
+    at, residuals = (np.concatenate(each) for each in zip(*found, strict=True))
     if len(at):
         return at, residuals, np.ones(len(at), dtype=bool)
-    at, residuals = _at_goal(robot, goal, rows[~free][:some])
+
+    at, residuals = _at_goal(robot, goal, rows[~free][:block])
     return at, residuals, np.zeros(len(at), dtype=bool)
-
-
-def _block(goal: TipGoal) -> int:
-    """How many rows are compared with a goal at once: thousands of rows with thousands of grasps take minutes."""
-    return max(1, COMPARED // len(goal.parts))
 
 
 def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
@@ -240,20 +249,34 @@ def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
     if len(q) == 0:
         return q, np.zeros((0, 2))
     if len(q) == 1 and isinstance(goal, Target):
-        (position, angle), (near, turned) = error_of_one(robot, goal, q[0]), goal.tolerances
+        position, angle = error_of_one(robot, goal, q[0])
+        near, turned = goal.tolerances
         kept = int(position <= near and angle <= turned)
         return q[:kept], np.array([[position, angle]])[:kept]
+
     residuals = np.array(goal.errors(robot, q)).T
     at = (residuals <= goal.tolerances).all(axis=1) if isinstance(goal, Target) else goal.satisfied(robot, q)
     return q[at], residuals[at]
 
 
+def _block(goal: TipGoal) -> int:
+    """How many rows are compared with a goal at once: thousands of rows with thousands of grasps take minutes."""
+    return max(1, COMPARED // len(goal.parts))
+
+
+def _draws(name: str, goal: TipGoal) -> bool:
+    """Whether the targets that a method takes are not all there is of a goal."""
+    return name not in ("projection", _walker(goal)) and any(map(leaves_freedom, goal.parts))
+
+
 def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[str, str]:
     """Reason and detail of a failure of a method that found q, shape (k, dof), all in collision."""
-    robot, goal = request.robot, request.goal
+    robot = request.robot
+    goal = request.goal
     if len(q) and request.world is not None:
         count = f"{len(q)} configurations" + (" or more" if len(q) >= _block(goal) else "")
         return "collision", f"{count} reach the goal, all in collision: {request.world.explain(q[0])}"
+
     fault = robot.limit_fault(answer.nearest)
     reached = bool(goal.satisfied(robot, answer.nearest[None])[0])
     if reached and not fault:
@@ -264,6 +287,7 @@ def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[
         return "limits", f"the arm could reach this singular pose in many postures, all outside the limits: {fault}"
     if reached:
         return "limits", f"the arm could reach the goal, but {fault}"
+
     away = f"the nearest posture is {_away(robot, goal, answer.nearest)}"
     if answer.timed_out and not all(_out_of_reach(robot, target) for target in request.targets):
         return "time", f"no solution in time; {away}"
@@ -274,16 +298,6 @@ def _out_of_reach(robot: Robot, target: Target) -> bool:
     from rrtik_ompl.ik.mb_rrt.search import out_of_reach  # whoever finds a solution needs no tree
 
     return out_of_reach(robot, target)
-
-
-def _walker(goal: TipGoal) -> IkMethod:
-    """The method for goals with freedom that walks to all of them, not to targets drawn from them."""
-    return "projection" if goal.has_regions else "numeric"
-
-
-def _draws(name: str, goal: TipGoal) -> bool:
-    """Whether the targets that a method takes are not all there is of a goal."""
-    return name not in ("projection", _walker(goal)) and any(map(leaves_freedom, goal.parts))
 
 
 def _away(robot: Robot, goal: TipGoal, q: Vector) -> str:

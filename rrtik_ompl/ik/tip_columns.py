@@ -39,15 +39,18 @@ class TipColumns:
         """Rotation columns x, y, z and position of the frame in the world for q of shape (dof, ...): (4, 3, ...)."""
         values = self._values(q)
         pose = [list(self.fixed[0][:3, column]) for column in range(4)]
+
         for k, value in enumerate(values):
             if self.prismatic[k]:
                 pose[3] = [p + value * z for p, z in zip(pose[3], pose[2], strict=True)]
             else:
-                c, s = np.cos(value), np.sin(value)
+                c = np.cos(value)
+                s = np.sin(value)
                 x = [c * a + s * b for a, b in zip(pose[0], pose[1], strict=True)]
                 pose[1] = [c * b - s * a for a, b in zip(pose[0], pose[1], strict=True)]
                 pose[0] = x
             pose = _moved(pose, self.fixed[k + 1])
+
         return np.stack([np.stack([np.broadcast_to(entry, q.shape[1:]) for entry in column]) for column in pose])
 
     def _values(self, q: Numbers) -> list[Numbers]:
@@ -65,16 +68,21 @@ def tip_columns(robot: Robot) -> TipColumns:
 
 def frame_columns(robot: Robot, joint: int, placement: Numbers) -> TipColumns:
     """The chain from the base to a frame, given by its joint's number (0: the world) and its pose in the joint's."""
-    chain, rows, row = robot.chain, list[int](), joint - 1
+    chain = robot.chain
+    rows = list[int]()
+    row = joint - 1
     while row >= 0:
         rows.insert(0, row)
         row = int(chain.parent[row])
-    turned, fixed = np.eye(4), []
+
+    turned = np.eye(4)
+    fixed = []
     for row in rows:
         to_axis = _z_along(chain.axis[row])
         fixed.append(_exact(turned.T @ chain.placement[row] @ to_axis))
         turned = to_axis
     fixed.append(_exact(turned.T @ placement))
+
     return TipColumns(chain.gain[rows], chain.offset[rows], np.array(fixed), chain.prismatic[rows])
 
 

@@ -59,7 +59,8 @@ class IkTrajectory:
     iterations: int
     seconds: float
 
-    __reduce__, __repr__ = as_value, in_one_line
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
     @property
     def found(self) -> bool:
@@ -135,6 +136,7 @@ def solve_ik_trajectory(
     begin = time.monotonic()
     rows = _checked(poses)
     targets = tuple(_target(row, position_tolerance, orientation_tolerance) for row in rows)
+
     task = Task(
         robot=robot,
         poses=rows,
@@ -147,11 +149,13 @@ def solve_ik_trajectory(
         rng=RandomStream(seed).rng,
         deadline=begin + not_negative(seconds, "seconds"),
     )
+
     name = _chosen(task, method)
     q, iterations = FOLLOWERS[name](task)
     unwind(robot, q, task.near)
     residuals = _keep_only_checked(task, q)
     reasons, detail = _why(task, name, q)
+
     return IkTrajectory(
         q=frozen(q),
         residuals=frozen(residuals),
@@ -201,12 +205,14 @@ def _chosen(task: Task, method: TrajectoryIkMethod) -> TrajectoryIkMethod:
         misfits["closed-form"] = "its closed form knows positions alone; give points, shape (k, 3)"
     if task.goals is not task.targets:
         misfits |= dict.fromkeys(("closed-form", "genetic"), "it knows no free axis; leave out free_rotation_axis")
+
     fitting = [name for name, misfit in misfits.items() if not misfit]
     if method != "auto" and misfits[method]:
         raise InputError(
             f"method '{method}' does not fit robot '{task.robot.name}' and this trajectory: {misfits[method]}; "
             f"what fits: {', '.join(fitting)}"
         )
+
     return fitting[0] if method == "auto" else method
 
 
@@ -246,9 +252,11 @@ def _keep_only_checked(task: Task, q: Matrix) -> Matrix:
     residuals = np.full((len(q), 2), np.nan)
     for k in np.flatnonzero(~np.isnan(q[:, 0])):
         residuals[k] = np.ravel(task.goals[k].errors(task.robot, q[k : k + 1]))
+
     good = (residuals <= task.targets[0].tolerances).all(axis=1) & inside_limits(task.robot, q)
     good[good] = task.accept(q[good])
-    q[~good], residuals[~good] = np.nan, np.nan
+    q[~good] = np.nan
+    residuals[~good] = np.nan
     q[:] = task.robot.clamp(q)
     return residuals
 
@@ -259,23 +267,28 @@ def _why(task: Task, name: TrajectoryIkMethod, q: Matrix) -> tuple[tuple[str, ..
     A genetic algorithm knows nothing of the points after the one where it stopped; there and where the time is up the
     reason is ``time``.
     """
-    reasons, detail = [""] * len(q), ""
+    reasons = [""] * len(q)
+    detail = ""
+
     for k in np.flatnonzero(np.isnan(q[:, 0])):
         left = task.deadline - time.monotonic()
-        reasons[k], line = "time", f"method '{name}' came to its limit before it found a way there"
+        reasons[k] = "time"
+        line = f"method '{name}' came to its limit before it found a way there"
         if left > 0.0 and (name != "genetic" or not detail):
             method: IkMethod = "numeric" if name == "genetic" else name
             alone = solve_ik(
                 task.robot, task.goals[k], method=method, world=task.world, seconds=min(left, SECONDS_A_POINT)
             )
-            reasons[k], line = alone.reason or "time", alone.detail or line
+            reasons[k] = alone.reason or "time"
+            line = alone.detail or line
         detail = detail or f"point {k}: {line}"
     return tuple(reasons), detail
 
 
 def _jumps(robot: Robot, q: Matrix, jump: float) -> tuple[int, ...]:
     """Points after a jump, and points that follow a gap."""
-    here, before = ~np.isnan(q[1:, 0]), ~np.isnan(q[:-1, 0])
+    here = ~np.isnan(q[1:, 0])
+    before = ~np.isnan(q[:-1, 0])
     far = np.abs(joint_difference(robot, q[1:], q[:-1])).max(axis=1) > jump
     after_gap = here & ~before & np.logical_or.accumulate(before)
     return tuple(int(k) + 1 for k in np.flatnonzero((here & before & far) | after_gap))

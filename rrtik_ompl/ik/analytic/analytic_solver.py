@@ -102,9 +102,16 @@ def two_links(
     real = np.abs(cosine) <= 1.0 + REACH_TOLERANCE
     np.clip(cosine, -1.0, 1.0, out=cosine)
     square = (1.0 - cosine) * (1.0 + cosine)
+    # nearly stretched or folded: rounding must not part what is one posture
     square[square < DOUBLE_ROOT] = 0.0
     sine = np.sqrt(square)
-    along, across = first + second * cosine, second * sine
-    ax, ay, cx, cy = along * x, along * y, across * x, across * y
+
+    along = first + second * cosine
+    across = second * sine
+    ax = along * x
+    ay = along * y
+    cx = across * x
+    cy = across * y
+
     turn = np.arctan2(sine, cosine)
     return np.stack([np.arctan2(ay - cx, ax + cy), np.arctan2(ay + cx, ax - cy)]), np.stack([turn, -turn]), real

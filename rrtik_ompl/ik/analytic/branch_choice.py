@@ -60,16 +60,21 @@ def nearest(
     goals = np.asarray(targets, dtype=np.float64)
     hints = np.broadcast_to(np.asarray(near, dtype=np.float64), (len(goals), robot.dof))
     scale = np.ones(robot.dof) if weights is None else finite_array(weights, (robot.dof,), "weights")
+
     found = solutions(robot, goals, near=hints, check=False)
     cost = np.where(found.valid, _distance(robot, found.branches, hints[:, None], scale), np.inf)
     margin = np.min(np.minimum(found.branches - robot.lower, robot.upper - found.branches), axis=2)
     least = cost.min(axis=1)
     best = np.argmax(np.where(cost <= least[:, None] + TIE, margin, -np.inf), axis=1)
-    q, reached = found.branches[np.arange(len(goals)), best].copy(), np.isfinite(least)
+
+    q = found.branches[np.arange(len(goals)), best].copy()
+    reached = np.isfinite(least)
     for k in np.flatnonzero(found.singular):  # few: singular poses are rare, and each has a curve to search
         member, distance = _nearest_member(robot, goals[k], hints[k], scale)
         if distance < least[k]:
-            q[k], reached[k] = member, True
+            q[k] = member
+            reached[k] = True
+
     q[~reached] = np.nan
     return q, reached
 
@@ -85,7 +90,11 @@ def _nearest_member(robot: Robot, goal: Matrix, near: Vector, scale: Vector) -> 
     A sweep over the whole curve, then ever finer sweeps around the best value of the free angle.
     """
     free = list(form_of(robot).free)
-    member, least, centre, width = near, np.inf, 0.0, np.pi
+    member = near
+    least = np.inf
+    centre = 0.0
+    width = np.pi
+
     for _ in range(REFINEMENTS):
         hints = np.tile(near, (SWEEP + 1, 1))
         values = centre + width * np.linspace(-1.0, 1.0, SWEEP + 1)
@@ -94,9 +103,12 @@ def _nearest_member(robot: Robot, goal: Matrix, near: Vector, scale: Vector) -> 
         found = solutions(robot, np.broadcast_to(goal, (len(hints), *goal.shape)), near=hints, check=False)
         distance = np.where(found.valid, _distance(robot, found.branches, near, scale), np.inf)
         row, branch = np.unravel_index(int(np.argmin(distance)), distance.shape)
+
         if distance[row, branch] < least:
-            member, least = found.branches[row, branch], float(distance[row, branch])
-        centre, width = values[row], 4.0 * width / SWEEP
+            member = found.branches[row, branch]
+            least = float(distance[row, branch])
+        centre = values[row]
+        width = 4.0 * width / SWEEP
     return member, least
 
 
@@ -126,22 +138,29 @@ def follow(
     goals = np.asarray(targets, dtype=np.float64)
     if len(goals) == 0:
         raise InputError("targets: a trajectory needs at least one point")
+
     found = solutions(robot, goals, near=near, check=False)
     before = np.zeros((1, robot.dof)) if near is None else robot.configuration(near)[None]
     cost = np.zeros(1)
     layers: list[_Layer] = []
+
     for k in range(len(goals)):
         q, tags = _candidates(robot, goals[k], found, k, before)
         if accept is not None and len(q):
             good = accept(q)
-            q, tags = q[good], tags[good]
+            q = q[good]
+            tags = tags[good]
+
         parent = np.zeros(len(q), dtype=np.int64)
         if len(q):
+            # the first point costs nothing, unless there is a posture before it
             price = _price(robot, q, before, jump) if near is not None or any(len(each.q) for each in layers) else 0.0
             total = price + np.broadcast_to(cost, (len(q), len(before)))
             parent = np.argmin(total, axis=1)
-            before, cost = q, total[np.arange(len(q)), parent]
+            before = q
+            cost = total[np.arange(len(q)), parent]
         layers.append(_Layer(q, tags, parent))
+
     return _track(robot, layers, int(np.argmin(cost)), None if near is None else robot.configuration(near), jump)
 
 
@@ -168,6 +187,7 @@ def _candidates(
     if not found.singular[k]:
         tags = np.flatnonzero(found.valid[k])
         return _in_every_turn(robot, found.branches[k, tags], tags)
+
     close = solutions(robot, np.broadcast_to(goal, (len(before), *goal.shape)), near=before, check=False)
     hints, tags = np.nonzero(close.valid)
     q = close.branches[hints, tags]
@@ -182,7 +202,8 @@ def _in_every_turn(robot: Robot, q: Matrix, tags: NDArray[np.int64]) -> tuple[Ma
     """
     span = robot.upper - robot.lower
     for joint in np.flatnonzero(~robot.prismatic & ~robot.continuous & (span >= TAU)):
-        rows, owners = [q], [tags]
+        rows = [q]
+        owners = [tags]
         most = int(span[joint] / TAU)
         for turn in (*range(-most, 0), *range(1, most + 1)):
             other = q.copy()
@@ -190,22 +211,32 @@ def _in_every_turn(robot: Robot, q: Matrix, tags: NDArray[np.int64]) -> tuple[Ma
             fits = inside_limits(robot, other)
             rows.append(other[fits])
             owners.append(tags[fits])
+
         if sum(map(len, rows)) > MOST_TURNED:
             break
-        q, tags = np.vstack(rows), np.concatenate(owners)
+        q = np.vstack(rows)
+        tags = np.concatenate(owners)
     return q, tags
 
 
 def _track(robot: Robot, layers: list[_Layer], last: int, near: Vector | None, jump: float) -> Track:
     """Read the way backwards from its last candidate, then say where it jumps, changes the branch or has a gap."""
     labels = form_of(robot).branches
-    q, branch = np.full((len(layers), robot.dof), np.nan), [""] * len(layers)
+    q = np.full((len(layers), robot.dof), np.nan)
+    branch = [""] * len(layers)
+
     for k in range(len(layers) - 1, -1, -1):
         if len(layers[k].q):
-            q[k], branch[k] = layers[k].q[last], labels[layers[k].tags[last]]
+            q[k] = layers[k].q[last]
+            branch[k] = labels[layers[k].tags[last]]
             last = int(layers[k].parent[last])
+
     gaps = [k for k, label in enumerate(branch) if not label]
-    jumps, changes, previous, label = [], [], near, ""
+    jumps = []
+    changes = []
+    previous = near
+    label = ""
+
     for k in range(len(layers)):
         if not branch[k]:
             continue
@@ -216,5 +247,7 @@ def _track(robot: Robot, layers: list[_Layer], last: int, near: Vector | None, j
                 jumps.append(k)
         if label not in ("", branch[k]):
             changes.append(k)
-        previous, label = q[k], branch[k]
+        previous = q[k]
+        label = branch[k]
+
     return Track(frozen(q), tuple(branch), tuple(jumps), tuple(changes), tuple(gaps))

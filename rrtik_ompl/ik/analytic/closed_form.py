@@ -94,9 +94,11 @@ def branches_of(
     fault = tip_fault(robot, form)
     if fault:
         raise InputError(f"robot '{robot.name}': {fault}; method 'numeric' fits every tip")
+
     answers = kernel_branches(robot, form, poses, hints, slack, check)
     if answers is None:
         answers = reference_branches(robot, form, poses, hints, slack, check)
+
     for array in answers:
         array.setflags(write=False)
     q, real, valid, singular, residuals = answers
@@ -118,11 +120,13 @@ def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP, slack: floa
     form = form_of(robot)
     near = np.zeros((samples, robot.dof))
     near[:, list(form.free)] = np.linspace(-np.pi, np.pi, samples, endpoint=False)[:, None]
+
     goal = np.asarray(target, dtype=np.float64)
     found = solutions(robot, goal[None], slack=slack, check=False)
     if found.singular[0]:
         many = np.broadcast_to(goal, (samples, *goal.shape))
         found = solutions(robot, many, near=near, slack=slack, check=False)
+
     rows: Matrix = found.branches.transpose(1, 0, 2)[found.valid.T]
     new = np.abs(np.diff(rows, axis=0, prepend=np.full((1, robot.dof), np.inf))).max(axis=1) > SAME_ANGLE
     different: Matrix = rows[new]
@@ -149,20 +153,24 @@ def check_poses(poses: NDArray[np.float64], what: str) -> None:
     """
     if len(poses) == 0:
         return
+
     columns = np.ascontiguousarray(poses[:, :3, :3].transpose(2, 1, 0))  # products of these beat small matrices
     off = np.zeros(len(poses))
     with np.errstate(over="ignore", invalid="ignore"):
         for j, k in combinations_with_replacement(range(3), 2):
             np.maximum(off, np.abs((columns[j] * columns[k]).sum(axis=0) - (j == k)), out=off)
+
     worst = int(np.argmax(off))
     if not off[worst] <= NOT_RIGID:
         raise InputError(
             f"{what}: entry {worst} is no rotation: its columns are {off[worst]:.3g} away from orthonormal "
             f"(at most {NOT_RIGID:g}); make it orthonormal"
         )
+
     mirrored = np.flatnonzero(left_handed(*columns))
     if len(mirrored):
         raise InputError(f"{what}: entry {mirrored[0]} mirrors (determinant -1); a rotation is right-handed")
+
     odd = np.flatnonzero((np.abs(poses[:, 3] - LAST_ROW) > LAST_ROW_TOLERANCE).any(axis=1))
     if len(odd):
         raise InputError(f"{what}: the last row of entry {odd[0]} must be 0 0 0 1, got {poses[odd[0], 3].tolist()}")

@@ -33,19 +33,24 @@ class PlanarArm:
     def solve(self, poses: NDArray[np.float64], *_: object) -> Branches:
         """Both branches for T_base_tip, shape (m, 4, 4); nothing else is used, for no pose is singular."""
         targets = self.to_plane @ poses
-        point, real = targets[:, :2, 3], np.abs(targets[:, 2, 3] - self.tip[2, 3]) <= IN_PLANE
+        point = targets[:, :2, 3]
+        real = np.abs(targets[:, 2, 3] - self.tip[2, 3]) <= IN_PLANE
+
         heading = np.zeros(len(poses))
         if len(self.links) == 3:
             turn = targets[:, :3, :3] @ self.tip[:3, :3].T
             real &= np.linalg.norm(turn[:, :2, 2], axis=1) <= IN_PLANE
             heading = np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1])
             point = point - _turned(self.links[2], heading)
-        lengths, angles = np.linalg.norm(self.links, axis=1), np.arctan2(self.links[:, 1], self.links[:, 0])
+
+        lengths = np.linalg.norm(self.links, axis=1)
+        angles = np.arctan2(self.links[:, 1], self.links[:, 0])
         first, second, reached = two_links(float(lengths[0]), float(lengths[1]), *point.T)
         joints = [first - angles[0], second - angles[1] + angles[0]]
         if len(self.links) == 3:
             joints.append(heading - joints[0] - joints[1])
         q = wrapped(np.stack(joints)).transpose(2, 1, 0)
+
         return Branches(q, np.repeat((real & reached)[:, None], 2, axis=1), np.zeros(len(poses), dtype=np.uint8))
 
     def nearness(self, Q: Matrix) -> dict[str, Vector]:
@@ -61,17 +66,20 @@ def planar_form(robot: Robot) -> AnalyticSolver | None:
     plain = np.array_equal(chain.gain, np.eye(robot.dof)) and not chain.offset.any() and not robot.prismatic.any()
     if robot.dof not in (2, 3) or not plain or (chain.parent != np.arange(-1, robot.dof - 1)).any():
         return None
+
     zero = np.zeros(robot.dof)
     T_base_world = np.linalg.inv(robot.fk_batch(zero, robot.link_names[0])[0])
     frames = T_base_world @ robot.joint_frames(zero)[0, 1:]
     axes = np.einsum("kij,kj->ki", frames[:, :3, :3], chain.axis)
     if np.abs(axes - axes[0]).max() > IN_PLANE:
         return None
+
     to_plane = np.asarray(np.linalg.inv(_plane(frames[0, :3, 3], axes[0])), dtype=np.float64)
     places = to_plane @ np.concatenate([frames, T_base_world @ robot.fk_batch(zero)])
     links = np.diff(places[:, :2, 3], axis=0)
     if (np.linalg.norm(links[:2], axis=1) < IN_PLANE).any():
         return None
+
     arm = PlanarArm(to_plane, links, places[-1])
     kind = "position" if robot.dof == 2 else "pose"
     return AnalyticSolver(robot.tip, kind, BRANCHES, (), (), arm.solve, arm.nearness)
@@ -82,10 +90,12 @@ def _plane(origin: Vector, axis: Vector) -> NDArray[np.float64]:
     across = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)
     x = across / np.linalg.norm(across)
     plane = np.eye(4)
-    plane[:3, :3], plane[:3, 3] = np.column_stack([x, np.cross(axis, x), axis]), origin
+    plane[:3, :3] = np.column_stack([x, np.cross(axis, x), axis])
+    plane[:3, 3] = origin
     return plane
 
 
 def _turned(link: Vector, angle: Vector) -> Matrix:
-    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine = np.cos(angle)
+    sine = np.sin(angle)
     return np.column_stack([link[0] * cosine - link[1] * sine, link[0] * sine + link[1] * cosine])

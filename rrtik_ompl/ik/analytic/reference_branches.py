@@ -50,7 +50,8 @@ def _block(
 ) -> list[NDArray[Any]]:
     """The same for as many targets as the cache has room for."""
     found = form(_placed(robot, form, poses), hints, slack, (robot.lower, robot.upper))
-    q, real = np.array(found.q.T, order="C"), np.array(found.real.T)
+    q = np.array(found.q.T, order="C")
+    real = np.array(found.real.T)
     valid = real & _turn_inside(robot, q, hints)
     residuals = tip_residuals(robot, q, poses, form.kind == "pose") if check else np.zeros((0, *real.shape))
     return [q, real, valid, np.array(found.singular), residuals]
@@ -69,8 +70,8 @@ def mountings(robot: Robot, form: AnalyticSolver) -> tuple[Matrix | None, Matrix
     """T_base_world and T_tip_frame, None where they are the identity."""
     frames = robot.model.frames
     base, tip, own = (frames[robot.model.getFrameId(name)] for name in (robot.link_names[0], robot.tip, form.frame))
-    mountings = (base.placement.inverse().homogeneous, (tip.placement.inverse() * own.placement).homogeneous)
-    before, after = (None if np.array_equal(matrix, np.eye(4)) else matrix for matrix in mountings)
+    placements = (base.placement.inverse().homogeneous, (tip.placement.inverse() * own.placement).homogeneous)
+    before, after = (None if np.array_equal(each, np.eye(4)) else each for each in placements)
     return before, after
 
 
@@ -84,7 +85,9 @@ def _turn_inside(robot: Robot, q: NDArray[np.float64], near: Matrix | None) -> N
     """
     inside = np.ones(q.shape[1:], dtype=bool)
     for joint in np.flatnonzero(~robot.prismatic):
-        low, high, values = robot.lower[joint], robot.upper[joint], q[joint]
+        low = robot.lower[joint]
+        high = robot.upper[joint]
+        values = q[joint]
         if low < -np.pi or high > np.pi:
             centre = 0.0 if near is None else near[:, joint]
             values[:] = _full_turns(values, low - LIMIT_TOLERANCE, high + LIMIT_TOLERANCE, centre)
@@ -100,14 +103,6 @@ def _full_turns(
     nearest = nearest - TAU * np.ceil(np.maximum(nearest - high, 0.0) / TAU)
     inside: NDArray[np.float64] = nearest + TAU * np.ceil(np.maximum(low - nearest, 0.0) / TAU)
     return inside
-
-
-def _tips(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Columns x, y, z and position of the tip for q of shape (dof, b, m), shape (4, 3, b, m)."""
-    rows = q.reshape(robot.dof, -1).T
-    if len(rows) > FEW:
-        return tip_columns(robot).poses(q)
-    return poses(robot, rows)[:, :3].T.reshape(4, 3, *q.shape[1:])
 
 
 def tip_residuals(
@@ -127,9 +122,19 @@ def tip_residuals(
     tips = _tips(robot, q)
     off = tips - poses[:, :3].transpose(2, 1, 0)[:, :, None]
     off *= off
+
     residuals = np.zeros((2, *tips.shape[2:]))
     residuals[0] = np.sqrt(off[3].sum(axis=0))
     if oriented:  # |R1 - R2| = 2 sqrt(2) sin(angle / 2), accurate for small angles
         chord = np.sqrt(off[:3].sum(axis=(0, 1)) / 8.0)
         residuals[1] = 2.0 * np.arcsin(np.minimum(chord, 1.0))
+
     return residuals
+
+
+def _tips(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns x, y, z and position of the tip for q of shape (dof, b, m), shape (4, 3, b, m)."""
+    rows = q.reshape(robot.dof, -1).T
+    if len(rows) > FEW:
+        return tip_columns(robot).poses(q)
+    return poses(robot, rows)[:, :3].T.reshape(4, 3, *q.shape[1:])

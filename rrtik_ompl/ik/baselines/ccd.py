@@ -35,7 +35,8 @@ def ccd(
     Returns:
         Where each start has led to, shape (m, dof), and the sweeps taken.
     """
-    joints, length = joints_to_tip(robot)[::-1], AXIS_LENGTH * reach_of(robot)
+    joints = joints_to_tip(robot)[::-1]
+    length = AXIS_LENGTH * reach_of(robot)
     return walked(robot, goal, starts, lambda Q: _sweep(robot, goal, Q, joints, length), sweeps, enough)
 
 
@@ -43,16 +44,19 @@ def _sweep(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...], len
     """Every joint once; the frames before a joint stay where they were, so that one forward kinematics is enough."""
     frames = robot.chain.joint_frames(Q)
     tips = poses(robot, Q)
+
     wanted = np.zeros((1, 4 if goal.oriented else 1, 3))
     wanted[0, 0] = goal.point
     points = tips[:, None, :3, 3]
     if goal.oriented:
         wanted[0, 1:] = wanted[0, 0] + length * goal.pose.rotation.T
         points = np.concatenate([points, points + length * tips[:, :3, :3].transpose(0, 2, 1)], axis=1)
+
     for joint in joints:
         axis = frames[:, joint.row + 1, :3, :3] @ robot.chain.axis[joint.row]
         origin = frames[:, joint.row + 1, None, :3, 3]
         points = _move(robot, joint, Q, axis, origin, points, wanted)
+
     return Q
 
 
@@ -75,5 +79,6 @@ def _move(
         swing = Swing.about(axis, points - origin)
         shift = swing.best(wanted - origin, low, high)
         points = origin + swing.turned(shift)
+
     Q[:, column] = np.clip(Q[:, column] + shift / joint.gain, robot.lower[column], robot.upper[column])
     return points

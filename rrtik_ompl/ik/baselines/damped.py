@@ -18,7 +18,10 @@ from rrtik_ompl.model.robot import Robot, jacobians, pinocchio_rows, poses
 ITERATIONS = 200
 DAMPING = 0.05  # [m] or [rad]; constant, squared where it is used
 LARGEST_STEP = 0.5  # [rad] or [m] of any joint
-STEPS, STEP, TINY, CLOSE = 1000, 0.1, 1e-12, 1e-4  # of Pinocchio's iteration
+STEPS = 1000  # of Pinocchio's iteration, at most
+STEP = 0.1  # of it: the share of the error that one removes
+TINY = 1e-12  # its damping
+CLOSE = 1e-4  # [m] and [rad], the norm of the error at which it ends
 
 
 def damped_least_squares(
@@ -59,24 +62,31 @@ def pinocchio_iteration(robot: Robot, goal: Target, starts: Matrix) -> tuple[Mat
 
 
 def _one_start(robot: Robot, goal: Target, q: Vector) -> tuple[Vector, int]:
-    model, data = robot.model, working_memory(robot.model)
+    model = robot.model
+    data = working_memory(robot.model)
     frame = model.getFrameId(robot.tip)
     steps = 0
+
     while steps < STEPS:
         full = pinocchio_rows(robot, q[None])[0]
         pin.framesForwardKinematics(model, data, full)
         J = np.reshape(pin.computeFrameJacobian(model, data, full, frame, pin.ReferenceFrame.LOCAL), (6, -1))
         J = J @ robot.chain.gain
         here = data.oMf[frame]
+
         if not goal.oriented:
-            error, J = here.actInv(goal.point), J[:3]
+            error = here.actInv(goal.point)
+            J = J[:3]
         else:
             away = here.actInv(goal.pose)
-            error, J = pin.log6(away).vector, pin.Jlog6(away.inverse()) @ J
+            error = pin.log6(away).vector
+            J = pin.Jlog6(away.inverse()) @ J
+
         if np.linalg.norm(error) < CLOSE:
             break
         q = q + STEP * (J.T @ np.linalg.solve(J @ J.T + TINY * np.eye(len(J)), error))
         steps += 1
+
     return _into_limits(robot, q), steps
 
 

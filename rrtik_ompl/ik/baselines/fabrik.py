@@ -55,25 +55,18 @@ def _pass(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...]) -> M
     points = np.concatenate([frames[:, rows][..., :3, 3], tips[:, None, :3, 3]], axis=1)
     axes = np.einsum("mkij,kj->mki", frames[:, rows][..., :3, :3], robot.chain.axis[[joint.row for joint in joints]])
     pulled = _pulled(points, goal)
+
     for k, joint in enumerate(joints):
-        axis, origin = axes[:, k], points[:, k, None]
+        axis = axes[:, k]
+        origin = points[:, k, None]
         rest = Swing.about(axis, points[:, k + 1 :] - origin)
         weights = _weights(robot, len(joints) - k)
         angle = rest.best((pulled[:, k + 1 :] - origin) * weights[:, None], *room(robot, joint, Q))
         points[:, k + 1 :] = origin + rest.turned(angle)
         axes[:, k + 1 :] = Swing.about(axis, axes[:, k + 1 :]).turned(angle)
         Q[:, joint.column] += angle / joint.gain
+
     return robot.clamp(Q)
-
-
-def _weights(robot: Robot, points: int) -> Vector:
-    """What the points that a joint moves count in its angle: in the plane the next one alone, in space all of them."""
-    weights = np.ones(points)
-    if robot.planar:
-        weights[1:] = 0.0
-    else:
-        weights[-1] = TIP_WEIGHT
-    return weights
 
 
 def _pulled(points: NDArray[np.float64], goal: Target) -> NDArray[np.float64]:
@@ -86,3 +79,13 @@ def _pulled(points: NDArray[np.float64], goal: Target) -> NDArray[np.float64]:
         length = np.linalg.norm(points[:, k + 1] - points[:, k], axis=1, keepdims=True)
         pulled[:, k] = pulled[:, k + 1] + away * (length / np.where(distance > 0.0, distance, 1.0))
     return pulled
+
+
+def _weights(robot: Robot, points: int) -> Vector:
+    """What the points that a joint moves count in its angle: in the plane the next one alone, in space all of them."""
+    weights = np.ones(points)
+    if robot.planar:
+        weights[1:] = 0.0
+    else:
+        weights[-1] = TIP_WEIGHT
+    return weights

@@ -76,10 +76,15 @@ class Swing:
 
         Where the angle does not matter (vectors on the axis) 0, or the end nearest to it.
         """
-        A, B = (self.outward * wanted).sum(axis=(1, 2)), (self.ahead * wanted).sum(axis=(1, 2))
+        A = (self.outward * wanted).sum(axis=(1, 2))
+        B = (self.ahead * wanted).sum(axis=(1, 2))
         best = np.arctan2(B, A)
+
+        # by full turns into the limits, from below, then from above
         best = best + TAU * np.ceil((low - best) / TAU).clip(0.0, None)
         best = best - TAU * np.ceil((best - high) / TAU).clip(0.0, None)
+
+        # where no turn of it is inside, the better end of the two
         lower_end = A * np.cos(low) + B * np.sin(low) >= A * np.cos(high) + B * np.sin(high)
         inside = (best >= low) & (best <= high)
         angle: Vector = np.where(inside, best, np.where(lower_end, low, high))
@@ -87,7 +92,8 @@ class Swing:
 
     def turned(self, angle: Vector) -> NDArray[np.float64]:
         """The vectors turned by angles, shape (m,)."""
-        cosine, sine = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
+        cosine = np.cos(angle)[:, None, None]
+        sine = np.sin(angle)[:, None, None]
         rotated: NDArray[np.float64] = self.vectors + sine * self.ahead - (1.0 - cosine) * self.outward
         return rotated
 

@@ -18,7 +18,8 @@ from rrtik_ompl.model.robot import Robot
 
 PARTICLES = 32  # of a swarm
 ITERATIONS = 400
-CONSTRICTION, ATTRACTION = 0.7298, 1.49618
+CONSTRICTION = 0.7298  # of the motion before, with which [29] makes swarms come to rest
+ATTRACTION = 1.49618  # most of the way to the own best place, and to the swarm's
 ORIENTATION_WEIGHT = 0.3  # [m/rad]; with 0.1 or 1 swarms of TITAN-4 and Panda arrived half as often
 
 Swarms: TypeAlias = NDArray[np.float64]  # shape (swarms, particles, dof)
@@ -53,18 +54,26 @@ def swarm(
     rng = np.random.default_rng(np.frombuffer(np.ascontiguousarray(starts).tobytes(), dtype=np.uint32))
     swarms = max(1, len(starts) // PARTICLES)
     place = robot.clamp(starts[: len(starts) // swarms * swarms]).reshape(swarms, -1, robot.dof)
-    before, own = place, place
+
+    before = place
+    own = place
     least = np.full(place.shape[:2], np.inf)
     each = np.arange(swarms)
+
     for iteration in range(iterations):
         cost = _cost(robot, goal, place.reshape(-1, robot.dof)).reshape(least.shape)
         better = cost < least
-        own, least = np.where(better[..., None], place, own), np.minimum(cost, least)
+        own = np.where(better[..., None], place, own)
+        least = np.minimum(cost, least)
         leader = own[each, np.argmin(least, axis=1)]
+
         if goal.satisfied(robot, leader).any():
             return leader, iteration
+
         moved = robot.clamp(move(rng, place, before, own, leader[:, None]))
-        before, place = place, moved
+        before = place
+        place = moved
+
     return leader, iterations
 
 

@@ -19,14 +19,18 @@ def children(rng: np.random.Generator, genes: Genes, cost: Vector, options: Gene
         options: Size of the tournament and rates of mutation.
     """
     parents = genes[_winners(rng, cost, options.tournament)]
+
     half = len(genes) // 2
-    mother, father = parents[:half], parents[half:]
+    mother = parents[:half]
+    father = parents[half:]
     exchange = rng.integers(0, LARGEST + 1, mother.shape, dtype=np.uint16) & (mother ^ father)
     brood = np.concatenate([mother ^ exchange, father ^ exchange])
+
     if options.bit_mutation:
         _flip_bits(rng, brood, options.bit_mutation)
     if options.gene_mutation:
         _flip_genes(rng, brood, options.gene_mutation)
+
     return brood
 
 

@@ -51,15 +51,18 @@ def score(
     reached = distance < near
     if target.oriented:
         reached &= angle < turned
+
     cost = distance + options.orientation_weight * angle
     if options.motion_weight and last is not None:
         cost += options.motion_weight * np.linalg.norm(joint_difference(robot, Q, last), axis=1)
     if options.singularity_weight:
         cost -= options.singularity_weight * manipulability(robot, Q, not target.oriented)
+
     good = accept(Q)
     if not good.all():
         reached &= good
         cost += reach_of(robot) * ~good
+
     return Score(cost, distance, angle, reached)
 
 

@@ -58,10 +58,12 @@ class GeneticOptions:
         for name in ("population", "tournament", "generations", "stall", "start_over", "refined"):
             if getattr(self, name) is not None:
                 whole_number(getattr(self, name), f"genetic: {name}", least=name != "refined")
+
         if self.population < 2 or self.population % 2:
             raise InputError(f"genetic: population must be an even number of at least 2, got {self.population}")
         if not 0 <= self.refined <= self.population:
             raise InputError(f"genetic: refined must lie between 0 and the population, got {self.refined}")
+
         for name in ("window", "largest_step"):
             value = getattr(self, name)
             if value is not None and not value > 0:

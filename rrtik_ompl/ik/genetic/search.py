@@ -91,15 +91,24 @@ class GaRun:
         accept: Callable[[Matrix], Mask] | None,
         near: Vector | None,
     ) -> None:
-        self.robot, self.targets, self.options, self.rng = robot, targets, options, rng
-        self.accept, self.near = accept, near
+        self.robot = robot
+        self.targets = targets
+        self.options = options
+        self.rng = rng
+        self.accept = accept
+        self.near = near
         dimensions = 6 if targets[0].oriented else 3
         self.gain = options.gain if options.gain is not None else float(robot.dof <= dimensions)
-        self.generation, self.fresh, self.attempts = 0, 0, 0
+
+        self.generation = 0
+        self.fresh = 0
+        self.attempts = 0
         self.distances: list[float] = []
         self.farthest: list[Vector] = []
         self.costs_farthest: list[int] = []
-        self.nearest, self.least = robot.clamp(np.zeros(robot.dof)), np.inf
+        self.nearest = robot.clamp(np.zeros(robot.dof))
+        self.least = np.inf
+
         self.begin()
 
     def begin(self) -> None:
@@ -117,7 +126,8 @@ class GaRun:
         """A random population."""
         self.genes = random_genes(self.rng, self.options.population, self.robot.dof)
         self.exact = np.zeros((0, self.robot.dof))  # refined individuals, not rounded to 16 bits: the first rows
-        self.best, self.standing = np.inf, 0
+        self.best = np.inf
+        self.standing = 0
 
     @property
     def last(self) -> Vector | None:
@@ -129,9 +139,11 @@ class GaRun:
         Q = self.window.decode(self.genes)
         Q[: len(self.exact)] = self.exact
         scored = score(self.robot, self.targets[len(self.points)], Q, self.last, self.options, self.will_do)
+
         self.generation += 1
         self.since_point += 1
         self.remember(Q, scored)
+
         if scored.reached.any():
             self.advance(Q[int(np.argmin(np.where(scored.reached, scored.cost, np.inf)))])
         elif self.options.start_over is not None and self.since_point >= self.options.start_over:
@@ -156,16 +168,23 @@ class GaRun:
         best = int(np.argmin(scored.cost))
         self.distances.append(float(scored.distance[best]))
         if len(self.points) >= len(self.farthest) and scored.cost[best] < self.least:
-            self.nearest, self.least = Q[best].copy(), float(scored.cost[best])
+            self.nearest = Q[best].copy()
+            self.least = float(scored.cost[best])
 
     def advance(self, q: Vector) -> None:
         """A point is gained: place the window for the next one; the bit strings stay as they are."""
         self.costs.append(self.since_point)
         self.points.append(q.copy())
-        self.since_point, self.best, self.standing = 0, np.inf, 0
+        self.since_point = 0
+        self.best = np.inf
+        self.standing = 0
         self.exact = self.exact[:0]
+
         if len(self.points) > len(self.farthest):
-            self.farthest, self.costs_farthest, self.least = self.points.copy(), self.costs.copy(), np.inf
+            self.farthest = self.points.copy()
+            self.costs_farthest = self.costs.copy()
+            self.least = np.inf
+
         if self.options.window is not None:
             step = q - self.points[-2] if len(self.points) > 1 else 0.0
             most = np.inf if self.options.largest_step is None else self.options.largest_step
@@ -175,7 +194,8 @@ class GaRun:
     def has_stalled(self, cost: float) -> bool:
         """Whether the best cost has not improved for as long as the options allow."""
         if cost < self.best - (1.0 - IMPROVEMENT) * abs(self.best) or not np.isfinite(self.best):
-            self.best, self.standing = cost, 0
+            self.best = cost
+            self.standing = 0
         else:
             self.standing += 1
         return self.options.stall is not None and self.standing >= self.options.stall

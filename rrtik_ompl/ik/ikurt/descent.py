@@ -38,21 +38,32 @@ def descend(metric: TipMetric, Q: Matrix, lower: Vector, upper: Vector, *, itera
     """Walk from each row of Q, shape (m, n), towards the goal, inside bounds of shape (n,)."""
     length = reach(metric.robot) * metric.unit
     enough = min(ACCURACY * length, SHARE * metric.radius)
-    best, best_distance = Q.copy(), np.full(len(Q), np.inf)
+    best = Q.copy()
+    best_distance = np.full(len(Q), np.inf)
     history = np.full((STALE, len(Q)), np.inf)
-    rows, q = np.arange(len(Q)), Q
+    rows = np.arange(len(Q))
+    q = Q
+
     for step in range(iterations):
         metric.evaluations += len(rows)
         tips, J = poses_and_jacobians(metric.robot, q)
         e, distance = metric.pull(tips)
+
         better = distance < best_distance[rows]
-        best[rows[better]], best_distance[rows[better]] = q[better], distance[better]
+        best[rows[better]] = q[better]
+        best_distance[rows[better]] = distance[better]
+
         going = (distance > enough) & (best_distance[rows] < FALLS * history[step % STALE, rows])
         history[step % STALE, rows] = best_distance[rows]
         if not going.any():
             break
-        rows, q, J, e = rows[going], q[going], J[going], e[going] / length
+
+        rows = rows[going]
+        q = q[going]
+        J = J[going]
+        e = e[going] / length
         q = _stepped(q, J * (metric.scale / length)[:, None], e, lower, upper)
+
     return Descent(best, best_distance)
 
 

@@ -54,7 +54,9 @@ class TipMetric:
     def __init__(
         self, robot: Robot, targets: list[Target], *, metres_per_radian: float | None = None, unit: float = 1.0
     ) -> None:
-        self.robot, self.targets, self.unit = robot, targets, unit
+        self.robot = robot
+        self.targets = targets
+        self.unit = unit
         self.metres_per_radian = reach(robot) / TAU * REACH_PER_TURN
         if metres_per_radian is not None:
             self.metres_per_radian = metres_per_radian
@@ -113,7 +115,9 @@ class ConfigurationMetric:
     """
 
     def __init__(self, goals: Matrix, radius: float = JOINT_RADIUS) -> None:
-        self.goals, self.evaluations, self.radius = goals, 0, radius
+        self.goals = goals
+        self.evaluations = 0
+        self.radius = radius
 
     def distance(self, Q: Matrix) -> Vector:
         """See :class:`Metric`."""

@@ -58,8 +58,13 @@ class PublishedSearch:
         rng: np.random.Generator,
         start: Vector,
     ) -> None:
-        self._metric, self._steps, self._lower, self._upper = metric, steps, lower, upper
-        self._free, self._stop, self._rng = motion_free, stop, rng
+        self._metric = metric
+        self._steps = steps
+        self._lower = lower
+        self._upper = upper
+        self._free = motion_free
+        self._stop = stop
+        self._rng = rng
         self.tree = IkurtTree(start[None], metric.distance(start[None]))
         self.connects = 0
 
@@ -71,6 +76,8 @@ class PublishedSearch:
             vertex, reached = self._connect(vertex)
             if reached:
                 return vertex
+
+            # one step of a basic RRT after every failure
             q_rand = self._random()
             near = int(self.tree.nearest(q_rand[None])[0])
             q_new = self._inside(_extend(self.tree.q[near], q_rand, self._steps.step))
@@ -80,7 +87,8 @@ class PublishedSearch:
 
     def _connect(self, near: int) -> tuple[int, bool]:
         """Algorithm 5: step after step, until one is blocked; the last vertex, and whether it is at the goal."""
-        delta, missed = self._steps.step, 0
+        delta = self._steps.step
+        missed = 0
         q_near = self.tree.q[near].copy()
         while not self._stop():
             q_new = self._towards_any(q_near, delta)
@@ -89,9 +97,13 @@ class PublishedSearch:
                 if missed > self._steps.misses:
                     break
                 continue
-            missed, away = 0, self._distance(q_new)
+
+            missed = 0
+            away = self._distance(q_new)
             if away < self.tree.distance[near]:
-                near, q_near = self._add(q_new, near, away), q_new
+                near = self._add(q_new, near, away)
+                q_near = q_new
+
             best = float(self.tree.distance[near])
             if best <= self._steps.accuracy:
                 return near, True
@@ -106,6 +118,7 @@ class PublishedSearch:
         return self._inside(q + direction * (delta / np.linalg.norm(direction)))
 
     def _inside(self, q: Vector) -> Vector:
+        # as published, samples lie inside the limits, and with them all steps towards samples
         return q if self._steps.beyond == 0.0 and not self._steps.even else np.clip(q, self._lower, self._upper)
 
     def _distance(self, q: Vector) -> float:

@@ -22,9 +22,12 @@ from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import IkurtTree
 
 DIRECTIONS = 16  # that CONNECT tries at once
-PATIENCE, FALL = 8, 0.8  # CONNECT goes on as long as so many rounds bring the distance down to this share,
+PATIENCE = 8  # CONNECT goes on as long as so many rounds bring the distance down
+FALL = 0.8  # to this share,
 SLOW_FALL = 0.97  # or to this one where there is no other way to the goal
-GROWN, SHRUNK, SHORTEST = 1.5, 0.7, 7e-4  # of CONNECT's step after a success and a miss; its least share of the first
+GROWN = 1.5  # of CONNECT's step after a success,
+SHRUNK = 0.7  # after a miss,
+SHORTEST = 7e-4  # and at least, of the first step
 CHECKED = 4  # of the better directions, nearest to the goal first, whose motions are checked together
 NEARER = 0.5  # a new descent from the way of CONNECT when the distance has fallen to this share
 MAX_EXPLORATIONS = 256  # batches of exploration between two CONNECTs; one before the first, then always twice as many,
@@ -35,7 +38,7 @@ TOWARDS_OTHER = 0.5  # share of the samples that are the newest vertices of the 
 DESCENTS = 2  # from vertices of a batch of exploration,
 SCOUTS = 22  # and from samples anywhere, for other goal configurations
 RARE = 32  # once a goal configuration is known, descents follow one batch in so many
-MAX_GOALS = 64
+MAX_GOALS = 64  # configurations that are known; further ones do not become roots
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,14 +96,24 @@ class BatchedSearch:
         rng: np.random.Generator,
         starts: Matrix,
     ) -> None:
-        self._metric, self._options, self._lower, self._upper = metric, options, lower, upper
-        self._validity, self._rng, self._starts = validity, rng, starts
+        self._metric = metric
+        self._options = options
+        self._lower = lower
+        self._upper = upper
+        self._validity = validity
+        self._rng = rng
+        self._starts = starts
+
         self._distances = metric.distance(starts)
         self.goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
         self.tree = IkurtTree(starts, self._distances)
         self.back = IkurtTree(self.goals, np.zeros(len(self.goals)))
-        self._newest, self._batches = starts[:0], 0
-        self.connects = self.restarts = self._dropped = 0
+
+        self._newest = starts[:0]
+        self._batches = 0
+        self.connects = 0
+        self.restarts = 0
+        self._dropped = 0
         self.blocked = starts[:0]
         self._nearest: Vector = starts[self._distances.argmin()]
         self._least = float(self._distances.min())
@@ -120,6 +133,7 @@ class BatchedSearch:
         """The path to the goal, shape (k, n), or None if the time was up first."""
         if self._least <= self._metric.radius:
             return self.tree.branch(int(self._distances.argmin()))
+
         explored = 1
         path = self._finish(np.arange(self.tree.size))
         while path is None and not self._validity.stop():
@@ -127,6 +141,7 @@ class BatchedSearch:
                 path = self._explore()
                 if path is not None or self._validity.stop():
                     return path
+
             path = self._connect(self.tree.best())
             explored = min(2 * explored, MAX_EXPLORATIONS if self.back.size else MAX_EXPLORATIONS_WITH_CONNECT)
             if self.tree.size > self._options.most_vertices:
@@ -137,13 +152,16 @@ class BatchedSearch:
     def _connect(self, first: int) -> Matrix | None:
         """From one vertex down the metric; the path to the goal, or None at the end of the patience."""
         self.connects += 1
-        vertex, step = first, self._options.step
+        vertex = first
+        step = self._options.step
         shortest = SHORTEST * step
         path = self._finish(np.array([vertex]))
         tried_at = before = self.tree.distance[vertex]
+
         for number in count(1):
             if path is not None or self._validity.stop():
                 return path
+
             lower = self._downhill(vertex, step)
             step = max(step * (SHRUNK if lower is None else GROWN), shortest)
             vertex = vertex if lower is None else lower
@@ -152,7 +170,9 @@ class BatchedSearch:
                 path = self._finish(np.array([vertex]))
                 return self.tree.branch(vertex) if path is None else path
             if away < NEARER * tried_at:
-                path, tried_at = self._finish(np.array([vertex])), away
+                path = self._finish(np.array([vertex]))
+                tried_at = away
+
             if number % PATIENCE == 0:
                 if away > (FALL if self._options.jacobian else SLOW_FALL) * before:
                     break
@@ -167,6 +187,7 @@ class BatchedSearch:
         directions *= step / np.linalg.norm(directions, axis=1, keepdims=True)
         candidates = np.clip(q + directions, self._lower, self._upper)
         distances = self._metric.distance(candidates)
+
         order = np.argsort(distances)[:CHECKED]
         order = order[distances[order] < self.tree.distance[vertex]]
         free = self._validity.motions_free(np.broadcast_to(q, (len(order), len(q))), candidates[order])
@@ -180,13 +201,16 @@ class BatchedSearch:
         self._batches += 1
         forward = self.back.size == 0 or self._batches % 2 == 0
         tree, other = (self.tree, self.back) if forward else (self.back, self.tree)
+
         new = self._grow(tree)
         if len(new) == 0:
             return None
         self._newest = tree.q[new]
+
         path = self._join(tree, new, other) if other.size else None
         if path is not None:
             return path if forward else path[::-1]
+
         if forward and (len(self.goals) == 0 or self._batches % RARE == 0):
             return self._finish(self._worth_it(new), scouts=SCOUTS)
         return None
@@ -196,17 +220,23 @@ class BatchedSearch:
         samples = self._rng.uniform(self._lower, self._upper, (SAMPLES, len(self._lower)))
         drawn = min(int(TOWARDS_OTHER * SAMPLES), len(self._newest)) if self.back.size else 0
         samples[:drawn] = self._newest[:drawn]
+
         near = tree.nearest(samples)
         roots = tree.q[near]
-        ends, away = roots.copy(), samples - roots
+        ends = roots.copy()
+        away = samples - roots
         length = np.linalg.norm(away, axis=1)
         step = away * np.minimum(1.0, self._options.stride / np.maximum(length, 1e-12))[:, None]
-        going, moved = np.flatnonzero(length > 0.0), np.zeros(SAMPLES, dtype=bool)
+        going = np.flatnonzero(length > 0.0)
+        moved = np.zeros(SAMPLES, dtype=bool)
+
         for piece in PIECES:
             further = roots[going] + piece * step[going]
             free = self._validity.motions_free(roots[going], further)  # from the vertex on: an edge is asked as a whole
             going = going[free]
-            ends[going], moved[going] = further[free], True
+            ends[going] = further[free]
+            moved[going] = True
+
         return tree.add(ends[moved], near[moved], self._metric.distance(ends[moved]))
 
     def _worth_it(self, new: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -221,10 +251,12 @@ class BatchedSearch:
             return self._join(self.tree, vertices, self.back)
         if not self._options.jacobian:
             return None
+
         samples = self._rng.uniform(self._lower, self._upper, (scouts, len(self._lower)))
         origins = np.vstack([self.tree.q[vertices], samples])
         ends = descend(self._metric, origins, self._lower, self._upper)
         self._see(ends.q, ends.distance)
+
         arrived = ends.distance <= self._metric.radius
         near = arrived[: len(vertices)]
         path = self._straight(vertices[near], ends.q[: len(vertices)][near])
@@ -262,7 +294,8 @@ class BatchedSearch:
         """Remember the nearest to the goal of some configurations."""
         k = distances.argmin()
         if distances[k] < self._least:
-            self._nearest, self._least = Q[k].copy(), float(distances[k])
+            self._nearest = Q[k].copy()
+            self._least = float(distances[k])
 
     def _restart(self) -> None:
         self._see(self.tree.q, self.tree.distance)

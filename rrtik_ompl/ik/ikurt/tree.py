@@ -22,7 +22,8 @@ class IkurtTree:
     def __init__(self, roots: Matrix, distances: Vector) -> None:
         self._q = np.empty((max(FIRST_ROOM, len(roots)), roots.shape[1]))
         self._parent = np.empty(len(self._q), dtype=np.int64)
-        self._distance, self._rank = np.empty(len(self._q)), np.empty(len(self._q))
+        self._distance = np.empty(len(self._q))
+        self._rank = np.empty(len(self._q))
         self.size = 0
         self.add(roots, np.full(len(roots), -1), distances)
 
@@ -41,7 +42,8 @@ class IkurtTree:
         while self.size + len(q) > len(self._q):
             self._grow()
         numbers = np.arange(self.size, self.size + len(q))
-        self._q[numbers], self._parent[numbers] = q, parents
+        self._q[numbers] = q
+        self._parent[numbers] = parents
         self._distance[numbers] = self._rank[numbers] = distances
         self.size += len(q)
         return numbers

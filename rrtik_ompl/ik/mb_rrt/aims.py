@@ -13,7 +13,7 @@ from rrtik_ompl.model.goal import TipGoal, joint_difference
 from rrtik_ompl.world.world import World
 
 DRAWS = 16  # targets of a goal that leaves freedom
-MAX_CONFIGURATIONS = 16  # configurations
+MAX_CONFIGURATIONS = 16  # of one call
 
 
 def tree_aims(
@@ -38,7 +38,8 @@ def tree_aims(
     Returns:
         Shape (k, dof), k <= ``most``, none if none was found in time.
     """
-    deadline, robot = time.monotonic() + seconds, world.robot
+    deadline = time.monotonic() + seconds
+    robot = world.robot
     rows = np.zeros((0, robot.dof))
 
     def accept(Q: Matrix) -> Mask:
@@ -50,6 +51,7 @@ def tree_aims(
         rows = rows[goal.satisfied(robot, rows) & world.valid_batch(rows)] if len(rows) else rows
         if found.timed_out or len(rows) >= most:
             break
+
     away = joint_difference(robot, rows, near)
     order = np.argsort(np.linalg.norm(away, axis=1), kind="stable")[:most]
     nearest: Matrix = np.where(robot.continuous, near + away[order], rows[order])

@@ -59,7 +59,8 @@ def cosine_interval(distance: Vector, length: float, smallest: float, largest: f
     Returns:
         Lower and upper ends, shapes (m,), not clipped: the interval is empty where it lies beyond -1 or 1.
     """
-    square, twice = distance**2 + length**2, 2.0 * np.maximum(distance, NOWHERE) * length
+    square = distance**2 + length**2
+    twice = 2.0 * np.maximum(distance, NOWHERE) * length
     return (square - largest**2) / twice, (square - smallest**2) / twice
 
 
@@ -71,16 +72,19 @@ def _edge_directions(links: Links, goals: Matrix, parents: Matrix, index: int, r
     axis = np.where(distance[:, None] > NOWHERE, towards / np.maximum(distance, NOWHERE)[:, None], arbitrary)
     if index == links.count:  # the law of cosines says the same, to the square root of the rounding
         return axis
+
     length = float(links.lengths[index - 1])
     ends = cosine_interval(distance, length, float(links.folded[index]), float(links.remaining[index]))
     low, high = (np.clip(end, -1.0, 1.0) for end in ends)
     share = rng.uniform(size=len(parents))
+
     if links.dimension == 2:  # uniform in the angle, on either side
         angle = np.arccos(low) + share * (np.arccos(high) - np.arccos(low))
         sign = rng.choice([-1.0, 1.0], len(parents))
         across = np.column_stack([-axis[:, 1], axis[:, 0]])
         turned: Matrix = np.cos(angle)[:, None] * axis + (sign * np.sin(angle))[:, None] * across
         return turned
+
     cosine = low + share * (high - low)  # uniform on the band of the sphere
     across = _perpendicular(axis, rng)
     tilted: Matrix = cosine[:, None] * axis + np.sqrt((1.0 - cosine) * (1.0 + cosine))[:, None] * across

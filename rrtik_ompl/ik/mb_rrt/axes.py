@@ -17,7 +17,7 @@ from rrtik_ompl.ik.mb_rrt.links import ROUNDING, smallest_spans
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.model.robot import Robot
 
-REWEIGHTINGS = 60  # of reweighting, to find the shortest polygon through the axes
+REWEIGHTINGS = 60  # rounds, to find the shortest polygon through the axes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,32 +97,31 @@ def axes_of(robot: Robot, oriented: bool) -> Axes:
     """The axes of an arm that `misfit` accepts, for positions or, if ``oriented``, for poses."""
     tip = tip_columns(robot)
     joints = np.argmax(tip.gain, axis=1)
+
     heights = _heights(tip.fixed, oriented)
-    first, points = np.array([0.0, 0.0, heights[0]]), _points(tip.fixed, heights)
+    first = np.array([0.0, 0.0, heights[0]])
+    points = _points(tip.fixed, heights)
     starts = np.column_stack([np.zeros((len(joints), 2)), heights[: len(joints)]])
-    aim = points[-1] * 0.0
+    aim = np.zeros(3)
     if oriented:
         points[-1] = starts[-1]
         aim = np.asarray(np.linalg.inv(tip.fixed[-1]) @ np.append(starts[-1], 1.0))[:3]
+
     lengths = np.linalg.norm(points - starts, axis=1)
     remaining = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
     folded = smallest_spans(lengths, remaining)
     low, high = (end[joints] + tip.offset for end in robot.finite_range())
+
     parallel = np.abs(np.abs(tip.fixed[1:-1, 2, 2]) - 1.0).max(initial=0.0) < ROUNDING
     flat = np.abs((points - starts)[:, 2]).max() < ROUNDING
     still = (np.hypot(points[:, 0], points[:, 1]) < ROUNDING) & (remaining[1:] < ROUNDING)
     idle = still & (not oriented)
     exact = bool(parallel and flat)
+
     return Axes(
         joints, tip.offset, low, high, tip.fixed, first, points, remaining[1:], folded[1:],
         (float(remaining[0]), float(folded[0])), aim, idle, exact,
     )  # fmt: skip
-
-
-def _points(fixed: NDArray[np.float64], heights: Vector) -> Matrix:
-    """The point after each joint in its turned frame, shape (n, 3)."""
-    points: Matrix = fixed[1:, :3, 3] + heights[1:, None] * fixed[1:, :3, 2]
-    return points
 
 
 def _heights(fixed: NDArray[np.float64], oriented: bool) -> Vector:
@@ -135,13 +134,16 @@ def _heights(fixed: NDArray[np.float64], oriented: bool) -> Vector:
     sides = count - 1 if oriented else count
     if sides == 0:
         return np.zeros(count + 1)
-    matrix, shift = np.zeros((sides, 3, count)), fixed[1 : sides + 1, :3, 3]
+    matrix = np.zeros((sides, 3, count))
+    shift = fixed[1 : sides + 1, :3, 3]
     for side in range(sides):
         matrix[side, 2, side] = -1.0
         if side + 1 < count:
             matrix[side, :, side + 1] = fixed[side + 1, :3, 2]
+
     heights: Vector = np.zeros(count)
     weight: Vector = np.ones(sides)
+
     for _ in range(REWEIGHTINGS):
         scaled = np.sqrt(weight)[:, None]
         rows = (scaled[:, :, None] * matrix).reshape(-1, count)
@@ -149,3 +151,9 @@ def _heights(fixed: NDArray[np.float64], oriented: bool) -> Vector:
         length = np.linalg.norm(matrix @ heights + shift, axis=1)
         weight = 1.0 / np.maximum(length, 1e-9 * max(float(length.max()), 1e-300))
     return np.append(heights, 0.0)
+
+
+def _points(fixed: NDArray[np.float64], heights: Vector) -> Matrix:
+    """The point after each joint in its turned frame, shape (n, 3)."""
+    points: Matrix = fixed[1:, :3, 3] + heights[1:, None] * fixed[1:, :3, 2]
+    return points

@@ -39,6 +39,7 @@ def grow_by_rule_b(axes: Axes, goal: Vector, *, tolerance: float, passes: int, r
     q = [np.zeros((passes if level else 1, axes.count)) for level in range(axes.count + 1)]
     frames[0][0] = axes.fixed[0]
     misses = np.zeros(passes)
+
     for done in range(passes):
         for level in range(axes.count):
             known = done + 1 if level else 1
@@ -47,10 +48,12 @@ def grow_by_rule_b(axes: Axes, goal: Vector, *, tolerance: float, passes: int, r
             q[level + 1][done] = q[level][parent]
             q[level + 1][done, level] = angle
             frames[level + 1][done] = frames[level][parent] @ _about_z(angle) @ axes.fixed[level + 1]
+
         end = frames[-1][done]
         misses[done] = np.linalg.norm(end[:3, :3] @ axes.aim + end[:3, 3] - goal)
         if misses[done] < tolerance:
             break
+
     return AxisRun(q[-1][: done + 1] - axes.offset, misses[: done + 1], first_hit(misses[: done + 1], tolerance))
 
 

@@ -43,8 +43,13 @@ def grow_in_joint_space(
     if links.dimension != 2 or not step > 0.0:
         raise InputError("the joint-space tree needs a planar chain and a step greater than 0")
     limit = float(finite_array(tolerance, (), "tolerance"))
-    Q, done, solved = np.zeros((passes + 1, links.count)), 0, 0
-    chains, misses = np.zeros((passes, links.count + 1, 2)), np.zeros(passes)
+
+    Q = np.zeros((passes + 1, links.count))
+    done = 0
+    solved = 0
+    chains = np.zeros((passes, links.count + 1, 2))
+    misses = np.zeros(passes)
+
     while done < passes and not (stop and solved):
         fresh = slice(done, min(done + BLOCK, passes))
         _extend(Q, fresh.start + 1, fresh.stop + 1, step, rng)

@@ -35,18 +35,23 @@ def grow_and_close(
     target = links.reachable(goal)
     if links.dimension != 2 or links.count < 2:
         raise InputError("closing the last two links needs a planar chain of at least two")
+
     levels: list[list[Vector]] = [[np.zeros(2)]] + [[] for _ in range(links.count - 2)]
     parents: list[list[int]] = [[] for _ in range(links.count - 2)]
+
     for done in range(1, passes + 1):
         for index in range(1, links.count - 1):
-            sample, length = surface(links, target, index, 1, rng), float(links.lengths[index - 1])
+            sample = surface(links, target, index, 1, rng)
+            length = float(links.lengths[index - 1])
             before = np.array(levels[index - 1])
             chosen = best_parents(before, sample, length, one_link_away)
             levels[index].append(one_link(before[chosen], sample, length, rng)[0])
             parents[index - 1].append(int(chosen[0]))
+
         elbow = _elbow(levels[-1][-1], target, float(links.lengths[-2]), float(links.lengths[-1]), rng)
         if elbow is not None:
             return np.array([*_walk(levels, parents), elbow, target]), done
+
     return None, passes
 
 
@@ -56,6 +61,7 @@ def _elbow(node: Vector, goal: Vector, first: float, second: float, rng: np.rand
     distance = float(np.linalg.norm(towards))
     if not abs(first - second) <= distance <= first + second or distance == 0.0:
         return None
+
     along = (distance**2 + first**2 - second**2) / (2.0 * distance)
     across = rng.choice([-1.0, 1.0]) * np.sqrt(max(first**2 - along**2, 0.0))
     unit = towards / distance
@@ -65,7 +71,8 @@ def _elbow(node: Vector, goal: Vector, first: float, second: float, rng: np.rand
 
 def _walk(levels: list[list[Vector]], parents: list[list[int]]) -> list[Vector]:
     """Nodes from the base to the newest of the last level."""
-    row, found = len(levels[-1]) - 1, []
+    row = len(levels[-1]) - 1
+    found = []
     for index in range(len(levels) - 1, 0, -1):
         found.append(levels[index][row])
         row = parents[index - 1][row]

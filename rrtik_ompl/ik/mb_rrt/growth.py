@@ -46,16 +46,23 @@ def grow(
         InputError: If the goal is out of reach; it says by how much.
         UnknownNameError: If there is no such variant.
     """
-    target, chosen = links.reachable(goal), variant(kind) if isinstance(kind, str) else kind
+    target = links.reachable(goal)
+    chosen = variant(kind) if isinstance(kind, str) else kind
     limit = float(finite_array(tolerance, (), "tolerance"))
+
     nodes: list[Matrix] = [np.zeros((1, links.dimension)), *(np.zeros((0, links.dimension)),) * links.count]
     parents = [np.zeros(0, dtype=np.int64)] * links.count
-    misses, solved, done = np.zeros(0), 0, 0
+    misses = np.zeros(0)
+    solved = 0
+    done = 0
+
     while done < passes and not (stop and solved):
         count = min(max(FIRST_BLOCK, done), passes - done)
         _add_passes(links, target, chosen, nodes, parents, count, rng)
         misses = np.append(misses, np.linalg.norm(nodes[-1][done:] - target, axis=1))
-        solved, done = first_hit(misses, limit), done + count
+        solved = first_hit(misses, limit)
+        done += count
+
     run = TreeSearch(links, target, tuple(nodes), tuple(parents), misses, solved)
     return run.until(solved) if stop and solved else run
 
@@ -75,7 +82,8 @@ def _add_passes(
         samples = kind.draw(links, goal, index, count, rng)
         chosen = best_parents(nodes[index - 1], samples, length, kind.rule)
         placed = one_link(nodes[index - 1][chosen], samples, length, rng)
-        nodes[index], parents[index - 1] = np.vstack([nodes[index], placed]), np.append(parents[index - 1], chosen)
+        nodes[index] = np.vstack([nodes[index], placed])
+        parents[index - 1] = np.append(parents[index - 1], chosen)
 
 
 def best_parents(nodes: Matrix, samples: Matrix, length: float, rule: Rule) -> NDArray[np.int64]:
@@ -93,7 +101,9 @@ def best_parents(nodes: Matrix, samples: Matrix, length: float, rule: Rule) -> N
     best = np.zeros(len(samples), dtype=np.int64)
     if len(nodes) == 1:
         return best
-    columns, before = np.ascontiguousarray(nodes.T), len(nodes) - len(samples)
+
+    columns = np.ascontiguousarray(nodes.T)
+    before = len(nodes) - len(samples)
     rows = max(1, SCORES // len(nodes))
     for begin in range(0, len(samples), rows):
         block = samples[begin : begin + rows]

@@ -46,15 +46,18 @@ def _joint_order(robot: Robot, axes: Axes) -> list[int]:
 
 def _first_links(world: World, later: set[int]) -> World:
     """The world without the bodies that one of the ``later`` joints moves."""
-    robot, scene = world.robot, world.scene
+    robot = world.robot
+    scene = world.scene
     kept: Any = pin.GeometryModel()
     for item in robot.collision.geometryObjects:
         if not _moves(robot, item.parentJoint, later):
             kept.addGeometryObject(item)
+
     held = tuple(item for item in scene.attached if not _moves(robot, _joint(robot, item.link), later))
     names = {*(each.name for each in scene.obstacles), *(each.name for each in held), *robot.link_names}
     allowed = tuple(pair for pair in scene.allowed_collisions if set(pair) <= names)
     part = Scene(scene.obstacles, attached=held, allowed_collisions=allowed)
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DescriptionWarning)  # said where the whole world was made
         return world.unheld.with_settings(robot=replace(robot, collision=kept), scene=part)

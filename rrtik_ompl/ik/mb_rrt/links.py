@@ -108,9 +108,11 @@ def sunflower(links: Links, count: int) -> Matrix:
     radius = links.reach * ((k + 0.5) / count) ** (1.0 / links.dimension)
     angle = k * (3.0 - np.sqrt(5.0)) * np.pi
     flat = np.column_stack([np.cos(angle), np.sin(angle)])
+
     if links.dimension == 2:
         disc: Matrix = radius[:, None] * flat
         return disc
+
     height = 2.0 * ((k * 0.7548776662466927 + 0.5) % 1.0) - 1.0  # the plastic number keeps it apart from the angle
     sphere = np.column_stack([np.sqrt(1.0 - height**2)[:, None] * flat, height])
     spread: Matrix = radius[:, None] * sphere

@@ -21,8 +21,10 @@ def mb_rrt_misfit(robot: Robot, target: Target) -> str:
 
 def mb_rrt(request: IkRequest) -> IkResponse:
     """A tree in the workspace for one target after the other, until a solution will do."""
-    robot, count = request.robot, len(request.targets)
-    rows, passes = np.zeros((0, robot.dof)), 0
+    robot = request.robot
+    count = len(request.targets)
+    rows = np.zeros((0, robot.dof))
+    passes = 0
     for target in request.targets:
         found = search(
             robot,
@@ -35,7 +37,8 @@ def mb_rrt(request: IkRequest) -> IkResponse:
             all=request.all,
             rounds=max(1, (ROUNDS_FOR_ALL if request.all else MAX_ROUNDS) // count),
         )
-        rows, passes = np.vstack([rows, found.q]), passes + found.passes
+        rows = np.vstack([rows, found.q])
+        passes += found.passes
         if found.timed_out or (request.accept(found.q).any() and not request.all):
             break
     return IkResponse(rows, request.near if len(rows) else nearest_posture(request), passes, found.timed_out)

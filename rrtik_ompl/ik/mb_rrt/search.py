@@ -69,6 +69,7 @@ def search(
     found = np.zeros((0, robot.dof))
     if out_of_reach(robot, target):
         return Found(found, 0)
+
     axes = axes_of(robot, target.oriented)
     tree = WorkspaceTree(axes, axes.nearest_in_reach(aimed_point(axes, target)), near, rng)
     for number in range(rounds):
@@ -80,6 +81,7 @@ def search(
             break
         if time.monotonic() > deadline:
             return Found(found, tree.passes, True)
+
     return Found(found, tree.passes)
 
 
@@ -111,28 +113,32 @@ def polished(robot: Robot, axes: Axes, target: Target, ends: Matrix, *, all: boo
     """
     if len(ends) == 0:
         return ends
+
     if target.oriented:
         ends = _last_turned(robot, axes, target, ends)
     if axes.exact:
         return ends[target.satisfied(robot, ends) & inside_limits(robot, ends)]
+
     if not all:
         ends, _ = descend(robot, target, ends, iterations=FIRST_STEPS)
         there = target.tightened(POLISHED).satisfied(robot, ends)
         if there.any():
             return ends[there]
+
     ends, _ = descend(robot, target, ends)
     return ends[target.satisfied(robot, ends)]
 
 
 def _last_turned(robot: Robot, axes: Axes, target: Target, ends: Matrix) -> Matrix:
     """The last joint, which leaves the aimed point where it is, turned as near to the orientation as it gets."""
-    joint, angles = int(axes.joints[-1]), np.array(ends)
+    joint = int(axes.joints[-1])
+    angles = np.array(ends)
     angles[:, joint] = -axes.offset[-1]
     frames = poses(robot, angles)[:, :3, :3] @ axes.fixed[-1][:3, :3].T
     wanted = target.pose.rotation @ axes.fixed[-1][:3, :3].T
+
     off = np.swapaxes(frames, 1, 2) @ wanted  # the turn about z nearest to it
     turn = np.arctan2(off[:, 1, 0] - off[:, 0, 1], off[:, 0, 0] + off[:, 1, 1])
-    full = TAU
-    turn += full * np.ceil((axes.lower[-1] - turn) / full - 1e-9)  # the first full turn inside the limits
+    turn += TAU * np.ceil((axes.lower[-1] - turn) / TAU - 1e-9)  # the first full turn inside the limits
     angles[:, joint] = np.clip(turn, axes.lower[-1], axes.upper[-1]) - axes.offset[-1]
     return angles

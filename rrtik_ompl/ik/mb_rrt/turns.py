@@ -36,19 +36,29 @@ def draw_turns(
         is, it is the one that comes nearest to being it.
     """
     local = np.einsum("mji,mj->mi", frames[:, :3, :3], goal - frames[:, :3, 3])
-    point, far, near = axes.points[level], float(axes.remaining[level]), float(axes.folded[level])
+    point = axes.points[level]
+    far = float(axes.remaining[level])
+    near = float(axes.folded[level])
+
     constant = np.einsum("mi,mi->m", local, local) + point @ point - 2.0 * local[:, 2] * point[2]
     amplitude = 2.0 * np.hypot(local[:, 0], local[:, 1]) * np.hypot(point[0], point[1])
     centre = np.arctan2(local[:, 1], local[:, 0]) - np.arctan2(point[1], point[0])
+
+    # a point on the axis, or a goal on it: every turn leaves them as far apart
     still = amplitude < FLAT
     divisor = np.where(still, 1.0, amplitude)
-    least, most = (constant - far**2) / divisor, (constant - near**2) / divisor
-    size = SLACK * (1.0 + np.abs(constant) / divisor)
-    useful = np.where(still, (least <= size) & (most >= -size), (least <= 1.0 + size) & (most >= -1.0 - size))
+    least = (constant - far**2) / divisor
+    most = (constant - near**2) / divisor
+    slack = SLACK * (1.0 + np.abs(constant) / divisor)
+
+    useful = np.where(still, (least <= slack) & (most >= -slack), (least <= 1.0 + slack) & (most >= -1.0 - slack))
     outer = np.where(still, np.pi, np.arccos(np.clip(least, -1.0, 1.0)))
     inner = np.where(still, 0.0, np.arccos(np.clip(most, -1.0, 1.0)))
+
     if far == 0.0 and bool(axes.exact):  # pointing at the goal, without the square root of the rounding
-        outer, inner = np.where(still, outer, 0.0), np.where(still, inner, 0.0)
+        outer = np.where(still, outer, 0.0)
+        inner = np.where(still, inner, 0.0)
+
     drawn, inside = _draw(centre, inner, outer, float(axes.lower[level]), float(axes.upper[level]), rng)
     return drawn, useful & inside
 
@@ -64,10 +74,15 @@ def _draw(
     starts = np.clip(begins, lower, upper).reshape(len(centre), -1)
     ends = np.clip(begins + widths, lower, upper).reshape(len(centre), -1)
     missed = np.maximum(np.maximum(lower - begins - widths, begins - upper), 0.0).reshape(len(centre), -1)
+
+    # arcs inside the limits count by their lengths; where there are none, those that miss them least
     inside = missed.min(axis=1) <= SLACK
     weight = np.where(missed <= np.minimum(missed.min(axis=1), np.pi)[:, None] + SLACK, ends - starts + SLACK, 0.0)
+
+    # one of them, then an angle on it
     total = np.cumsum(weight, axis=1)
     pick = (total > (rng.uniform(size=len(centre)) * total[:, -1])[:, None]).argmax(axis=1)
     rows = np.arange(len(centre))
-    first, last = starts[rows, pick], ends[rows, pick]
+    first = starts[rows, pick]
+    last = ends[rows, pick]
     return first + rng.uniform(size=len(centre)) * (last - first), inside

@@ -39,7 +39,9 @@ class WorkspaceTree:
             rng: Random numbers.
             free: Which rows are free of collision as far as the link of a level; everything if None.
         """
-        self._axes, self._goal, self._rng = axes, goal, rng
+        self._axes = axes
+        self._goal = goal
+        self._rng = rng
         self._start = np.array(start)[None]
         self.passes = 0
         self.edges = 0
@@ -62,7 +64,8 @@ class WorkspaceTree:
             Configurations of those that came to the end of the arm, shape (k, dof), k <= width.
         """
         self.passes += width
-        q, frames = np.repeat(self._q[0], width, axis=0), np.repeat(self._frames[0], width, axis=0)
+        q = np.repeat(self._q[0], width, axis=0)
+        frames = np.repeat(self._frames[0], width, axis=0)
         for level in range(self._axes.count):
             q, frames = self._step(level, q, frames)
             if len(q) == 0:
@@ -73,7 +76,9 @@ class WorkspaceTree:
 
     def _step(self, level: int, q: Matrix, frames: NDArray[np.float64]) -> tuple[Matrix, NDArray[np.float64]]:
         """Add a link to each branch, or to another of the same index in its place; those that succeed."""
-        done_q, done_frames, wanted = [], [], len(q)
+        done_q = []
+        done_frames = []
+        wanted = len(q)
         for attempt in range(TRIES):
             turned, good = self._turned(level, q, frames, stay=attempt == 0)
             done_q.append(turned[good])
@@ -82,7 +87,9 @@ class WorkspaceTree:
             if wanted == 0 or len(self._q[level]) < 2:
                 break
             others = self._rng.integers(len(self._q[level]), size=wanted)
-            q, frames = self._q[level][others], self._frames[level][others]
+            q = self._q[level][others]
+            frames = self._frames[level][others]
+
         return np.vstack(done_q), np.concatenate(done_frames)
 
     def _turned(self, level: int, q: Matrix, frames: NDArray[np.float64], *, stay: bool) -> tuple[Matrix, Mask]:
@@ -94,9 +101,11 @@ class WorkspaceTree:
         angle, useful = draw_turns(axes, level, frames, self._goal, self._rng)
         # Where the regions are not exact, "useful" is a hint: what counts is whether the polish gets to the goal.
         good = useful if axes.exact else np.ones(len(q), dtype=bool)
+
         if stay and axes.idle[level]:
             kept = self._start[0, axes.joints[level]] + axes.offset[level]
             angle = np.full(len(q), np.clip(kept, axes.lower[level], axes.upper[level]))
+
         turned = np.array(q)
         turned[:, axes.joints[level]] = angle - axes.offset[level]
         self.edges += len(q)
@@ -108,7 +117,12 @@ class WorkspaceTree:
         """Frames of the next joint."""
         angle = q[:, self._axes.joints[level]] + self._axes.offset[level]
         turn = np.tile(np.eye(4), (len(q), 1, 1))
-        cosine, sine = np.cos(angle), np.sin(angle)
-        turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1] = cosine, -sine, sine, cosine
+        cosine = np.cos(angle)
+        sine = np.sin(angle)
+        turn[:, 0, 0] = cosine
+        turn[:, 0, 1] = -sine
+        turn[:, 1, 0] = sine
+        turn[:, 1, 1] = cosine
+
         moved: NDArray[np.float64] = frames @ turn @ self._axes.fixed[level + 1]
         return moved

@@ -46,22 +46,29 @@ def numeric(request: IkRequest) -> IkResponse:
     """The method of `solve_ik`: solutions of many members of the goal side by side until one will do."""
     if request.all:
         return _many(request)
-    aims, timed_out = aims_of(request), False
-    kernels, limb = library(KERNELS), seeded_limb_of(request.robot)
+    aims = aims_of(request)
+    kernels = library(KERNELS)
+    limb = seeded_limb_of(request.robot)
     if len(aims) == 1 and kernels is not None and limb is not None:
-        robot, near = request.robot, request.near  # by default the middle of the limits, which need not be clamped
-        near = near if near is mid_range_configuration(robot) else robot.clamp(near)
+        near = request.near
+        if near is not mid_range_configuration(request.robot):  # the default, which needs no clamping
+            near = request.robot.clamp(near)
         return _alone(request, SearchOfOne(kernels, limb, aims, near))
-    search, waiting = Search(request.robot, aims, request.near), np.arange(len(aims))
+
+    search = Search(request.robot, aims, request.near)
+    waiting = np.arange(len(aims))
     found = []
+    timed_out = False
     while len(waiting):
-        going, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
+        going = waiting[:AT_ONCE]
+        waiting = waiting[AT_ONCE:]
         going = going[search.advance(going)]
         found.append(search.q[going])
         timed_out = time.monotonic() > request.deadline
         if timed_out or request.accept(found[-1]).any():
             break
         waiting = np.concatenate([waiting, going])
+
     return _answered(request, np.concatenate(found), search.steps, timed_out)
 
 
@@ -78,18 +85,23 @@ def _alone(request: IkRequest, search: SearchOfOne) -> IkResponse:
 
 def _many(request: IkRequest) -> IkResponse:
     """Solutions from many random starts, as different as they come."""
-    robot, steps, timed_out = request.robot, 0, False
+    robot = request.robot
+    steps = 0
+    timed_out = False
     found = [np.zeros((0, robot.dof))]
     aims = aims_of(request)
+
     for number in range(MAX_ROUNDS):
         Q = request.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
         if number == 0:
             Q[0] = request.near
         Q, reached, taken = walk(robot, aims[(number * STARTS + np.arange(STARTS)) % len(aims)], Q, patience=PATIENCE)
         found.append(Q[reached])
-        steps, timed_out = steps + taken, time.monotonic() > request.deadline
+        steps += taken
+        timed_out = time.monotonic() > request.deadline
         if timed_out:
             break
+
     return _answered(request, np.vstack(found), steps, timed_out)
 
 

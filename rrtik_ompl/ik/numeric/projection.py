@@ -22,10 +22,12 @@ from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
 
 ITERATIONS = 60
-PATIENCE, STALLED = 10, 0.5  # a walk is given up whose squared residual is not down to this share in so many steps
+PATIENCE = 10  # iterations in which the squared residual has to fall
+STALLED = 0.5  # to this share, or a walk is given up
 DAMPING = 1e-6  # the constant part, in units of the squared residual (1 is the reach)
 LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one iteration
-STARTS, MAX_ROUNDS = 32, 16
+STARTS = 32  # in one round
+MAX_ROUNDS = 16  # at least one for each region
 
 
 def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix | None = None) -> Matrix:
@@ -41,10 +43,12 @@ def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix 
     Returns:
         Where each start has led to, in the region or not, shape (m, dof).
     """
-    Q, left = robot.clamp(starts), np.arange(len(starts))
+    Q = robot.clamp(starts)
+    left = np.arange(len(starts))
     places = np.full((len(Q), 3), np.nan) if places is None else places
     scale = np.repeat([1.0 / reach_of(robot), PER_RADIAN], 3)[:, None]
     mark = np.full(len(Q), np.inf)
+
     for step in range(ITERATIONS):
         tips = poses(robot, Q[left])
         aims = region.nearest(tips)
@@ -53,16 +57,22 @@ def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix 
         ends = region.poses(aims)
         twist = twist_between(tips, ends[:, :3, :3], ends[:, :3, 3])
         square = ((twist * scale[:, 0]) ** 2).sum(axis=1)
+
         kept = ~_arrived(region, twist)
         if step % PATIENCE == 0:
             kept &= square <= STALLED * mark[left]
             mark[left] = square
-        left, aims, twist, square = left[kept], aims[kept], twist[kept], square[kept]
+        left = left[kept]
+        aims = aims[kept]
+        twist = twist[kept]
+        square = square[kept]
         if len(left) == 0:
             break
+
         held = _held(region, aims, scale, slides[kept])
         J = held @ (jacobians(robot, Q[left]) * scale)
         Q[left] = robot.clamp(Q[left] + _step(J, held @ (twist[:, :, None] * scale), square))
+
     return Q
 
 
@@ -79,10 +89,14 @@ def projected(robot: Robot, region: TaskRegion, starts: Matrix, rng: np.random.G
 
 def projection(request: IkRequest) -> IkResponse:
     """The method of `solve_ik`: from random postures onto one part of the goal after the other."""
-    robot, rng = request.robot, request.rng
+    robot = request.robot
+    rng = request.rng
     regions = [part.region() for part in request.goal.parts]
-    found, nearest, least = np.zeros((0, robot.dof)), request.near, np.inf
+    found = np.zeros((0, robot.dof))
+    nearest = request.near
+    least = np.inf
     timed_out = False
+
     for number in range(max(MAX_ROUNDS, len(regions))):
         region = regions[number % len(regions)]
         starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
@@ -90,13 +104,16 @@ def projection(request: IkRequest) -> IkResponse:
         rows = projected(robot, region, starts, rng)
         distance = region.distance(robot, rows)
         if distance.min() < least:
-            nearest, least = rows[distance.argmin()], distance.min()
+            nearest = rows[distance.argmin()]
+            least = distance.min()
+
         found = np.vstack([found, rows[region.satisfied(robot, rows)]])
         if request.accept(found).any() and not request.all:
             break
         timed_out = time.monotonic() > request.deadline
         if timed_out:
             break
+
     return IkResponse(found, nearest, number + 1, timed_out)
 
 
@@ -115,15 +132,21 @@ def _held(region: TaskRegion, aims: Matrix, scale: Matrix, slides: Mask) -> NDAr
     low, high = region.bounds.T
     inside = ((low < aims) & (aims < high)) | (high - low >= TAU) & region.free
     inside[:, :3] &= slides[:, None]
-    R, tips = region.T_world_w.rotation, region.poses(aims)[:, :3, 3]
+
+    R = region.T_world_w.rotation
+    tips = region.poses(aims)[:, :3, 3]
     about = tips - (region.T_world_w.translation + aims[:, :3] @ R.T)
-    pitched, rolled = (rpy_matrices(aims[:, 3:] * part)[:, :, k] for part, k in (([0, 0, 1], 1), ([0, 1, 1], 0)))
+    # axes of pitch and roll, turned by the angles that are applied after them
+    pitched = rpy_matrices(aims[:, 3:] * [0, 0, 1])[:, :, 1]
+    rolled = rpy_matrices(aims[:, 3:] * [0, 1, 1])[:, :, 0]
     axes = np.stack([rolled, pitched, np.tile([0.0, 0.0, 1.0], (len(aims), 1))], axis=2)
+
     freed = np.zeros((len(aims), 6, 6))
     freed[:, :3, :3] = R
     freed[:, 3:, 3:] = R @ axes
     freed[:, :3, 3:] = np.cross(freed[:, 3:, 3:], about[:, :, None], axis=1)
     freed = freed * scale * inside[:, None, :]
+
     held: NDArray[np.float64] = np.eye(6) - freed @ np.linalg.pinv(freed)
     return held
 

@@ -34,7 +34,9 @@ def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds:
         rounds: At most, but one for each target; these take turns.
     """
     robot = request.robot
-    found, steps = np.zeros((0, robot.dof)), 0
+    found = np.zeros((0, robot.dof))
+    steps = 0
+
     for number in range(max(rounds, len(request.targets))):
         target = request.targets[number % len(request.targets)]
         Q = request.rng.uniform(*robot.finite_range(), (starts, robot.dof))
@@ -42,11 +44,13 @@ def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds:
             Q[0] = request.near
         Q, taken = method(robot, target, Q)
         good = target.satisfied(robot, Q) & inside_limits(robot, Q)
-        found, steps = np.vstack([found, Q[good]]), steps + taken
+        found = np.vstack([found, Q[good]])
+        steps += taken
         if request.accept(found).any() and not request.all:
             break
         if time.monotonic() > request.deadline:
             return IkResponse(found, nearest_posture(request), steps, timed_out=True)
+
     return IkResponse(found, request.near if len(found) else nearest_posture(request), steps)
 
 
@@ -59,13 +63,15 @@ def nearest_posture(request: IkRequest, *, searched: bool = False) -> Vector:
         request: The problem.
         searched: Whether `Search` is known to find nothing inside the limits.
     """
-    robot, aims = request.robot, aims_of(request)
+    robot = request.robot
+    aims = aims_of(request)
     if not searched:
         search = Search(robot, aims[:MEMBERS], request.near)
         inside = search.q[search.advance(np.arange(len(search.q)))]
         if len(inside):
             first: Vector = inside[0]
             return first
+
     starts = request.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
     anywhere, _, _ = walk(_turning_freely(robot), aims[np.arange(STARTS) % len(aims)], starts)
     nearest: Vector = anywhere[int(np.argmin(np.add(*request.goal.errors(robot, anywhere))))]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.ik.method_interface import different_rows
 from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.ik.numeric.restarts import STARTS
 from rrtik_ompl.model.goal import TipGoal, joint_difference
@@ -17,7 +18,6 @@ from rrtik_ompl.model.robot import Robot
 
 ROUNDS_PER_POINT = 4  # of random starts at a point that no motion leads to
 CARRIED = 8  # solutions that are followed side by side, those nearest to the posture before
-SAME_POSTURE = 1e-3  # [rad] or [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,21 +47,26 @@ class Tracker:
         is taken. Where none can go on, the next point is solved afresh.
         """
         q = np.full((len(self.targets), self.robot.dof), np.nan)
-        point, last, steps = 0, near, 0
+        point = 0
+        last = near
+        steps = 0
         while point < len(q) and time.monotonic() <= self.deadline:
             begun, taken = self.fresh(self.targets[point], last)
             steps += taken
-            if len(begun):
-                ways, taken = self.carry(begun, point)
-                steps += taken
-                travel = np.abs(joint_difference(self.robot, ways[1:], ways[:-1])).sum(axis=(0, 2))
-                if last is not None:
-                    travel += np.abs(joint_difference(self.robot, ways[0], last)).sum(axis=1)
-                best = ways[:, int(np.argmin(travel))]
-                q[point : point + len(best)] = best
-                point, last = point + len(best), best[-1]
-            else:
+            if len(begun) == 0:
                 point += 1
+                continue
+
+            ways, taken = self.carry(begun, point)
+            steps += taken
+            travel = np.abs(joint_difference(self.robot, ways[1:], ways[:-1])).sum(axis=(0, 2))
+            if last is not None:
+                travel += np.abs(joint_difference(self.robot, ways[0], last)).sum(axis=1)
+            best = ways[:, int(np.argmin(travel))]
+
+            q[point : point + len(best)] = best
+            point += len(best)
+            last = best[-1]
         return q, steps
 
     def fresh(self, target: TipGoal, last: Vector | None) -> tuple[Matrix, int]:
@@ -76,16 +81,15 @@ class Tracker:
             Q = self.good(target, Q)
             if len(Q) or time.monotonic() > self.deadline:
                 break
+
         away = np.zeros(len(Q)) if last is None else np.linalg.norm(joint_difference(self.robot, Q, last), axis=1)
-        kept: list[Vector] = []
-        for q in Q[np.argsort(away, kind="stable")]:
-            if len(kept) < CARRIED and all(np.abs(q - other).max() > SAME_POSTURE for other in kept):
-                kept.append(q)
-        return np.array(kept).reshape(-1, self.robot.dof), steps
+        kept = different_rows(Q, np.argsort(away, kind="stable"))[:CARRIED]
+        return Q[kept], steps
 
     def carry(self, begun: Matrix, point: int) -> tuple[NDArray[np.float64], int]:
         """Follow the trajectory from solutions of a point until none can go on; shape (points, survivors, dof)."""
-        ways, steps = begun[None], 0
+        ways = begun[None]
+        steps = 0
         for target in self.targets[point + 1 :]:
             if time.monotonic() > self.deadline:
                 break
@@ -98,6 +102,7 @@ class Tracker:
             alive[alive] = self.accept(Q[alive])
             if not alive.any():
                 break
+
             ways = np.concatenate([ways[:, alive], Q[None, alive]])
         return ways, steps
 

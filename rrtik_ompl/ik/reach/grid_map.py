@@ -48,7 +48,8 @@ class ReachMap:
     samples: int
     base: Vector
 
-    __reduce__, __repr__ = as_value, in_one_line
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
     @property
     def reached(self) -> NDArray[np.bool_]:
@@ -103,7 +104,9 @@ class ReachMap:
         height = self.centres(2)[level]
         x, y, z = (self.centres(k) for k in range(3))
         bx, by, bz = (float(value) for value in self.base)
-        side, top = self.values[:, ahead].T, self.values[:, :, level].T
+        side = self.values[:, ahead].T
+        top = self.values[:, :, level].T
+
         cuts = [
             Slice(f"side, y = {y[ahead]:.2f} m", "x [m]", "z [m]", x, z, side, base=(bx, bz)),
             Slice(f"top, z = {height:.2f} m", "x [m]", "y [m]", x, y, top, base=(bx, by)),
@@ -122,6 +125,7 @@ class ReachMap:
             rows = np.column_stack([self.corner + self.size * (places + 0.5), self.values[self.reached]])
             write_text(path, "\n".join([f"x,y,z,{self.measure}", *(",".join(f"{v:.6g}" for v in r) for r in rows), ""]))
             return
+
         data = BytesIO()
         scalars = {name: getattr(self, name) for name in ("robot", "measure", "size", "samples")}
         np.savez_compressed(data, corner=self.corner, values=self.values, base=self.base, **scalars)

@@ -13,7 +13,7 @@ from rrtik_ompl.model.robot import Robot, jacobians
 
 DIRECTIONS = 64  # one bit each of a 64-bit number
 FINE = 16  # the nearest of them is looked up in a cube of 33 cells a side
-GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad], the golden angle
 
 
 class Counter:
@@ -91,5 +91,6 @@ def _directions(planar: bool) -> Matrix:
         around = TAU * np.arange(DIRECTIONS) / DIRECTIONS
         return np.stack([np.cos(around), np.sin(around), np.zeros(DIRECTIONS)], axis=1)
     height = 1.0 - (2.0 * np.arange(DIRECTIONS) + 1.0) / DIRECTIONS
-    turn, radius = GOLDEN * np.arange(DIRECTIONS), np.sqrt(1.0 - height**2)
+    turn = GOLDEN * np.arange(DIRECTIONS)
+    radius = np.sqrt(1.0 - height**2)
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)

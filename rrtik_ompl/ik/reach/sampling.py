@@ -22,7 +22,7 @@ SAMPLES = 200_000
 BLOCK = 20_000  # postures at a time
 TURNS = 16  # of the first joint for each of them: the whole arm turns as one body, which needs no kinematics
 CELLS = 18  # of the grid across the farthest reach, if no size is given
-MAX_CELLS = 4_000_000
+MAX_CELLS = 4_000_000  # 32 MB of values
 MOST_SAMPLES = 1_000_000_000  # some minutes of a processor
 PROBE = 4096  # postures that determine how large the grid must be
 BELOW = 1e-3  # of a cell: the layer of a planar arm ends so far above the arm, which is seen from above
@@ -70,18 +70,25 @@ def reach_map(
     count = whole_number(samples, "samples", 1)
     at_most(count, MOST_SAMPLES, "samples")
     rng = np.random.default_rng(whole_number(seed, "seed"))
+
     base = poses(robot, np.zeros((1, robot.dof)), robot.link_names[0])[0, :3, 3]
     corner, size, shape = _grid(robot, base, cell)
+
     counter = MEASURES[measure](int(np.prod(shape)), robot.planar)
     counted = 0
     low, high = robot.finite_range()
     turn = _first_turn(robot) if world is None else None
+
     for begin in range(0, count, BLOCK):
         Q = rng.uniform(low, high, (min(BLOCK, count - begin), robot.dof))
         if world is not None:
             Q = Q[world.valid_batch(Q)]
-        tips, quality = poses(robot, Q), counter.quality(robot, Q)
-        points, pointing = tips[:, :3, 3], tips[:, :3, "xyz".index(axis)]
+
+        tips = poses(robot, Q)
+        quality = counter.quality(robot, Q)
+        points = tips[:, :3, 3]
+        pointing = tips[:, :3, "xyz".index(axis)]
+
         for number in range(1 if turn is None else TURNS):
             if turn is not None and number:
                 angles = rng.uniform(low[0], high[0], len(Q))
@@ -92,6 +99,7 @@ def reach_map(
             cells = np.ravel_multi_index(tuple(places[inside].T), shape)
             counter.add(cells, pointing[inside], quality[inside])
             counted += len(cells)
+
     return ReachMap(robot.name, measure, frozen(corner), size, frozen(counter.values.reshape(shape)), counted, base)
 
 
@@ -104,11 +112,14 @@ def _first_turn(robot: Robot) -> Callable[[Matrix, Matrix, Vector], tuple[Matrix
     alone = np.count_nonzero(chain.gain[:, 0]) == 1 and chain.gain[0, 0] == 1.0
     if robot.prismatic[0] or not alone or np.count_nonzero(chain.parent == -1) != 1:
         return None
+
     frame = robot.chain.joint_frames(np.zeros((1, robot.dof)))[0, 1]
-    axis, origin = frame[:3, :3] @ chain.axis[0], frame[:3, 3]
+    axis = frame[:3, :3] @ chain.axis[0]
+    origin = frame[:3, 3]
 
     def turn(points: Matrix, pointing: Matrix, angles: Vector) -> tuple[Matrix, Matrix]:
-        c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+        c = np.cos(angles)[:, None]
+        s = np.sin(angles)[:, None]
 
         def rotated(v: Matrix) -> Matrix:
             moved: Matrix = c * v + s * np.cross(axis, v) + (1.0 - c) * (v @ axis)[:, None] * axis
@@ -126,15 +137,19 @@ def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float
     reach = PROBE_MARGIN * float(np.linalg.norm(tips, axis=1).max())
     if reach == 0.0:
         raise InputError(f"robot '{robot.name}': no joint moves its tip, so there is nothing to map; name another tip")
+
     size = reach / CELLS if cell is None else positive(cell, "cell")
     margin = 0.5 * (PROBE_MARGIN - 1.0) * reach
-    low, high = (np.floor if k == 0 else np.ceil for k in (0, 1))
+
     with np.errstate(over="ignore"):
-        first, last = low((tips.min(axis=0) - margin) / size), high((tips.max(axis=0) + margin) / size)
+        first = np.floor((tips.min(axis=0) - margin) / size)
+        last = np.ceil((tips.max(axis=0) + margin) / size)
         if robot.planar:
-            first[2], last[2] = BELOW - 1.0, BELOW
+            first[2] = BELOW - 1.0
+            last[2] = BELOW
         numbers = np.maximum(last - first, 1.0)
         count = float(np.prod(numbers))
+
     if not count <= MAX_CELLS:
         raise InputError(f"cell of {size:g} m makes {count:.3g} cells; at most {MAX_CELLS}")
     shape = tuple(map(int, numbers))
