@@ -94,13 +94,23 @@ class Follower:
                 "arm of a follower: it needs positions() and command(q, t), as SimulatedLink(robot, start) has them, "
                 f"got {repr(link)[:40]}"
             )
-        self._motion, self._link = trajectory, link
-        self._step, self._tolerance = 1.0 / positive(rate, "rate of a follower"), positive(tolerance, "tolerance")
+
+        self._motion = trajectory
+        self._link = link
+        self._step = 1.0 / positive(rate, "rate of a follower")
+        self._tolerance = positive(tolerance, "tolerance")
         _check_rest(trajectory)
         self._pace = Pace(trajectory, _kept_limits(trajectory, limits))
+
         self._lock = Lock()
-        self._wanted, self._paused, self._stopping, self._reason = 1.0, False, False, ""
-        self._again, self._late, self._ended = 0.0, 0.0, False
+        self._wanted = 1.0
+        self._paused = False
+        self._stopping = False
+        self._reason = ""
+        self._again = 0.0
+        self._late = 0.0
+        self._ended = False
+
         self._check_begin(trajectory.positions[0])
 
     @property
@@ -116,7 +126,8 @@ class Follower:
     @property
     def result(self) -> Followed:
         """How far it is, and how it ended."""
-        pace, reason = self._pace, self._reason
+        pace = self._pace
+        reason = self._reason
         arrived = pace.place >= self._motion.duration
         if not arrived:
             reason = reason or "on its way"
@@ -135,7 +146,8 @@ class Follower:
     def stop(self, reason: str = "stopped") -> None:
         """Come to rest on the trajectory, for good."""
         with self._lock:
-            self._stopping, self._reason = True, self._reason or reason
+            self._stopping = True
+            self._reason = self._reason or reason
 
     def pace(self, pace: float) -> None:
         """Play the motion at a share of its speed, from above 0 to 1.
@@ -183,7 +195,9 @@ class Follower:
                 now = clock()
                 if fault := self._fault(told):
                     self.stop(fault)
-                passed, before = max(now - before, 1e-6), now
+
+                passed = max(now - before, 1e-6)
+                before = now
                 due = min(passed, MOST_PERIODS * self._step)
                 self._late += passed - due
                 self.step(due)
@@ -198,6 +212,7 @@ class Follower:
         if target != pace.end and pace.now >= self._again:
             pace.turn_to(target)
             self._again = pace.now + AGAIN_SECONDS
+
         pace.advance(seconds)
         pace.place = min(pace.place, self._motion.duration)
 
@@ -250,9 +265,11 @@ def _kept_limits(motion: Trajectory, limits: RateLimits | None) -> RateLimits:
     peaks = motion.peaks()
     if limits is None:  # joints that stand still have the peaks of the others
         return RateLimits(*(np.maximum(np.where(row > 0.0, row, row.max()), 1e-9) for row in peaks))
+
     bounds = limits.for_joints(len(motion.joint_names))
     for name, unit in (("velocity", ""), ("acceleration", "^2"), ("jerk", "^3")):
-        peak, bound = getattr(peaks, name), getattr(bounds, name)
+        peak = getattr(peaks, name)
+        bound = getattr(bounds, name)
         over = peak > bound * (1.0 + SLACK)
         if over.any():
             joint = int(np.argmax(np.where(over, peak / bound, 0.0)))
@@ -261,5 +278,6 @@ def _kept_limits(motion: Trajectory, limits: RateLimits | None) -> RateLimits:
                 f"trajectory, its limit is {bound[joint]:.4g} rad/s{unit} or m/s{unit}; time the path anew with these "
                 "limits, or slow the trajectory down by slowed()"
             )
+
     rows = zip((bounds.velocity, bounds.acceleration, bounds.jerk), peaks, strict=True)
     return RateLimits(*(np.maximum(bound, peak) for bound, peak in rows))

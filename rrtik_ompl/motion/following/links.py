@@ -62,6 +62,7 @@ class SimulatedLink:
         Raises:
             InputError: If it is no row of finite numbers, one for each joint, or the time is none.
         """
-        place, time = finite_array(q, self._q.shape, "set point").copy(), finite_number(t, "time of a set point")
+        place = finite_array(q, self._q.shape, "set point").copy()
+        time = finite_number(t, "time of a set point")
         self._q = place
         self.sent.append((time, place))

@@ -19,10 +19,10 @@ from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
 LOOKS = 80  # along a change of pace
 FIRST_LOOKS = 12  # along each of those that are tried; most that keep no limits are found by them
 SHORTEST = 0.03  # [s] of a change of pace
-LENGTHS_PER_DECADE = 12
+LENGTHS_PER_DECADE = 12  # of those that are tried
 DELAYS = np.concatenate([[0.0], np.geomspace(0.03, 1.0, 12)])  # [s] until it begins
 BESIDE = 1e-5  # [s] from a knot
-SLACK = 1.0 + 1e-9
+SLACK = 1.0 + 1e-9  # times a limit
 LOWER = (1.0, 0.7, 0.4)  # shares of a higher pace that are tried in turn: less of it leaves room for the change
 
 
@@ -55,7 +55,10 @@ class Change(NamedTuple):
 
 def changes_to(end: float, starts: Matrix, moments: Vector, lengths: Vector) -> Change:
     """The quintics from paces with two derivatives, rows of ``starts``, shape (3, k), to a steady one."""
-    p, v, a = starts[0], starts[1] * lengths, starts[2] * lengths**2
+    p = starts[0]
+    v = starts[1] * lengths
+    a = starts[2] * lengths**2
+    # what the three highest powers have to bring about at the end: of the pace and its two derivatives
     rest = np.stack([end - p - v - 0.5 * a, -v - a, -a])
     ends = np.array([[1.0, 1.0, 1.0], [3.0, 4.0, 5.0], [6.0, 12.0, 20.0]])
     coefficients = np.concatenate([np.stack([p, v, 0.5 * a]), np.linalg.solve(ends, rest)])
@@ -73,16 +76,22 @@ class Pace:
 
     def __init__(self, motion: Trajectory, limits: RateLimits) -> None:
         """Full pace, at the beginning of a motion that keeps the limits."""
-        self.place, self.now, self.end = 0.0, 0.0, 1.0
-        self._motion, self._limits, self._jerks = motion, limits, motion.jerks
+        self.place = 0.0
+        self.now = 0.0
+        self.end = 1.0
+        self._motion = motion
+        self._limits = limits
+        self._jerks = motion.jerks
         self._changes: list[Change] = []  # at most two, one after the other
         self._steady = 1.0  # before the first of them
+
         # a change to rest takes as much of the motion's time as half its length: no longer one ends before the motion
         longest = max(2.0 * motion.duration, 2.0 * SHORTEST)
         count = 2 + int(LENGTHS_PER_DECADE * np.log10(longest / SHORTEST))
         waits, lengths = np.meshgrid(DELAYS, np.geomspace(SHORTEST, longest, count), indexing="ij")
         order = np.argsort((waits + lengths).ravel(), kind="stable")
-        self._waits, self._lengths = np.unravel_index(order, waits.shape)[0], lengths.ravel()[order]
+        self._waits = np.unravel_index(order, waits.shape)[0]
+        self._lengths = lengths.ravel()[order]
 
     @property
     def steady(self) -> float | None:
@@ -99,6 +108,7 @@ class Pace:
     def turn_to(self, end: float) -> None:
         """Decide on a change to another pace, now or soon, or to one nearer to it; on none if none keeps the limits."""
         starts = np.array([self._after(delay) for delay in DELAYS]).T[:, self._waits]
+
         for share in LOWER if end > self.end else LOWER[:1]:
             if share * end <= self.end < end:
                 return
@@ -115,10 +125,12 @@ class Pace:
         clock = np.linspace(0.0, 1.0, FIRST_LOOKS)[:, None] * tried.length
         gained, pace, *_ = tried.at(clock)
         found: Mask = np.all((pace >= -1e-9) & (pace <= SLACK), axis=0)
+
         if tried.end == 0.0:  # the motion rests at its own end too
             ahead = self._motion.duration - self.place
             found &= places + gained[-1] < self._motion.duration
             found &= (tried.moment + tried.length - self.now) * self._after(0.0)[1] < ahead
+
         numbers = np.flatnonzero(found)
         found[numbers] = self._kept_at(clock[:, numbers], tried.some(numbers), places[numbers]).all(axis=0)
         return found
@@ -129,6 +141,7 @@ class Pace:
         gained, pace, *_ = change.at(clock)
         if pace.min() < -1e-9 or pace.max() > SLACK:
             return False
+
         # the motion's jerk jumps at its knots: just before and after each that is passed
         places = place + gained
         knots = self._motion.times[(self._motion.times > places[0]) & (self._motion.times < places[-1])]
@@ -142,7 +155,10 @@ class Pace:
         places = np.ravel(place + gained)
         state = self._motion(places)
         p, rise, bend = (row.reshape(-1, 1) for row in paces)
-        v, a, j = state.velocities, state.accelerations, self._jerks_at(places)
+        v = state.velocities
+        a = state.accelerations
+        j = self._jerks_at(places)
+
         rates = (v * p, a * p**2 + v * rise, j * p**3 + 3.0 * a * p * rise + v * bend)
         bounds = (self._limits.velocity, self._limits.acceleration, self._limits.jerk)
         kept = [(np.abs(rate) <= SLACK * bound + 1e-12).all(axis=1) for rate, bound in zip(rates, bounds, strict=True)]
@@ -165,17 +181,25 @@ class Pace:
 
     def _after(self, seconds: float) -> tuple[float, float, float, float]:
         """Place, pace and its two derivatives after a time from now, as has been decided."""
-        until, at, place, steady = self.now + seconds, self.now, self.place, self._steady
+        until = self.now + seconds
+        at = self.now
+        place = self.place
+        steady = self._steady
+
         for number, change in enumerate(self._changes):
             if change.moment >= until:
                 break
             moment = float(change.moment)
             if moment > at:
-                place, at = place + steady * (moment - at), moment
+                place += steady * (moment - at)
+                at = moment
+
             stop = min(self._ends(number), until)
             gained, pace, rise, bend = (row.tolist() for row in change.at(np.array([at - moment, stop - moment])))
             place += gained[1] - gained[0]
-            at, steady = stop, change.end
+            at = stop
+            steady = change.end
             if stop == until and until < moment + change.length:
                 return place, pace[1], rise[1], bend[1]
+
         return place + steady * (until - at), steady, 0.0, 0.0

@@ -77,20 +77,24 @@ class Servo:
         slide: bool = False,
     ) -> None:
         require(world, World, "world of a servo")
-        self._world, self._robot = world, world.robot
+        self._world = world
+        self._robot = world.robot
         self._method = one_of(METHODS, method, "method of a servo")
         self._tasks = Secondary(not_negative(centring, "centring"), not_negative(manipulability, "manipulability"))
-        self._near, self._kept = positive(near, "near"), not_negative(kept, "kept")
+        self._near = positive(near, "near")
+        self._kept = not_negative(kept, "kept")
         if self._kept >= self._near:
             raise InputError(f"kept must be less than near, got {self._kept:g} and {self._near:g} m")
         require(slide, bool, "slide")
         self._slide = slide
+
         self._data = working_memory(self._robot.model)
         self._tip = self._robot.model.getFrameId(self._robot.tip)
         self._speed = np.where(np.isfinite(self._robot.velocity), self._robot.velocity, 1.0)
-        low, high = self._robot.lower, self._robot.upper
+        low = self._robot.lower
+        high = self._robot.upper
         self._middle = np.where(np.isfinite(low + high), 0.5 * (low + high), np.nan)
-        self._ramp = np.eye(self._robot.dof) * STEP
+        self._ramp = np.eye(self._robot.dof) * STEP  # one joint moved a row
         self._slope: tuple[Vector, Vector] | None = None  # of the volume, and where
 
     def step(self, q: ArrayLike, twist: ArrayLike, dt: float) -> Vector:
@@ -107,8 +111,20 @@ class Servo:
         here = finite_array(q, (self._robot.dof,), "configuration of a servo")
         wanted = finite_array(twist, (6,), "twist of a servo")
         seconds = positive(dt, "time step of a servo")
+
         rates = self._apart(here, *self._for_twist(here, wanted), seconds)
         return self._proven(here, self._within_limits(here, rates, seconds), seconds)
+
+    def _for_twist(self, q: Vector, twist: Vector) -> tuple[Vector, Vector]:
+        """Rates that move the tip, and those of the secondary tasks that leave it where it is, shape (dof,) each."""
+        left, sizes, right = np.linalg.svd(self._jacobian(q), full_matrices=False)
+        low = float(sizes[-1])
+        damping = (1.0 - (low / LEAST_SINGULAR) ** 2) * LEAST_SINGULAR**2 if low < LEAST_SINGULAR else 0.0
+        # 1e-18, so that nothing is divided by 0 where the Jacobian vanishes
+        rates = right.T @ ((sizes / (sizes**2 + damping + 1e-18)) * (left.T @ twist))
+
+        wish = self._wish(q)
+        return rates, wish - right.T @ (right @ wish)
 
     def _jacobian(self, q: Vector) -> Matrix:
         robot = self._robot
@@ -117,20 +133,13 @@ class Servo:
         found: Matrix = full @ robot.chain.gain
         return found
 
-    def _for_twist(self, q: Vector, twist: Vector) -> tuple[Vector, Vector]:
-        """Rates that move the tip, and those of the secondary tasks that leave it where it is, shape (dof,) each."""
-        left, sizes, right = np.linalg.svd(self._jacobian(q), full_matrices=False)
-        low = float(sizes[-1])
-        damping = (1.0 - (low / LEAST_SINGULAR) ** 2) * LEAST_SINGULAR**2 if low < LEAST_SINGULAR else 0.0
-        rates = right.T @ ((sizes / (sizes**2 + damping + 1e-18)) * (left.T @ twist))
-        wish = self._wish(q)
-        return rates, wish - right.T @ (right @ wish)
-
     def _wish(self, q: Vector) -> Vector:
         """Rates of the secondary tasks, shape (dof,)."""
-        centring, volume = self._tasks.centring, self._tasks.manipulability
+        centring = self._tasks.centring
+        volume = self._tasks.manipulability
         if centring == 0.0 and volume == 0.0:
             return np.zeros_like(q)
+
         wish: Vector = np.nan_to_num(centring * (self._middle - q), nan=0.0)
         if volume > 0.0:
             wish = wish + volume * self._volume_slope(q)
@@ -148,36 +157,29 @@ class Servo:
         rows = jacobian @ jacobian.T if len(self._ramp) >= 6 else jacobian.T @ jacobian
         return float(np.sqrt(max(np.linalg.det(rows), 0.0)))
 
-    def _within_limits(self, q: Vector, rates: Vector, seconds: float) -> Vector:
-        """Rates within velocity limits, and such that no joint passes its range."""
-        robot = self._robot
-        brake = max(REACTION_SECONDS, seconds)
-        most = np.minimum(self._speed, np.maximum(robot.upper - q, 0.0) / brake)
-        least = np.maximum(-self._speed, np.minimum(robot.lower - q, 0.0) / brake)
-        if self._method == "clipped":
-            return np.clip(rates, least, most)
-        bound = np.where(rates > 0.0, most, -least)
-        share = np.min(np.divide(bound, np.abs(rates), out=np.ones_like(rates), where=np.abs(rates) > bound))
-        scaled: Vector = rates * share
-        return scaled
-
     def _apart(self, q: Vector, rates: Vector, wish: Vector, seconds: float) -> Vector:
         """Rates whose approach to the nearest body falls with the distance; the distance is a lower bound of it."""
-        fast, whole = self._world.fast, rates + wish
+        fast = self._world.fast
+        whole = rates + wish
         if fast is None or not whole.any():
             return whole
+
         rows = np.vstack([q, q + self._ramp])
         lower = fast.clearance(self._robot.joint_values(rows)).lower
         here = float(lower[0])
         if not here < self._near or not np.isfinite(lower).all():
             return whole
-        slope, share = (lower[1:] - here) / STEP, max(here - self._kept, 0.0) / (self._near - self._kept)
+
+        slope = (lower[1:] - here) / STEP
+        share = max(here - self._kept, 0.0) / (self._near - self._kept)
         if slope @ wish < 0.0:  # the secondary task fades out in the outer half, and leaves the inner one to the tip
             whole = rates + max(2.0 * share - 1.0, 0.0) * wish
+
         allowed = -min(share * self._tip_speed(whole), 0.5 * max(here - self._kept, 0.0) / seconds)
         approach = float(slope @ whole)
         if approach >= allowed:
             return whole
+
         if self._slide:
             whole = whole + slope * ((allowed - approach) / max(float(slope @ slope), 1e-12))
         else:
@@ -188,12 +190,27 @@ class Servo:
     def _tip_speed(self, rates: Vector) -> float:
         return float(np.abs(rates) @ self._world.weights)
 
+    def _within_limits(self, q: Vector, rates: Vector, seconds: float) -> Vector:
+        """Rates within velocity limits, and such that no joint passes its range."""
+        robot = self._robot
+        brake = max(REACTION_SECONDS, seconds)
+        most = np.minimum(self._speed, np.maximum(robot.upper - q, 0.0) / brake)
+        least = np.maximum(-self._speed, np.minimum(robot.lower - q, 0.0) / brake)
+
+        if self._method == "clipped":
+            return np.clip(rates, least, most)
+        bound = np.where(rates > 0.0, most, -least)
+        share = np.min(np.divide(bound, np.abs(rates), out=np.ones_like(rates), where=np.abs(rates) > bound))
+        scaled: Vector = rates * share
+        return scaled
+
     def _proven(self, q: Vector, rates: Vector, seconds: float) -> Vector:
         """The rates, or the largest share of them with which the step is proven free; 0 if none is."""
         if not rates.any():
             return rates
         if self._world.motion_proven(q, q + seconds * rates):
             return rates
+
         ends = q + seconds * np.outer(SHARES, rates)
         proven = self._world.motions_proven(np.broadcast_to(q, ends.shape), ends)
         return rates * float(SHARES[proven.argmax()]) if proven.any() else np.zeros_like(rates)

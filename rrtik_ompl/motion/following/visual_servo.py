@@ -67,7 +67,8 @@ def interaction_matrix(points: ArrayLike, depths: ArrayLike) -> Matrix:
     z = finite_array(depths, (len(seen),), "depths")
     if (z <= 0.0).any():
         raise InputError(f"depths must be above 0, got {z.min():g}")
-    (x, y), none = seen.T, np.zeros(len(seen))
+    x, y = seen.T
+    none = np.zeros(len(seen))
     across = np.stack([-1.0 / z, none, x / z, x * y, -(1.0 + x * x), y], axis=1)
     down = np.stack([none, -1.0 / z, y / z, 1.0 + y * y, -x * y, -x], axis=1)
     return np.stack([across, down], axis=1).reshape(-1, 6)
@@ -113,14 +114,22 @@ class VisualServo:
         patience: float = 0.15,
     ) -> None:
         require(servo, Servo, "servo")
-        self._servo, self._robot = servo, robot
+        self._servo = servo
+        self._robot = robot
         self._method = one_of(get_args(ServoMethod), method, "method of visual servoing")
         if self._method == "image" and T_base_camera is None:
             raise InputError("visual servoing by 'image' needs T_base_camera, the pose of the camera")
         self._camera = None if T_base_camera is None else rigid(T_base_camera, "pose of the camera")
-        self._gain, self._speed, self._turn = positive(gain, "gain"), positive(speed, "speed"), positive(turn, "turn")
+
+        self._gain = positive(gain, "gain")
+        self._speed = positive(speed, "speed")
+        self._turn = positive(turn, "turn")
         self._patience = positive(patience, "patience")
-        self.near, self.aligned, self.jump = 5e-4, np.deg2rad(0.1), 0.03  # [m], [rad], [m]: done; of a sighting
+
+        self.near = 5e-4  # [m] and
+        self.aligned = np.deg2rad(0.1)  # [rad], within which the tip is there
+        self.jump = 0.03  # [m] from one sighting to the next: more is taken for an error
+
         self._goal: pin.SE3 | None = None
         self._unseen = 0.0
 
@@ -140,9 +149,13 @@ class VisualServo:
         Raises:
             InputError: If one of them is none.
         """
-        here, seconds = self._robot.configuration(q, "configuration"), positive(dt, "time step")
+        here = self._robot.configuration(q, "configuration")
+        seconds = positive(dt, "time step")
         state = self._look(None if seen is None else rigid(seen, "where the tip shall be"), seconds)
-        tip, goal, still = self._robot.fk(here), self._goal, np.zeros(self._robot.dof)
+        tip = self._robot.fk(here)
+        goal = self._goal
+        still = np.zeros(self._robot.dof)
+
         if goal is None:
             return ServoStep(still, "lost", np.inf, np.inf)
         away, turned = apart(tip, goal)
@@ -150,6 +163,7 @@ class VisualServo:
             return ServoStep(still, state, away, turned)
         if away <= self.near and turned <= self.aligned:
             return ServoStep(still, "done", away, turned)
+
         rates = self._servo.step(here, self._slowed(self._twist(tip, goal)), seconds)
         return ServoStep(rates, "moving" if np.abs(rates).max() > STILL else "blocked", away, turned)
 
@@ -158,7 +172,9 @@ class VisualServo:
         if seen is None:
             self._unseen += seconds
             return "moving" if self._unseen <= self._patience else "lost"
-        before, self._unseen = self._goal, 0.0
+
+        before = self._goal
+        self._unseen = 0.0
         if before is not None and np.linalg.norm(seen.translation - before.translation) > self.jump:
             return "jumped"
         self._goal = seen
@@ -169,6 +185,7 @@ class VisualServo:
         if self._method == "position" or self._camera is None:
             turning = tip.rotation @ pin.log3(tip.rotation.T @ goal.rotation)
             return self._gain * np.concatenate([goal.translation - tip.translation, turning])
+
         camera = self._camera
         now, wanted = (_square(camera.actInv(T)) for T in (tip, goal))
         if min(now[:, 2].min(), wanted[:, 2].min()) < MIN_DEPTH:
@@ -176,14 +193,16 @@ class VisualServo:
         error = (now[:, :2] / now[:, 2:] - wanted[:, :2] / wanted[:, 2:]).ravel()
         here, there = (interaction_matrix(each[:, :2] / each[:, 2:], each[:, 2]) for each in (now, wanted))
         moved = self._gain * np.linalg.lstsq(0.5 * (here + there), error, rcond=None)[0]  # of the gripper: - L moves it
+
         spin = moved[3:]
         velocity = moved[:3] + np.cross(spin, camera.actInv(tip).translation)
         return np.concatenate([camera.rotation @ velocity, camera.rotation @ spin])
 
     def _slowed(self, twist: Vector) -> Vector:
         """The same direction, within the speeds of the tip."""
-        fast = float(np.linalg.norm(twist[:3])) / self._speed, float(np.linalg.norm(twist[3:])) / self._turn
-        return twist / max(*fast, 1.0)
+        linear = float(np.linalg.norm(twist[:3])) / self._speed
+        angular = float(np.linalg.norm(twist[3:])) / self._turn
+        return twist / max(linear, angular, 1.0)
 
 
 def _square(T: pin.SE3) -> Matrix:

@@ -51,10 +51,9 @@ def time_parameterize(
     With ``blend`` corners are rounded and passed without a stop, as fast as the limits allow [19]. The motion then
     leaves the path by at most 0.22 of ``blend``. Its acceleration never jumps, not even without jerk limits; it is
     proven free where it leaves the path, if the path is proven, or else checked in steps; :meth:`Trajectory.prove`
-    proves the whole motion anew. Waypoints
-    nearer to each other than 0.02 of ``blend`` are merged, so that many of them are one smooth curve, and no piece of
-    such a curve is shorter than 1 ms. A corner that cannot be rounded is a stop; where rounding makes nothing faster
-    none is rounded.
+    proves the whole motion anew. Waypoints nearer to each other than 0.02 of ``blend`` are merged, so that many of
+    them are one smooth curve, and no piece of such a curve is shorter than 1 ms. A corner that cannot be rounded is a
+    stop; where rounding makes nothing faster none is rounded.
 
     Args:
         path: A valid path. Waypoints that coincide or lie on a line are no corners.
@@ -94,15 +93,18 @@ def time_parameterize(
     bounds = RateLimits.of(limits) if isinstance(limits, Robot) else limits
     require(bounds, RateLimits, "limits of a path to time", "use RateLimits.of(robot)")
     bounds = bounds.for_joints(path.waypoints.shape[1])
+
     for robot in (limits if isinstance(limits, Robot) else None, None if world is None else world.robot):
         if robot is not None:
             require_joints(robot, path.joint_names, "path")
+
     corners = _corners(path)
     reach = float(bounded_array(blend, (), "blend"))
     if reach < 0.0:
         raise InputError(f"blend must be 0 or greater, got {reach:g}")
     if clearance is not None:
         not_negative(clearance, "clearance")
+
     arm = limits if isinstance(limits, Robot) else None if world is None else world.robot
     wanted = (tip_speed, tip_acceleration, torque, not_negative(payload, "payload") or None)
     more = None
@@ -110,12 +112,12 @@ def time_parameterize(
         more = DynamicLimits.of(
             arm, tip_speed=tip_speed, tip_acceleration=tip_acceleration, torque=torque, payload=payload
         )
+
     stopping = stopped(path, corners, bounds, more)
     if reach == 0.0:
         return stopping
     if world is None:
         raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
-    require(world, World, "world of a path with rounded corners")
     check_route_clearance(world, clearance, path.waypoints)
     faults = fault_finder(path, world, clearance)
     return blended(path, corners, bounds, reach, stopping.duration, faults, more) or stopping

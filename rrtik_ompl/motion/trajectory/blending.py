@@ -45,28 +45,26 @@ def blended(
     if len(rows) < 2:  # the whole path is shorter than what is merged
         return None
     along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
-    radii, room = first_radii(rows, blend), (DEVIATION_SHARE - MERGED_SHARE) * blend
+    radii = first_radii(rows, blend)
+    room = (DEVIATION_SHARE - MERGED_SHARE) * blend
+
     for _ in range(MAX_ROUNDS):
         parts = runs(rows, radii, limits, room=room, more=more)
         motion = within(joined([run.pieces for run in parts], path), limits)
         if motion.duration >= slowest:
             return None
+
         columns = zip(*((run.places, run.apart, run.on_path) for run in parts), strict=True)
         places, apart, on_path = (np.concatenate(column) for column in columns)
         bad = places[apart > room]
         if len(bad) == 0:
             off_path = np.ones_like(on_path) if merged else ~on_path  # what was proven is the path with all corners
             bad = places[faults(motion, off_path)]
+
         if len(bad) == 0:
             return motion
         radii = _narrower(radii, along[1:-1], bad, LEAST_RADIUS * blend)
     return None
-
-
-def stopped(path: JointPath, corners: Matrix, limits: RateLimits, more: DynamicLimits | None) -> Trajectory:
-    """The motion along a path with these vertices that stops at each of them."""
-    parts = runs(corners, np.zeros(len(corners) - 2), limits, more=more)
-    return within(joined([run.pieces for run in parts], path), limits)
 
 
 def within(motion: Trajectory, limits: RateLimits, rounds: int = 10) -> Trajectory:
@@ -78,6 +76,32 @@ def within(motion: Trajectory, limits: RateLimits, rounds: int = 10) -> Trajecto
             break
         motion = motion.slowed(factor)
     return motion
+
+
+def _narrower(radii: Vector, along: Vector, bad: Vector, least: float) -> Vector:
+    """Half the radius of the corners near bad places; 0 where that is less than the least."""
+    bad = np.unique(bad)
+    blamed = (np.abs(along - bad[_nearest(bad, along)]) <= radii) & (radii > 0.0)
+    rounded = np.flatnonzero(radii > 0.0)
+    if not blamed.any() and len(rounded):
+        blamed[rounded[_nearest(along[rounded], bad)]] = True
+
+    halved: Vector = np.where(blamed, 0.5 * radii, radii)
+    halved[halved < least] = 0.0
+    return halved
+
+
+def _nearest(rows: Vector, places: Vector) -> NDArray[np.int64]:
+    """Numbers of the rows, ascending, that are nearest to places: of two the first."""
+    after = np.minimum(np.searchsorted(rows, places), len(rows) - 1)
+    before = np.maximum(after - 1, 0)
+    return np.where(np.abs(places - rows[before]) <= np.abs(places - rows[after]), before, after)
+
+
+def stopped(path: JointPath, corners: Matrix, limits: RateLimits, more: DynamicLimits | None) -> Trajectory:
+    """The motion along a path with these vertices that stops at each of them."""
+    parts = runs(corners, np.zeros(len(corners) - 2), limits, more=more)
+    return within(joined([run.pieces for run in parts], path), limits)
 
 
 def fault_finder(path: JointPath, world: World, clearance: float | None) -> Faults:
@@ -102,22 +126,3 @@ def fault_finder(path: JointPath, world: World, clearance: float | None) -> Faul
         )
 
     return unproven
-
-
-def _narrower(radii: Vector, along: Vector, bad: Vector, least: float) -> Vector:
-    """Half the radius of the corners near bad places; 0 where that is less than the least."""
-    bad = np.unique(bad)
-    blamed = (np.abs(along - bad[_nearest(bad, along)]) <= radii) & (radii > 0.0)
-    rounded = np.flatnonzero(radii > 0.0)
-    if not blamed.any() and len(rounded):
-        blamed[rounded[_nearest(along[rounded], bad)]] = True
-    halved: Vector = np.where(blamed, 0.5 * radii, radii)
-    halved[halved < least] = 0.0
-    return halved
-
-
-def _nearest(rows: Vector, places: Vector) -> NDArray[np.int64]:
-    """Numbers of the rows, ascending, that are nearest to places: of two the first."""
-    after = np.minimum(np.searchsorted(rows, places), len(rows) - 1)
-    before = np.maximum(after - 1, 0)
-    return np.where(np.abs(places - rows[before]) <= np.abs(places - rows[after]), before, after)

@@ -17,22 +17,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.motion.trajectory.motion import Trajectory
 
 
-def proof_of_pieces(motion: Trajectory, world: World, clearance: float, first: int, end: int) -> Proof:
-    """A proof of the pieces from ``first`` up to ``end``; see :meth:`Trajectory.prove`."""
-    h, begin = np.diff(motion.times)[first:end], motion.accelerations[first:end]
-    pushes = np.maximum(np.abs(begin), np.abs(begin + h[:, None] * motion.jerks[first:end]))
-    times = motion.times[first : end + 1]
-    return proof_by_chords(times, pushes @ world.weights, lambda clock: motion(clock).positions, world, clearance)
-
-
-def greatest_speeds(motion: Trajectory) -> Matrix:
-    """Bounds of the rates of all joints on each piece, shape (m, n) [rad/s or m/s]."""
-    h = np.diff(motion.times)[:, None]
-    peak = np.abs(motion.velocities)
-    found: Matrix = np.maximum(peak[1:], peak[:-1]) + h * np.abs(motion.jerks * h) / 8.0
-    return found
-
-
 def faults_of(motion: Trajectory, world: World) -> list[tuple[float, str]]:
     """The first fault of every piece that has one, time [s] and reason; see :meth:`Trajectory.faults`."""
     clock = bad_moments(motion, world)
@@ -47,11 +31,30 @@ def bad_moments(motion: Trajectory, world: World) -> Vector:
     counts = np.ceil(ways * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
     pieces, shares = even_parts(counts)
     clock = np.append(motion.times[pieces] + shares * h[pieces], motion.duration)
+
     bad = np.flatnonzero(~world.checks.certified(motion(clock).positions))
     touching, where = np.unique(np.append(pieces, len(h) - 1)[bad], return_index=True)
     moments = np.asarray(clock[bad[where]])
+
     if world.settings.proving is None:
         return moments
     gaps = proof_of_pieces(motion, world, world.settings.proving, 0, len(h)).unproven
     unproven = np.setdiff1d([gap.motion for gap in gaps], touching).astype(np.int64)
     return np.sort(np.concatenate([moments, motion.times[unproven]]))
+
+
+def greatest_speeds(motion: Trajectory) -> Matrix:
+    """Bounds of the rates of all joints on each piece, shape (m, n) [rad/s or m/s]."""
+    h = np.diff(motion.times)[:, None]
+    peak = np.abs(motion.velocities)
+    found: Matrix = np.maximum(peak[1:], peak[:-1]) + h * np.abs(motion.jerks * h) / 8.0
+    return found
+
+
+def proof_of_pieces(motion: Trajectory, world: World, clearance: float, first: int, end: int) -> Proof:
+    """A proof of the pieces from ``first`` up to ``end``; see :meth:`Trajectory.prove`."""
+    h = np.diff(motion.times)[first:end]
+    begin = motion.accelerations[first:end]
+    pushes = np.maximum(np.abs(begin), np.abs(begin + h[:, None] * motion.jerks[first:end]))
+    times = motion.times[first : end + 1]
+    return proof_by_chords(times, pushes @ world.weights, lambda clock: motion(clock).positions, world, clearance)

@@ -72,19 +72,24 @@ def proof_by_chords(
         clearance: To be kept from every obstacle [m].
         finer: How many of ``SLACKS`` have been tried.
     """
-    h, slack = np.diff(times), SLACKS[finer]
+    h = np.diff(times)
+    slack = SLACKS[finer]
     chords = chords_of(h, pushes, slack)
     clock = times[chords.pieces] + chords.shares * h[chords.pieces]
     found = chords.joined(world.prover.route(places(np.append(clock, times[-1])), clearance=clearance, slack=slack))
     if found.proven or finer + 1 == len(SLACKS):
         return found
+
     unproven = np.array([gap.motion for gap in found.unproven])
     q = places(times[unproven] + np.nan_to_num([gap.share for gap in found.unproven]) * h[unproven])
     hopeful = world.prover.proven(q, q, clearance=clearance)  # where the motion itself is as near, no chord helps
     gaps = [gap for gap, hope in zip(found.unproven, hopeful, strict=True) if not hope]
     near = unproven[hopeful]
+
     for stretch in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else ():
-        first, end = int(stretch[0]), int(stretch[-1]) + 1
+        first = int(stretch[0])
+        end = int(stretch[-1]) + 1
         again = proof_by_chords(times[first : end + 1], pushes[first:end], places, world, clearance, finer + 1)
         gaps += [replace(gap, motion=first + gap.motion) for gap in again.unproven]
+
     return replace(found, unproven=tuple(sorted(gaps, key=lambda gap: gap.motion)))

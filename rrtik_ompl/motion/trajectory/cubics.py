@@ -29,7 +29,9 @@ def jerks_of(
 def ends_of(times: Vector, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> Matrix:
     """Where the cubic of each piece ends, shape (m - 1, n)."""
     h = (times[1:] - times[:-1])[:, None]
-    v, a, j = velocities[:-1], accelerations[:-1], jerks_of(times, velocities, accelerations)
+    v = velocities[:-1]
+    a = accelerations[:-1]
+    j = jerks_of(times, velocities, accelerations)
     ends: Matrix = positions[:-1] + h * (v + h * (a / 2.0 + h * j / 6.0))
     return ends
 
@@ -37,8 +39,11 @@ def ends_of(times: Vector, positions: Matrix, velocities: Matrix, accelerations:
 def hermite_accelerations(times: Vector, positions: Matrix, velocities: Matrix) -> Matrix:
     """Accelerations at the beginning of the cubics through positions and velocities, and at the end of the last one."""
     h = np.diff(times)[:, None]
-    mean, first, last = np.diff(positions, axis=0) / h, velocities[:-1], velocities[1:]
-    begin, end = (6.0 * mean - 4.0 * first - 2.0 * last) / h, (2.0 * first + 4.0 * last - 6.0 * mean) / h
+    mean = np.diff(positions, axis=0) / h
+    first = velocities[:-1]
+    last = velocities[1:]
+    begin = (6.0 * mean - 4.0 * first - 2.0 * last) / h
+    end = (2.0 * first + 4.0 * last - 6.0 * mean) / h
     return np.vstack([begin, end[-1:]])
 
 
@@ -55,27 +60,32 @@ def cubic_peaks(times: Vector, velocities: Matrix, accelerations: Matrix) -> tup
     h = times[1:] - times[:-1]
     jerks = jerks_of(times, velocities, accelerations)
     v, a, j = (np.ascontiguousarray(rows.T) for rows in (velocities, accelerations, jerks))
+
     with np.errstate(divide="ignore", invalid="ignore"):
         turn = -a[:, :-1] / j
         between = np.where((turn > 0.0) & (turn < h), v[:, :-1] + 0.5 * turn * a[:, :-1], 0.0)
     velocity = np.maximum(np.abs(v).max(axis=1), np.abs(between).max(axis=1))
+
     ends = a[:, :-1] + h * j
     apart = np.abs(ends - a[:, 1:])
     # what rounding of times and velocities does to the acceleration at the end of a piece
     noise = 8.0 * np.finfo(np.float64).eps * (np.abs(v).max() + times[-1] * np.abs(a).max()) / h
     smooth = apart <= noise
     acceleration = np.maximum(np.abs(a).max(axis=1), np.abs(np.where(smooth, 0.0, ends)).max(axis=1))
+
     jump = JUMP_SHARE * acceleration.max()
     rest = np.abs(a[:, [0, -1]]) <= jump  # before its beginning and after its end the arm does not move
     smooth |= apart <= jump
     steady = smooth.all(axis=1) & rest.all(axis=1)
     jerk = np.where(steady, np.abs((a[:, 1:] - a[:, :-1]) / h).max(axis=1), np.inf)
+
     return velocity, acceleration, jerk
 
 
 def set_point_peaks(times: Vector, velocities: Matrix, accelerations: Matrix) -> tuple[Vector, Vector, Vector]:
     """The same at set points, the jerk as a drive sees it: the change of acceleration from one period to the next."""
-    velocity, acceleration = np.abs(velocities).max(axis=0), np.abs(accelerations).max(axis=0)
+    velocity = np.abs(velocities).max(axis=0)
+    acceleration = np.abs(accelerations).max(axis=0)
     h = np.maximum(np.diff(times), period_of(times))[:, None]
     jerk = np.abs(np.diff(accelerations, axis=0) / h).max(axis=0)
     rest = np.abs(accelerations[[0, -1]]).max(axis=0) <= JUMP_SHARE * acceleration.max()
@@ -95,10 +105,12 @@ def are_set_points(times: Vector, positions: Matrix, velocities: Matrix, acceler
     """Whether points are those of a smooth motion at a control rate, which jerks change between two of them."""
     if period_of(times) > LONGEST_PERIOD + CLOCK_ERROR:
         return False
+
     apart = np.abs(ends_of(times, positions, velocities, accelerations) - positions[1:]).max()
     h = np.diff(times)[:, None]
     rise = np.diff(velocities, axis=0)
     most = np.maximum(np.abs(accelerations).max(axis=0), np.abs(rise / h).max(axis=0))
+
     # of any motion whose acceleration is nowhere larger, positions differ by less from these
     gap = np.diff(positions, axis=0) - h * (velocities[:-1] + 0.5 * rise) + h**2 * np.diff(accelerations, axis=0) / 12.0
     near = np.abs(gap) <= h**2 * most / 2.0 + CLOCK_ERROR * np.abs(velocities).max(axis=0) + EXACT
@@ -112,16 +124,24 @@ def in_thirds(times: Vector, positions: Matrix, velocities: Matrix, acceleration
         Times, shape (3 m - 2, 1), positions, velocities and accelerations; every third is a point.
     """
     h = np.diff(times)[:, None]
-    p, v, a = positions[:-1], velocities[:-1], accelerations[:-1]
+    p = positions[:-1]
+    v = velocities[:-1]
+    a = accelerations[:-1]
+
+    # what the jerks of the three thirds have to bring about: of position, velocity and acceleration
     gains = (positions[1:] - p - h * (v + h * a / 2.0), (velocities[1:] - v - h * a) * h)
     changes = np.stack([*gains, (accelerations[1:] - a) * h**2])
     first, second, _ = np.einsum("ij,jkl->ikl", np.linalg.inv(_THIRDS), changes) / h**3
     x = h / 3.0
+
     rows = [np.repeat(values, 3, axis=0)[:-2] for values in (times[:, None], positions, velocities, accelerations)]
     for k, jerk in enumerate((first, second), start=1):
-        p, v, a = p + x * (v + x * (a / 2.0 + x * jerk / 6.0)), v + x * (a + x * jerk / 2.0), a + x * jerk
+        p = p + x * (v + x * (a / 2.0 + x * jerk / 6.0))
+        v = v + x * (a + x * jerk / 2.0)
+        a = a + x * jerk
         for row, values in zip(rows, (times[:-1, None] + k * x, p, v, a), strict=True):
             row[k::3] = values
+
     return rows
 
 

@@ -87,7 +87,8 @@ class Curve:
 
     def at(self, places: Vector) -> Samples:
         """Position and derivatives at places that do not decrease, shape (m,)."""
-        kernels, n = library(KERNELS), self.vertices.shape[1]
+        kernels = library(KERNELS)
+        n = self.vertices.shape[1]
         if kernels is None:
             values = reference.sample_curve(self.vertices, self.along, self.directions, self.radii, places)
         else:
@@ -114,11 +115,17 @@ class Curve:
 
     def tightest(self, places: Vector) -> Vector:
         """The smallest radius, a sixth less at most, of the corners within which places lie; inf for none."""
-        at, radii = self.along[1:-1], self.radii[1:-1]
-        steps, found = np.floor(4.0 * np.log2(np.maximum(radii, 1e-300))), np.full(len(places), np.inf)
+        at = self.along[1:-1]
+        radii = self.radii[1:-1]
+        # in steps of a quarter of an octave, so that there are few radii to search for
+        steps = np.floor(4.0 * np.log2(np.maximum(radii, 1e-300)))
+        found = np.full(len(places), np.inf)
+
         for step in np.unique(steps)[::-1]:
-            alike, radius = steps == step, np.exp2(0.25 * step)
-            starts, ends = np.sort(at[alike] - radii[alike]), np.sort(at[alike] + radii[alike])
+            alike = steps == step
+            radius = np.exp2(0.25 * step)
+            starts = np.sort(at[alike] - radii[alike])
+            ends = np.sort(at[alike] + radii[alike])
             found[np.searchsorted(starts, places) > np.searchsorted(ends, places)] = radius
         return found
 
@@ -127,16 +134,19 @@ class Curve:
 
         Also the smallest radius, about, of the corners within which each lies; see :meth:`tightest`.
         """
-        at, radii = self.along[1:-1], self.radii[1:-1]
+        at = self.along[1:-1]
+        radii = self.radii[1:-1]
         knots = np.unique(np.concatenate([at - radii, at, at + radii, self.along[[0, -1]]]))
         knots = knots[np.concatenate([[True], knots[1:] - knots[:-1] > SAME_PLACE * self.length])]
         knots[-1] = self.length
+
         middles = 0.5 * (knots[1:] + knots[:-1])
         widths = knots[1:] - knots[:-1]
         tightest = self.tightest(middles)
         steps = np.where(np.isinf(tightest), widths / STEPS_PER_LINE, tightest / STEPS_PER_RADIUS)
         steps = np.minimum(steps, self.length / LEAST_STEPS)
         counts = np.maximum(np.ceil(widths / steps), 1.0).astype(np.int64)
+
         pieces, shares = even_parts(counts)
         places = np.append(knots[pieces] + shares * widths[pieces], self.length)
         return places, np.append(tightest[pieces], np.inf)

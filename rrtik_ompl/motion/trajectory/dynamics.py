@@ -24,9 +24,10 @@ from rrtik_ompl.motion.trajectory.fastest import MOST, Bounds
 
 DIRECTIONS = 12  # of the tip's acceleration that are bounded; the polygon loses 0.9 % of the circle
 ANGLES = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-INSIDE = float(np.cos(0.5 * np.pi / DIRECTIONS))
-LEAST_SPEED = 1e-12
-FASTEST_TIP, HARDEST_TIP = 20.0, 200.0  # [m/s], [m/s^2]: a larger limit is a slip of the pen, or in millimetres
+INSIDE = float(np.cos(0.5 * np.pi / DIRECTIONS))  # where the polygon's sides are, its corners being on the circle
+LEAST_SPEED = 1e-12  # [m] along a unit of the path; a slower tip has no direction
+FASTEST_TIP = 20.0  # [m/s]; a larger limit is a slip of the pen, or in millimetres
+HARDEST_TIP = 200.0  # [m/s^2]; likewise
 
 
 class Measured(NamedTuple):
@@ -88,11 +89,13 @@ class DynamicLimits:
             raise InputError("limits of the tip and of torques need a robot: pass it as limits, or pass world=...")
         mass = not_negative(payload, "payload")
         limits = np.full(robot.dof, np.inf) if torque is None or torque is False else _torques(robot, torque)
+
         wanted = bool(np.isfinite(limits).any())
         if mass > 0.0 and not wanted:
             raise InputError("payload: it counts only for torques; give torque=True, or their limits")
         if not wanted and tip_speed is None and tip_acceleration is None:
             return None
+
         speed = _of_tip(tip_speed, "tip speed", "m/s", FASTEST_TIP)
         push = _of_tip(tip_acceleration, "tip acceleration", "m/s^2", HARDEST_TIP)
         return cls(robot, speed, push, limits, _loaded(robot, mass))
@@ -125,10 +128,12 @@ class DynamicLimits:
             np.linalg.norm(found.tip_velocities, axis=1).max() / self.tip_speed,
             np.sqrt(np.linalg.norm(found.tip_accelerations, axis=1).max() / self.tip_acceleration),
         ]
+
         if self.moves_torques:
             moving = found.torques - found.holding
             room = np.where(moving > 0.0, self.torque - found.holding, self.torque + found.holding)
             shares.append(np.sqrt(max((np.abs(moving) / np.maximum(room, 1e-300)).max(), 0.0)))
+
         most = float(max(shares))
         return most * (1.0 + 1e-12) if most > 1.0 else 1.0
 
@@ -138,11 +143,15 @@ class DynamicLimits:
         return Measured(*(np.array(column) for column in zip(*rows, strict=True)))
 
     def _states(self, *states: Matrix) -> Iterator[tuple[Vector, Vector, Vector, Vector]]:
-        model, gain = self.model, self.robot.chain.gain
-        data, tip = working_memory(model), model.getFrameId(self.robot.tip)
-        here, none = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, np.zeros(self.robot.dof)
+        model = self.model
+        gain = self.robot.chain.gain
+        data = working_memory(model)
+        tip = model.getFrameId(self.robot.tip)
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        none = np.zeros(self.robot.dof)
         still = np.zeros(model.nv)
         full = self.robot.pinocchio_configuration(states[0])
+
         for q, v, a in zip(full, states[1] @ gain.T, states[2] @ gain.T, strict=True):
             torques = holding = none
             if self.moves_torques:
@@ -150,33 +159,39 @@ class DynamicLimits:
                 torques = gain.T @ pin.rnea(model, data, q, v, a)
             pin.forwardKinematics(model, data, q, v, a)
             pin.updateFramePlacement(model, data, tip)
-            speed = pin.getFrameVelocity(model, data, tip, here).linear.copy()
-            push = pin.getFrameClassicalAcceleration(model, data, tip, here).linear.copy()
+            speed = pin.getFrameVelocity(model, data, tip, axes).linear.copy()
+            push = pin.getFrameClassicalAcceleration(model, data, tip, axes).linear.copy()
             yield speed, push, torques, holding
 
     def _tip_rows(self, unit: Measured) -> Bounds:
         """The acceleration p' u + p'' x of the tip lies in the plane of p' and p'': its component in each direction."""
-        ahead, bow = unit.tip_velocities, unit.tip_accelerations
+        ahead = unit.tip_velocities
+        bow = unit.tip_accelerations
         size = np.linalg.norm(ahead, axis=1)
         along = ahead / np.maximum(size, LEAST_SPEED)[:, None]
         straight = (bow * along).sum(axis=1)
         aside = np.linalg.norm(bow - straight[:, None] * along, axis=1)
+
         first = np.outer(size, np.cos(ANGLES))
         second = np.outer(straight, np.cos(ANGLES)) + np.outer(aside, np.sin(ANGLES))
         most = np.full_like(first, INSIDE * self.tip_acceleration)
+
         cap = self.tip_acceleration / np.maximum(np.where(size < LEAST_SPEED, aside, 0.0), 1e-200)
         return Bounds(Rows(first, second, -most, most), np.minimum(cap, MOST))
 
     def _torque_rows(self, unit: Measured, along: Matrix) -> Bounds:
-        high, low = self.torque - unit.holding, -self.torque - unit.holding
+        high = self.torque - unit.holding
+        low = -self.torque - unit.holding
         if (high <= 0.0).any() or (low >= 0.0).any():
             joint = int(((high <= 0.0) | (low >= 0.0)).any(axis=0).argmax())
-            name, need = self.robot.joint_names[joint], np.abs(unit.holding[:, joint]).max()
+            name = self.robot.joint_names[joint]
+            need = np.abs(unit.holding[:, joint]).max()
             newtons = "N" if self.robot.prismatic[joint] else "N m"
             raise InputError(
                 f"torque limits: joint '{name}' needs {need:.3g} {newtons} to hold the arm still on this path, its "
                 f"limit is {self.torque[joint]:.3g} {newtons}; carry less, or choose another path"
             )
+
         used = np.isfinite(self.torque)
         rows = Rows(*(part[:, used] for part in (along, unit.torques - unit.holding, low, high)))
         return Bounds(rows, np.full(len(along), MOST))
@@ -206,6 +221,7 @@ def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
                 f"torque limits: robot '{robot.name}' states no efforts; its URDF needs them, or give torque=[...]"
             )
         return own
+
     given: Any = torque
     row = finite_array(given, () if dimensions(given) == 0 else (robot.dof,), f"torque limits of robot '{robot.name}'")
     if (row <= 0.0).any():

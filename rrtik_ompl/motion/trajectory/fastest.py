@@ -17,7 +17,8 @@ from rrtik_ompl.kernels.timing.reference import Rows
 from rrtik_ompl.motion.trajectory.curve import Samples
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 
-CRUISE_PARTS, MOST_PARTS = 12.0, 2000  # of the least time of a cruise, and of a motion
+CRUISE_PARTS = 12.0  # into which the least time of a cruise is cut
+MOST_PARTS = 2000  # of a motion
 MOST = 1e200  # path speed squared where nothing bounds it
 
 
@@ -80,6 +81,8 @@ class PathTiming:
         count = int(np.clip(np.ceil(CRUISE_PARTS * self.duration / seconds), 1, MOST_PARTS))
         places = self.places(np.linspace(0.0, self.duration, count + 1))
         speeds = np.diff(places) * (count / self.duration)
+
+        # the least speed of each window, then the largest of these: peaks narrower than a window are cut off
         width = 1 + int(seconds * count / self.duration)
         rest = np.zeros(width)
         least = sliding_window_view(np.concatenate([rest, speeds, rest]), width).min(axis=1)
@@ -107,6 +110,7 @@ def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) 
         task.high[:] = bounds.rows.high.ravel()
         kernels.find_squares(task.address)
         squares = task.squares.copy()
+
     speeds = np.sqrt(squares)
     with np.errstate(divide="ignore"):
         steps = 2.0 * (grid[1:] - grid[:-1]) / (speeds[1:] + speeds[:-1])

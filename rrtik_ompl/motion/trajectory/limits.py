@@ -13,10 +13,8 @@ from rrtik_ompl.base.copies import as_value, changed, in_one_line
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.model.robot import Robot
 
-DEFAULT_TURN_RATE, DEFAULT_SLIDE_RATE = (
-    0.5,
-    0.1,
-)  # [rad/s], [m/s]: of a joint without a velocity limit; slow enough to watch
+DEFAULT_TURN_RATE = 0.5  # [rad/s] of a joint without a velocity limit: slow enough to watch
+DEFAULT_SLIDE_RATE = 0.1  # [m/s] of one that slides
 RAMP_SECONDS = 0.5  # in which a joint without an acceleration limit reaches its full velocity
 ONSET_SECONDS = 0.1  # in which a joint without a jerk limit reaches its full acceleration
 
@@ -42,7 +40,8 @@ class RateLimits:
     acceleration: Vector
     jerk: Vector
 
-    __reduce__, __repr__ = as_value, in_one_line
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
     def __init__(self, velocity: ArrayLike, acceleration: ArrayLike, jerk: ArrayLike = np.inf) -> None:
         """Take limits, one number per joint; one number alone is for all joints.
@@ -88,6 +87,7 @@ class RateLimits:
         part = float(finite_array(share, (), "share of the limits"))
         if not 0.0 < part <= 1.0:
             raise InputError(f"share of the limits must be greater than 0 and at most 1, got {part:g}")
+
         plain = np.where(robot.prismatic, DEFAULT_SLIDE_RATE, DEFAULT_TURN_RATE)
         v = _of_robot(robot, velocity, "velocity", robot.velocity, plain)
         a = _of_robot(robot, acceleration, "acceleration", robot.acceleration, v / RAMP_SECONDS)
@@ -139,6 +139,7 @@ class RateLimits:
                 self._fits(len(row))
                 kept = finite_array(np.where(np.isfinite(limit), row, 0.0), (None,), f"peaks of {name}")
                 shares.append((kept / limit).max(initial=0.0))
+
         factors = [float(share) ** (1.0 / power) for power, share in enumerate(shares, start=1)]
         return 1.0 if max(shares) <= 1.0 else max(factors) * ROUNDING_MARGIN
 

@@ -28,16 +28,23 @@ def along_lines(corners: Matrix, limits: RateLimits) -> list[Pieces]:
     lengths = np.linalg.norm(edges, axis=1)
     directions = edges / lengths[:, None]
     rates = limits.along(directions)
+
     phases, pushes = _phases(lengths, *rates)
     _check(phases, lengths, rates)
     jerks = np.diff(np.concatenate([pushes, np.zeros_like(pushes[:, :1])], axis=1), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         jerks = np.where((phases > MIN_PHASE_SECONDS) & np.isfinite(rates[2])[:, None], jerks / phases, 0.0)
-    speeds, travelled = np.zeros_like(phases), np.zeros_like(phases)
+
+    speeds = np.zeros_like(phases)
+    travelled = np.zeros_like(phases)
     for k in range(6):
-        h, v, a, j = phases[:, k], speeds[:, k], pushes[:, k], jerks[:, k]
+        h = phases[:, k]
+        v = speeds[:, k]
+        a = pushes[:, k]
+        j = jerks[:, k]
         speeds[:, k + 1] = v + h * (a + 0.5 * h * j)
         travelled[:, k + 1] = travelled[:, k] + h * (v + h * (0.5 * a + h * j / 6.0))
+
     kept = phases > MIN_PHASE_SECONDS
     return [
         Pieces(h[used], a + np.outer(s[used], d), np.outer(v[used], d), np.outer(p[used], d))
@@ -60,7 +67,9 @@ def _phases(length: Vector, v: Vector, a: Vector, j: Vector) -> tuple[Matrix, Ma
         fast = cruise < 0.0
         ramp = np.where(fast, np.where(short, 2.0 * gentle, peak / a + onset), ramp)
         onset = np.minimum(onset, 0.5 * ramp)
-    hold, cruise = ramp - 2.0 * onset, np.maximum(cruise, 0.0)
+
+    hold = ramp - 2.0 * onset
+    cruise = np.maximum(cruise, 0.0)
     push = np.where(np.isinf(j), a, np.where(np.isinf(j), 0.0, j) * onset)
     phases = np.stack([onset, hold, onset, cruise, onset, hold, onset], axis=1)
     return phases, push[:, None] * PUSHES

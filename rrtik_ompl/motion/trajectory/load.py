@@ -45,7 +45,8 @@ def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) ->
         document = loads(read_text(file), ending)
         found = _from_document(document, robot)
         if robot is not None and found.joint_names != robot.joint_names:
-            own, wanted = ", ".join(found.joint_names), ", ".join(robot.joint_names)
+            own = ", ".join(found.joint_names)
+            wanted = ", ".join(robot.joint_names)
             raise InputError(f"the trajectory moves {own}, but robot '{robot.name}' has the joints {wanted}")
         return found
     except InputError as error:
@@ -69,17 +70,20 @@ def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
     if sliding is None and robot is not None and document["joint_names"] == list(robot.joint_names):
         sliding = robot.prismatic.tolist()
     names = {"joint_names": document["joint_names"], "prismatic": sliding, "robot_name": document["robot"]}
+
     plain = Trajectory(document["times"], document["positions"], document["velocities"], **names)
     if document["accelerations"] is None:
         return plain
+
     bends = finite_array(document["accelerations"], plain.positions.shape, "trajectory accelerations")
     points = (plain.times, plain.positions, plain.velocities, bends)
     dense = are_set_points(*points)
     if not dense:
         try:
             return Trajectory(*points, **names)
-        except InputError:
+        except InputError:  # they lead elsewhere than to the next point
             pass
+
     clock, *rows = in_thirds(*points)
     try:
         smooth = Trajectory(clock[:, 0], *rows, **names)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
+from io import BytesIO
 from typing import Any
 
 import yaml
@@ -44,6 +45,11 @@ def to_yaml(message: dict[str, Any]) -> str:
     return text
 
 
+def _dumper() -> type[yaml.SafeDumper]:
+    dumper: type[yaml.SafeDumper] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+    return dumper
+
+
 def from_yaml(text: str) -> dict[str, Any]:
     """A message from YAML.
 
@@ -73,21 +79,17 @@ def write_mcap(file: str | os.PathLike[str], robot: str, names: Sequence[str], c
         from mcap.writer import Writer
     except ImportError:
         raise InputError("MCAP files need the package mcap: pip install 'rrtik-ompl[mcap]'") from None
-    from io import BytesIO
 
     sink = BytesIO()
     writer = Writer(sink)
     writer.start(profile="", library="rrtik-ompl")
     schema = writer.register_schema("sensor_msgs/JointState", "jsonschema", json.dumps(_SCHEMA).encode())
     channel = writer.register_channel("/joint_states", "json", schema, {"robot": robot})
+
     for number, (time, position, velocity, acceleration) in enumerate(zip(*columns, strict=True)):
         stamp = round(time * NANOSECONDS)
         state = {"name": list(names), "position": position, "velocity": velocity, "acceleration": acceleration}
         writer.add_message(channel, stamp, json.dumps(state).encode(), stamp, number)
+
     writer.finish()
     write_bytes(file, sink.getvalue())
-
-
-def _dumper() -> type[yaml.SafeDumper]:
-    dumper: type[yaml.SafeDumper] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    return dumper

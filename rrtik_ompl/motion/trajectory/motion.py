@@ -85,7 +85,8 @@ class Trajectory:
     robot_name: str = ""
     set_points: NDArray[np.int64] | None = None
 
-    __reduce__, _repr_html_ = as_value, in_notebook
+    __reduce__ = as_value
+    _repr_html_ = in_notebook
 
     def __init__(
         self,
@@ -107,9 +108,11 @@ class Trajectory:
         # the names and units of a path obey the same rules, so a path checks them
         path = JointPath(positions, joint_names, prismatic, robot_name)
         rows = path.waypoints
+
         clock = finite_array(times, (len(rows),), "trajectory times")
         if len(clock) < 2 or clock[0] != 0.0 or not (clock[1:] > clock[:-1]).all():
             raise InputError("trajectory times: expected two or more, beginning with 0, each greater than the last")
+
         rates = finite_array(velocities, rows.shape, "trajectory velocities")
         if accelerations is None:
             bends = hermite_accelerations(clock, rows, rates)
@@ -122,6 +125,7 @@ class Trajectory:
                     f"trajectory: point {point} is {apart.max():.2g} away from where the point "
                     "before it leads; leave the accelerations out to have positions and velocities decide"
                 )
+
         values = {"times": clock, "positions": rows, "velocities": rates, "accelerations": bends}
         for name, value in values.items():
             object.__setattr__(self, name, frozen(value))
@@ -148,11 +152,13 @@ class Trajectory:
         many = getattr(t, "ndim", int(np.iterable(t))) > 0
         wanted = finite_array(t, (None,) if many else (), "time of a trajectory")
         clock = np.clip(np.atleast_1d(wanted), 0.0, self.duration)
+
         piece = np.clip(np.searchsorted(self.times, clock, side="right") - 1, 0, len(self.times) - 2)
         x = (clock - self.times[piece])[:, None]
         q, v, a = (rows[piece] for rows in (self.positions, self.velocities, self.accelerations))
         j = jerks_of(self.times, self.velocities, self.accelerations, piece)
         found = [q + x * (v + x * (a / 2.0 + x * j / 6.0)), v + x * (a + x * j / 2.0), a + x * j]
+
         found[0][clock == self.duration] = self.positions[-1]  # to the bit
         outside = np.atleast_1d(wanted) != clock
         found[1][outside] = found[2][outside] = 0.0
@@ -168,8 +174,10 @@ class Trajectory:
 
         With ``set_points``: at these, the jerk by their differences.
         """
-        at, found = (slice(None), cubic_peaks) if self.set_points is None else (self.set_points, set_point_peaks)
-        return Peaks(*found(self.times[at], self.velocities[at], self.accelerations[at]))
+        if self.set_points is None:
+            return Peaks(*cubic_peaks(self.times, self.velocities, self.accelerations))
+        at = self.set_points
+        return Peaks(*set_point_peaks(self.times[at], self.velocities[at], self.accelerations[at]))
 
     def slowed(self, factor: float) -> Trajectory:
         """The same motion, ``factor`` times as long.
@@ -180,6 +188,7 @@ class Trajectory:
         k = positive(factor, "factor of a trajectory")
         if not 1e-6 <= k <= 1e6:
             raise InputError(f"factor of a trajectory: expected 1e-6 to 1e6, got {k:g}")
+
         rates = (self.velocities / k, self.accelerations / k**2)
         slow = Trajectory(self.times * k, self.positions, *rates, **self._names())
         return slow if self.set_points is None else slow.at_set_points(self.set_points)
@@ -251,7 +260,8 @@ class Trajectory:
         """How much the acceleration jumps at each knot, shape (m, n): from rest at the first, to rest at the last."""
         a = self.accelerations
         ends = a[:-1] + np.diff(self.times)[:, None] * self.jerks
-        before, after = np.vstack([np.zeros_like(a[:1]), ends]), np.vstack([a[:-1], np.zeros_like(a[:1])])
+        before = np.vstack([np.zeros_like(a[:1]), ends])
+        after = np.vstack([a[:-1], np.zeros_like(a[:1])])
         found: Matrix = np.abs(after - before)
         return found
 
@@ -283,10 +293,15 @@ class Trajectory:
             InputError: If the ending is another one or the file cannot be written.
         """
         require(accelerations, bool, "accelerations of a file")
-        ending, at = written_ending(file), slice(None) if self.set_points is None else self.set_points
-        known = self.times[at], State(self.positions[at], self.velocities[at], self.accelerations[at])
-        clock, state = known if rate is None else self.sampled(rate)
-        columns = [(column + 0.0).tolist() for column in (clock, *state)]
+        ending = written_ending(file)
+        if rate is None:
+            at = slice(None) if self.set_points is None else self.set_points
+            clock = self.times[at]
+            state = State(self.positions[at], self.velocities[at], self.accelerations[at])
+        else:
+            clock, state = self.sampled(rate)
+
+        columns = [(column + 0.0).tolist() for column in (clock, *state)]  # + 0.0: no file has a -0.0
         if ending == ".mcap":
             write_mcap(file, self.robot_name, self.joint_names, columns)
             return

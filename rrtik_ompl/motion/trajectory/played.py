@@ -42,34 +42,23 @@ def _judged_motion(motion: Trajectory, world: World) -> tuple[Vector, Judged]:
     """
     course = _course_of(world, motion)
     found, faults = judged_course(world, course, partial(_faults_of_motion, world, motion))
+
     doubtful = found.verdict.unproven
     doubt = f"not proven free in {len(doubtful)} of {len(motion.times) - 1} pieces" if doubtful else ""
     text = "" if doubtful else "the whole motion is proven free"
+
     seen = course if found.curve is None else found.curve
     touched = [end for contact in found.contacts for end in (contact.begin, contact.end)]
     clock = _frames_of(motion, np.append(_clock(motion, seen.motions, seen.shares), _times(motion, np.array(touched))))
     where = [f"after {_clock(motion, np.array([k]), np.array([x]))[0]:.3f} s: {why}" for k, x, why in faults or ()]
+
     drawn = _drawn_moves(motion, doubtful, clock)
     said = Verdict(not doubtful, text, drawn, doubt)
     verdict = with_reason(said, world, where, checked=faults is not None)
+
     curve = None if found.curve is None else _on_frames(motion, found.curve, clock, drawn)
     contacts = tuple(_contact_on_frames(motion, each, clock) for each in found.contacts)
     return clock, Judged(verdict, curve, contacts)
-
-
-def _frames_of(motion: Trajectory, more: Vector) -> Vector:
-    """Times at which a motion is drawn [s], shape (k,): at an even rate, at its knots, and at some more."""
-    count = int(np.clip(np.ceil(FRAME_RATE * motion.duration), 2, MOST_FRAMES))
-    knots = motion.times if len(motion.times) <= MOST_KNOTS else motion.times[[0, -1]]
-    clock = np.concatenate([np.linspace(0.0, motion.duration, count + 1), knots, more])
-    return frozen(np.unique(np.round(clock, TIME_DIGITS)))  # the page rounds them, and no two may be the same
-
-
-def _faults_of_motion(world: World, motion: Trajectory) -> list[Fault]:
-    """The first fault of each piece of a timed motion."""
-    found = faults_of(motion, world)
-    pieces, shares = _places_at(motion.times, np.array([moment for moment, _ in found]))
-    return [(k, x, reason) for k, x, (_, reason) in zip(pieces.tolist(), shares.tolist(), found, strict=True)]
 
 
 def _course_of(world: World, motion: Trajectory) -> Course:
@@ -78,6 +67,7 @@ def _course_of(world: World, motion: Trajectory) -> Course:
     speed = greatest_speeds(motion)
     ways = np.append(0.0, np.cumsum(h * np.maximum(speed @ world.weights, 1e-12)))
     clock = np.interp(np.linspace(0.0, ways[-1], PLACES + 1), ways, motion.times)
+
     if len(motion.times) <= MOST_KNOTS:
         clock = np.unique(np.append(clock, motion.times))
     return Course(
@@ -85,6 +75,13 @@ def _course_of(world: World, motion: Trajectory) -> Course:
         at=lambda pieces, shares: motion(_clock(motion, pieces, shares)).positions,
         prove=lambda clearance: motion.prove(world, clearance=clearance),
     )
+
+
+def _faults_of_motion(world: World, motion: Trajectory) -> list[Fault]:
+    """The first fault of each piece of a timed motion."""
+    found = faults_of(motion, world)
+    pieces, shares = _places_at(motion.times, np.array([moment for moment, _ in found]))
+    return [(k, x, reason) for k, x, (_, reason) in zip(pieces.tolist(), shares.tolist(), found, strict=True)]
 
 
 def _places_at(times: Vector, clock: Vector) -> tuple[NDArray[np.int64], Vector]:
@@ -102,6 +99,14 @@ def _times(motion: Trajectory, at: Vector) -> Vector:
     """Times of places that are written as the number of a piece plus the share of it [s]."""
     pieces = np.clip(at.astype(np.int64), 0, len(motion.times) - 2)
     return _clock(motion, pieces, at - pieces)
+
+
+def _frames_of(motion: Trajectory, more: Vector) -> Vector:
+    """Times at which a motion is drawn [s], shape (k,): at an even rate, at its knots, and at some more."""
+    count = int(np.clip(np.ceil(FRAME_RATE * motion.duration), 2, MOST_FRAMES))
+    knots = motion.times if len(motion.times) <= MOST_KNOTS else motion.times[[0, -1]]
+    clock = np.concatenate([np.linspace(0.0, motion.duration, count + 1), knots, more])
+    return frozen(np.unique(np.round(clock, TIME_DIGITS)))  # the page rounds them, and no two may be the same
 
 
 def _drawn_moves(motion: Trajectory, pieces: tuple[int, ...], clock: Vector) -> tuple[int, ...]:

@@ -81,10 +81,13 @@ def motion_report(motion: Trajectory, limits: RateLimits) -> MotionReport:
     """
     require(motion, Trajectory, "motion to report of")
     require(limits, RateLimits, "limits of a report", "use RateLimits.of(robot)")
-    bounds, peaks = limits.for_joints(len(motion.joint_names)), motion.peaks()
+
+    bounds = limits.for_joints(len(motion.joint_names))
+    peaks = motion.peaks()
     jerk = np.divide(peaks.jerk, bounds.jerk, out=np.zeros(len(peaks.jerk)), where=np.isfinite(bounds.jerk))
     jumps = motion.jumps()
     noise = JUMP_SHARE * peaks.acceleration.max()
+
     return MotionReport(
         motion.joint_names,
         motion.prismatic,
@@ -104,6 +107,7 @@ def switches(motion: Trajectory) -> Vector:
     else:
         ends = motion.accelerations[:-1] + np.diff(motion.times)[:, None] * motion.jerks
         both = np.stack([motion.accelerations[:-1], ends], axis=1).reshape(-1, ends.shape[1])
+
     loud = np.abs(both) > QUIET_SHARE * np.abs(both).max(axis=0)
     return np.array(
         [np.count_nonzero(np.diff(np.sign(column[used]))) for column, used in zip(both.T, loud.T, strict=True)],

@@ -21,7 +21,7 @@ from rrtik_ompl.motion.trajectory.smoothing import Spline, smoothed, steps_for, 
 
 PERIOD = 1e-3  # [s] the least piece of a curve: the control period of a fast drive
 CRUISE_SLACK = 1e-3  # of a speed, by which it may be more than is said while the acceleration changes its sign
-SHORT_WINDOW = 0.02  # [s]
+SHORT_WINDOW = 0.02  # [s]; one so short costs nothing
 MAX_SLOWINGS = 3  # by limits of the tip or of torques; two are enough but for rounding
 SMOOTHED_SHARE = 0.12  # of a corner's radius: by which the smoothing over time alone may leave the rounded corner
 
@@ -78,6 +78,7 @@ def runs(
     stops = [0, *(np.flatnonzero(radii == 0.0) + 1).tolist(), len(corners) - 1]
     along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     lines = along_lines(corners, limits) if more is None and (len(stops) > 2 or len(corners) == 2) else []
+
     found = []
     for first, last in pairwise(stops):
         if last == first + 1 and more is None:
@@ -86,6 +87,11 @@ def runs(
             curve = Curve.of(corners[first : last + 1], radii[first : last - 1])
             found.append(along_curve(curve, limits, room=room, more=more, begin=along[first]))
     return found
+
+
+def _straight(pieces: Pieces, start: Vector, begin: float) -> Run:
+    travelled = np.linalg.norm(pieces.positions - start, axis=1)
+    return Run(pieces, begin + travelled, np.zeros(len(travelled)), np.ones(len(travelled), dtype=bool))
 
 
 def along_curve(
@@ -113,24 +119,10 @@ def along_curve(
     extra = None if more is None else more.bounds(shape)
     bends = _lengths(shape.bends)
     slow = SMOOTHED_SHARE * tightest / np.maximum(bends, 1e-300)
+
     splines = (_smooth(curve, (grid, shape, extra), slow, limits, attempt) for attempt in _attempts(limits))
     tried = [_along(curve, spline if more is None else _slowed(spline, more), begin) for spline in splines]
     return min(tried, key=lambda run: (run.apart.max() > room, run.duration))
-
-
-def _along(curve: Curve, spline: Spline, begin: float) -> Run:
-    """A spline in joints and place as the run that it is."""
-    knots, velocities, accelerations = (rows[:-1] for rows in spline.knots())
-    n = curve.vertices.shape[1]
-    apart = _lengths(knots[:, :n] - curve.path_at(knots[:, n]))
-    # a piece lies among its four control points: on an edge, if all of them lie on it
-    controls, at = spline.controls[:, :n], spline.controls[:, n]
-    near = _lengths(controls - curve.path_at(at)) <= COINCIDENCE
-    edge = curve.edges(at)
-    count = len(knots)
-    on_path = (edge[:count] == edge[3 : 3 + count]) & np.logical_and.reduce([near[k : k + count] for k in range(4)])
-    pieces = Pieces(np.full(count, spline.step), knots[:, :n], velocities[:, :n], accelerations[:, :n])
-    return Run(pieces, begin + knots[:, n], apart, on_path)
 
 
 def _attempts(limits: RateLimits) -> tuple[Attempt, ...]:
@@ -147,6 +139,7 @@ def _smooth(
     """
     window = attempt.window * widest_window(limits)
     grid, shape, extra = samples
+
     bounds = Bounds.capped(2.0 * slow / (window**2 / 12.0 + PERIOD**2 / 3.0))
     bounds = bounds if extra is None else bounds.and_also(extra)
     timing = fastest(grid, shape, limits, bounds)
@@ -154,18 +147,14 @@ def _smooth(
         raise InputError(
             f"no motion along {curve.length:.3g} rad or m could be calculated; choose limits of an ordinary size"
         )
+
     if attempt.cruises:
         cap = np.square((1.0 + CRUISE_SLACK) * timing.cruising(window))
         timing = fastest(grid, shape, limits, bounds.and_also(Bounds.capped(cap)))
+
     step, count, most = steps_for(timing.duration, window, PERIOD)
     places = timing.places(np.linspace(0.0, timing.duration, count + 1))
     return smoothed(np.column_stack([curve.at(places).positions, places]), step, most, limits)
-
-
-def _lengths(rows: Matrix) -> Vector:
-    """Of each row, shape (m,)."""
-    found: Vector = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    return found
 
 
 def _slowed(spline: Spline, more: DynamicLimits) -> Spline:
@@ -179,6 +168,25 @@ def _slowed(spline: Spline, more: DynamicLimits) -> Spline:
     return spline
 
 
-def _straight(pieces: Pieces, start: Vector, begin: float) -> Run:
-    travelled = np.linalg.norm(pieces.positions - start, axis=1)
-    return Run(pieces, begin + travelled, np.zeros(len(travelled)), np.ones(len(travelled), dtype=bool))
+def _along(curve: Curve, spline: Spline, begin: float) -> Run:
+    """A spline in joints and place as the run that it is."""
+    knots, velocities, accelerations = (rows[:-1] for rows in spline.knots())
+    n = curve.vertices.shape[1]
+    apart = _lengths(knots[:, :n] - curve.path_at(knots[:, n]))
+
+    # a piece lies among its four control points: on an edge, if all of them lie on it
+    controls = spline.controls[:, :n]
+    at = spline.controls[:, n]
+    near = _lengths(controls - curve.path_at(at)) <= COINCIDENCE
+    edge = curve.edges(at)
+    count = len(knots)
+    on_path = (edge[:count] == edge[3 : 3 + count]) & np.logical_and.reduce([near[k : k + count] for k in range(4)])
+
+    pieces = Pieces(np.full(count, spline.step), knots[:, :n], velocities[:, :n], accelerations[:, :n])
+    return Run(pieces, begin + knots[:, n], apart, on_path)
+
+
+def _lengths(rows: Matrix) -> Vector:
+    """Of each row, shape (m,)."""
+    found: Vector = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    return found

@@ -41,7 +41,9 @@ class Spline:
 
     def knots(self) -> tuple[Matrix, Matrix, Matrix]:
         """Positions, velocities and accelerations at the knots, shape (m - 2, n) each."""
-        before, here, after = self.controls[:-2], self.controls[1:-1], self.controls[2:]
+        before = self.controls[:-2]
+        here = self.controls[1:-1]
+        after = self.controls[2:]
         bends = after - 2.0 * here + before
         return here + bends / 6.0, (after - before) / (2.0 * self.step), bends / self.step**2
 
@@ -63,7 +65,8 @@ class Spline:
     def peaks(self) -> tuple[Vector, Vector, Vector]:
         """Bounds of velocity, acceleration and jerk of each coordinate, shape (n,) each; exact but for the first."""
         # joints in rows: numpy looks for the largest number along a row much faster than down a column
-        found, rows = [], np.ascontiguousarray(self.controls.T)
+        found = []
+        rows = np.ascontiguousarray(self.controls.T)
         for power in (1, 2, 3):
             rows = rows[:, 1:] - rows[:, :-1]
             found.append(np.maximum(rows.max(axis=1), -rows.min(axis=1)) / self.step**power)
@@ -118,6 +121,8 @@ def _means(rows: Matrix, widths: set[int]) -> Iterator[Matrix]:
     first = rows[:1]
     gaps = rows - first
     total = np.zeros((len(rows) - 1, rows.shape[1]))
+
+    # sums over windows of ever more rows, each from those before
     for width in range(1, max(widths) + 1):
         rest = np.broadcast_to((width - 1) * gaps[-1], (1, rows.shape[1]))
         total = np.vstack([total, rest])

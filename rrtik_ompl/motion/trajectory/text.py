@@ -33,12 +33,18 @@ def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Seque
         ]
         head = {"version": 1, "kind": KIND, "robot": robot, "joint_names": list(names), "units": list(units)}
         return json.dumps(head | {"points": points}, indent=1) + "\n"
+
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(_header(names))
     for time, *values in zip(*columns, strict=True):
         table.writerow([repr(number) for number in (time, *(x for value in values for x in value))])
     return text.getvalue()
+
+
+def _header(names: Iterable[str]) -> list[str]:
+    own = list(names)
+    return ["time", *own, *(f"{name} velocity" for name in own), *(f"{name} acceleration" for name in own)]
 
 
 def written_ending(file: str | os.PathLike[str]) -> str:
@@ -62,26 +68,29 @@ def loads(text: str, ending: str) -> dict[str, Any]:
     return _from_message(json_object(text, KIND, "points") if ending == ".json" else from_yaml(text))
 
 
-def holds_motion(text: str, ending: str) -> bool:
-    """Whether the text of a .json or .csv file is a trajectory, well formed or not, rather than a path."""
-    if ending == ".csv":
-        return text.startswith("time,") and " velocity" in text.partition("\n")[0]
-    return '"points"' in text and '"waypoints"' not in text
-
-
-def _header(names: Iterable[str]) -> list[str]:
-    own = list(names)
-    return ["time", *own, *(f"{name} velocity" for name in own), *(f"{name} acceleration" for name in own)]
+def _from_csv(text: str) -> dict[str, Any]:
+    names, rows = table_rows(text, ",")
+    count = (len(names or ()) - 1) // 3
+    joints = (names or [])[1 : 1 + count]
+    if count < 1 or names != _header(joints):
+        wanted = "time,<joint>...,<joint> velocity...,<joint> acceleration..."
+        raise InputError(f"line 1: expected the columns {wanted}; is this a trajectory file?")
+    found: dict[str, Any] = {"times": [row[0] for row in rows], "joint_names": joints, "units": None, "robot": ""}
+    for k, field in enumerate(FIELDS):
+        found[field] = [row[1 + k * count : 1 + (k + 1) * count] for row in rows]
+    return found
 
 
 def _from_message(document: dict[str, Any]) -> dict[str, Any]:
     points = document["points"]
     if not isinstance(points, list) or not all(isinstance(point, dict) for point in points):
         raise InputError("points: expected a list of objects with positions, velocities and time_from_start")
+
     for number, point in enumerate(points, start=1):
         for key in ("positions", "velocities", "time_from_start"):
             if not point.get(key) and point.get(key) != 0:
                 raise InputError(f"point {number}: no {key}; a motion needs positions, velocities and time_from_start")
+
     bends = [point.get("accelerations") for point in points]
     return {
         "times": [_seconds(point["time_from_start"]) for point in points],
@@ -105,14 +114,8 @@ def _seconds(time: object) -> object:
         raise InputError(f"time_from_start: expected seconds, or sec and nanosec, got {time!r}") from None
 
 
-def _from_csv(text: str) -> dict[str, Any]:
-    names, rows = table_rows(text, ",")
-    count = (len(names or ()) - 1) // 3
-    joints = (names or [])[1 : 1 + count]
-    if count < 1 or names != _header(joints):
-        wanted = "time,<joint>...,<joint> velocity...,<joint> acceleration..."
-        raise InputError(f"line 1: expected the columns {wanted}; is this a trajectory file?")
-    found: dict[str, Any] = {"times": [row[0] for row in rows], "joint_names": joints, "units": None, "robot": ""}
-    for k, field in enumerate(FIELDS):
-        found[field] = [row[1 + k * count : 1 + (k + 1) * count] for row in rows]
-    return found
+def holds_motion(text: str, ending: str) -> bool:
+    """Whether the text of a .json or .csv file is a trajectory, well formed or not, rather than a path."""
+    if ending == ".csv":
+        return text.startswith("time,") and " velocity" in text.partition("\n")[0]
+    return '"points"' in text and '"waypoints"' not in text
