@@ -36,10 +36,13 @@ class HeldTables:
     """
 
     def __init__(self, robot: Robot, constraints: HeldRegions, limbs: list[LimbTable]) -> None:
-        self.regions, self._limbs = constraints.regions, limbs
-        dof, made = robot.dof, [_region_tables(*pair) for pair in zip(constraints.regions, limbs, strict=True)]
+        self.regions = constraints.regions
+        self._limbs = limbs
+        dof = robot.dof
+        made = [_region_tables(*pair) for pair in zip(constraints.regions, limbs, strict=True)]
         addresses = [region.address for region, _ in made]
         self._parts = [part for parts in made for part in parts]
+
         self.held = packed(
             HeldTable,
             count=len(addresses),
@@ -58,13 +61,15 @@ class HeldTables:
             weights=np.zeros(ik_layout.TWIST_NUMBERS),
             node=np.zeros(dof),
         )
+
         self.address = self.held.address
         self.shortest = min((_shortest_step(region) for region in constraints.regions), default=SHORTEST_STEP)
 
     def project(self, rows: Matrix, steps: int = STEPS) -> tuple[Matrix, Mask]:
         """Move configurations, shape (m, dof), into all regions; where they are then, and which are there, (m,)."""
         kernels = library(layout.KERNELS)
-        moved, reached = aligned(np.asarray(rows)), aligned(np.zeros(len(rows), dtype=np.int32))
+        moved = aligned(np.asarray(rows))
+        reached = aligned(np.zeros(len(rows), dtype=np.int32))
         if kernels is not None:
             kernels.project_rows(self.address, moved.ctypes.data, len(rows), steps, reached.ctypes.data)
         return moved.reshape(rows.shape).copy(), reached != 0
@@ -74,48 +79,27 @@ class HeldTables:
         return all(part.intact() for part in (self.held, *self._parts, *self._limbs))
 
 
-def _shortest_step(region: HeldRegion) -> float:
-    """Half the step of all joints that has room to bend inside a region, `SHORTEST_STEP` at most."""
-    dof = region.robot.dof
-    step = np.full((1, dof), SHORTEST_STEP / np.sqrt(dof))
-    room = region.limits(between=True) - region.kept
-    bent = region.deviations(np.zeros((1, dof)), step)[0]
-    share = float(np.sqrt((room[bent > 0.0] / bent[bent > 0.0]).min(initial=4.0)))
-    return SHORTEST_STEP * min(0.5 * share, 1.0)
-
-
-def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:
-    """The tables of path constraints; None where there are no kernels, or a joint hangs on several numbers of q."""
-    if library(layout.KERNELS) is None:
-        return None
-    limbs = [_limb_of(robot, each.joint, each.T_joint_d.tobytes()) for each in constraints.regions]
-    known = [limb for limb in limbs if limb is not None]
-    return HeldTables(robot, constraints, known) if len(known) == len(limbs) else None
-
-
-@lru_cache(maxsize=64)
-def _limb_of(robot: Robot, joint: int, placement: bytes) -> LimbTable | None:
-    """The joints that move a frame, given by its pose in that of a joint."""
-    return limb_table(robot, frame_columns(robot, joint, np.frombuffer(placement).reshape(4, 4)))
-
-
 def _region_tables(region: HeldRegion, limb: LimbTable) -> tuple[RegionTable, CallTable]:
     """The table of a region, and the memory of its frames."""
     fixed = limb.fixed.reshape(-1, ik_layout.POSE_NUMBERS)[0]
     first = np.eye(4)
-    first[:3, :3], first[:3, 3] = fixed[:9].reshape(3, 3), fixed[9:]
+    first[:3, :3] = fixed[:9].reshape(3, 3)
+    first[:3, 3] = fixed[9:]
+
     call = packed(
         CallTable,
         first=pose_numbers((region.T_w_world @ first)[None]).ravel(),
         frames=np.zeros(ik_layout.POSE_NUMBERS * (limb.joints + 1)),
     )
+
     made = packed(RegionTable, limb=limb, call=call, turning=int(region.turning), record=_record(region))
     return made, call
 
 
 def _record(region: HeldRegion) -> Matrix:
     """The numbers of a region."""
-    bounds, levers = region.region.bounds, region.levers[region.rows]
+    bounds = region.region.bounds
+    levers = region.levers[region.rows]
     return record(
         layout.LEVERS + len(levers),
         {
@@ -133,9 +117,36 @@ def _record(region: HeldRegion) -> Matrix:
     )
 
 
+def _shortest_step(region: HeldRegion) -> float:
+    """Half the step of all joints that has room to bend inside a region, `SHORTEST_STEP` at most."""
+    dof = region.robot.dof
+    step = np.full((1, dof), SHORTEST_STEP / np.sqrt(dof))
+    room = region.limits(between=True) - region.kept
+    bent = region.deviations(np.zeros((1, dof)), step)[0]
+    # a chord leaves its curve by the square of its length
+    share = float(np.sqrt((room[bent > 0.0] / bent[bent > 0.0]).min(initial=4.0)))
+    return SHORTEST_STEP * min(0.5 * share, 1.0)
+
+
 def projected_onto(robot: Robot, constraints: HeldRegions, rows: Matrix) -> Matrix:
     """Configurations, shape (m, dof), moved into all regions and limits; those that got there, shape (k, dof)."""
-    tables, rows = held_tables(robot, constraints), robot.clamp(rows)  # one that is there already is not moved
+    tables = held_tables(robot, constraints)
+    rows = robot.clamp(rows)  # one that is there already is not moved
     moved, there = projected_rows(robot, constraints, rows) if tables is None else tables.project(rows)
     held: Matrix = moved[there & constraints.held(moved)]
     return held
+
+
+def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:
+    """The tables of path constraints; None where there are no kernels, or a joint hangs on several numbers of q."""
+    if library(layout.KERNELS) is None:
+        return None
+    limbs = [_limb_of(robot, each.joint, each.T_joint_d.tobytes()) for each in constraints.regions]
+    known = [limb for limb in limbs if limb is not None]
+    return HeldTables(robot, constraints, known) if len(known) == len(limbs) else None
+
+
+@lru_cache(maxsize=64)
+def _limb_of(robot: Robot, joint: int, placement: bytes) -> LimbTable | None:
+    """The joints that move a frame, given by its pose in that of a joint."""
+    return limb_table(robot, frame_columns(robot, joint, np.frombuffer(placement).reshape(4, 4)))

@@ -16,7 +16,7 @@ from rrtik_ompl.kernels.tables.memory import aligned, packed
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.tip_distance import reach_of
 
-SEEDS = 512
+SEEDS = 512  # configurations that walks may start from
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +68,9 @@ def limb_table(robot: Robot, tip: TipColumns) -> LimbTable | None:
 
 @lru_cache(maxsize=64)
 def seeded_limb_of(robot: Robot) -> LimbTable | None:
-    """The same with seeds."""
-    limb, seeds = limb_table(robot, tip_columns(robot)), seeds_of(robot)
+    """As `limb_of`, with the configurations of `seeds_of` to start from."""
+    limb = limb_table(robot, tip_columns(robot))
+    seeds = seeds_of(robot)
     if limb is not None:
         limb.put(seed_count=len(seeds.q), seeds=aligned(seeds.q), seed_tips=aligned(pose_numbers(seeds.tips)))
     return limb

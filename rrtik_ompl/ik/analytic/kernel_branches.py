@@ -32,9 +32,11 @@ def kernel_branches(
     arm = None if kernels is None else _arm_of(robot, form)
     if kernels is None or arm is None:
         return None
+
     call = _Call(poses, hints, slack, check)
     getattr(kernels, form.kernel)(arm.table.address, call.address)
     answers = call.answers()
+
     (odd,) = call.odd.nonzero()
     if len(odd):
         rest = _singular_branches(robot, form, poses[odd], None if hints is None else hints[odd], slack, check)
@@ -73,12 +75,14 @@ def valid_branches(robot: Robot, form: AnalyticSolver, pose: Matrix, hint: Vecto
     arm = None if kernels is None else _arm_of(robot, form)
     if kernels is None or arm is None:
         return None
+
     try:  # taken out while it is used, so that threads do not meet
         call = arm.spare.pop()
     except IndexError:
         call = _Call(pose[None], hint[None], 0.0, False)
     else:
         call.begin(pose, hint)
+
     getattr(kernels, form.kernel)(arm.table.address, call.address)
     rows = call.valid_rows()
     arm.spare.append(call)
@@ -99,8 +103,10 @@ def _arm_of(robot: Robot, form: AnalyticSolver) -> _Arm | None:
     limb = limb_of(robot)
     if limb is None or limb.joints != DOF or limb.sliding.any():
         return None
+
     placements = np.array([np.eye(4) if each is None else each for each in mountings(robot, form)])
     from_world, to_frame = pose_numbers(placements)
+
     table = packed(
         ArmTable,
         from_world=from_world,
@@ -118,10 +124,12 @@ class _Call:
     """One call of a kernel. Answers are filled up to whole blocks."""
 
     def __init__(self, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool) -> None:
-        self._count, self._shape = len(poses), (BRANCHES, WIDTH * _blocks(len(poses)))
+        self._count = len(poses)
+        self._shape = (BRANCHES, WIDTH * _blocks(len(poses)))
         self._checked = int(check)
         self._table = table = CallTable(PlannedTable(_plan_of(len(poses), hints is not None, check)))
         self.address = table.address
+
         table.poses.reshape(poses.shape)[:] = poses
         table.slack = slack
         if hints is not None:
@@ -136,6 +144,7 @@ class _Call:
         """Of the only pose the branches inside the limits, shape (k, dof); None if it is to be answered otherwise."""
         if self.odd[0]:
             return None
+
         table = self._table
         q = table.q.reshape(DOF, *self._shape)[:, :, 0]
         real, fits = (flags.view(np.bool_)[::WIDTH] for flags in (table.real, table.fits))
@@ -152,8 +161,9 @@ class _Call:
         return self._table.odd.view(np.bool_)[: self._count]
 
     def answers(self) -> list[NDArray[Any]]:
-        """As of `reference_branches`."""
-        table, own = self._table, slice(self._count)
+        """As `reference_branches` gives them; those of the odd targets are to be filled in."""
+        table = self._table
+        own = slice(self._count)
         q = table.q.reshape(DOF, *self._shape)[:, :, own]
         residuals = table.residuals.reshape(2 * self._checked, *self._shape)[:, :, own]
         real, fits = (flags.view(np.bool_).reshape(self._shape)[:, own] for flags in (table.real, table.fits))

@@ -123,7 +123,7 @@ class GaRun:
         self.since_point = 0
 
     def draw(self) -> None:
-        """A random population."""
+        """Draw a random population, and count anew for how long it stands still."""
         self.genes = random_genes(self.rng, self.options.population, self.robot.dof)
         self.exact = np.zeros((0, self.robot.dof))  # refined individuals, not rounded to 16 bits: the first rows
         self.best = np.inf

@@ -126,7 +126,7 @@ class BatchedSearch:
 
     @property
     def vertices(self) -> int:
-        """Vertices of all trees."""
+        """Vertices of all trees, those of dropped ones too."""
         return self.tree.size + self.back.size + self._dropped
 
     def run(self) -> Matrix | None:

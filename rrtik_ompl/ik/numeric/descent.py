@@ -36,9 +36,11 @@ def walk(
         Where the starts have led to, shape (m, dof), whether that is at the goal, shape (m,), and the most steps taken.
     """
     patience = steps + 1 if patience is None else patience
-    kernels, limb = library(KERNELS), limb_of(robot)
+    kernels = library(KERNELS)
+    limb = limb_of(robot)
     if kernels is None or limb is None:
         return walk_plainly(robot, aims, starts, steps, patience)
+
     call = KernelCall(limb, aims, np.clip(starts, robot.lower, robot.upper), steps, patience)
     most = kernels.walk(limb.address, call.address)
     return call.q, call.reached, most
@@ -67,10 +69,12 @@ class SearchOfOne:
     """
 
     def __init__(self, kernels: Library, limb: LimbTable, aim: Matrix, near: Vector) -> None:
-        self._kernels, self._limb, self.steps = kernels, limb, 0
+        self._kernels = kernels
+        self._limb = limb
+        self.steps = 0
         try:
             self._call = spare_calls(limb).pop()
-        except IndexError:
+        except IndexError:  # none was made yet, or all are in use
             self._call = KernelCall(limb, aim, near[None], STEPS, PATIENCE, near[None], np.zeros(1, dtype=np.int64))
         else:
             self._call.begin(aim, near)
@@ -102,7 +106,8 @@ class Search:
     """
 
     def __init__(self, robot: Robot, aims: Matrix, near: ArrayLike) -> None:
-        self._robot, self._aims = robot, aims
+        self._robot = robot
+        self._aims = aims
         self._near = np.empty((len(aims), robot.dof))
         self._near[:] = robot.clamp(np.asarray(near))
         self._next = np.zeros(len(aims), dtype=np.int64)
@@ -119,29 +124,37 @@ class Search:
         return np.concatenate([self._advance(rows[k : k + AT_A_TIME]) for k in range(0, len(rows), AT_A_TIME)])
 
     def _advance(self, rows: NDArray[np.int64]) -> Mask:
-        kernels, limb = library(KERNELS), seeded_limb_of(self._robot)
+        kernels = library(KERNELS)
+        limb = seeded_limb_of(self._robot)
         if kernels is None or limb is None:
             return self._advance_plainly(rows)
+
         call = KernelCall(limb, self._aims[rows], self.q[rows], STEPS, PATIENCE, self._near[rows], self._next[rows])
         kernels.solve(limb.address, call.address)
         self.steps += call.steps
-        self.q[rows], self._next[rows] = call.q, call.next
+        self.q[rows] = call.q
+        self._next[rows] = call.next
         return call.reached
 
     def _advance_plainly(self, rows: NDArray[np.int64]) -> Mask:
         """The same in numpy, all goals side by side."""
-        seeds, reached = seeds_of(self._robot), np.zeros(len(rows), dtype=bool)
+        seeds = seeds_of(self._robot)
+        reached = np.zeros(len(rows), dtype=bool)
         order = np.argsort(farness(self._robot, self._aims[rows], seeds.tips), axis=1, kind="stable")
+
         while True:
             open_rows = np.flatnonzero(~reached & (self._next[rows] <= SEEDS))
             if len(open_rows) == 0:
                 return reached
+
             going = rows[open_rows]
             number = self._next[going]
             starts = np.where(
                 (number == 0)[:, None], self._near[going], seeds.q[order[open_rows, np.maximum(number, 1) - 1]]
             )
+
             q, there, taken = walk_plainly(self._robot, self._aims[going], starts, STEPS, PATIENCE)
-            self.q[going], reached[open_rows] = q, there
+            self.q[going] = q
+            reached[open_rows] = there
             self._next[going] += 1
             self.steps += taken

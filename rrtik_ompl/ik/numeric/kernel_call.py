@@ -42,14 +42,15 @@ class KernelCall:
         near: Matrix | None = None,
         following: NDArray[np.int64] | None = None,
     ) -> None:
-        given = near is not None, following is not None
-        self._table = table = CallTable(PlannedTable(_plan_of(limb, len(aims), len(q), *given, steps, patience)))
+        plan = _plan_of(limb, len(aims), len(q), near is not None, following is not None, steps, patience)
+        self._table = table = CallTable(PlannedTable(plan))
         self.address = table.address
         self.q: Matrix = table.q.reshape(q.shape)
         self.q[:] = q
         self.next: NDArray[np.int64] = table.next.view(np.int64)
         self.aims: Matrix = table.aims.reshape(aims.shape)
         self.aims[:] = aims
+
         if near is not None:
             table.near.reshape(near.shape)[:] = near
         if following is not None:

@@ -119,7 +119,8 @@ def projection(request: IkRequest) -> IkResponse:
 
 def _arrived(region: TaskRegion, twist: Matrix) -> Mask:
     """Which rows are at most a hundredth of the tolerance away."""
-    position, angle = (np.linalg.norm(part, axis=1) for part in (twist[:, :3], twist[:, 3:]))
+    position = np.linalg.norm(twist[:, :3], axis=1)
+    angle = np.linalg.norm(twist[:, 3:], axis=1)
     arrived: Mask = (position <= SHARE * region.position_tolerance) & (angle <= SHARE * region.orientation_tolerance)
     return arrived
 

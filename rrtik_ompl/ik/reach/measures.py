@@ -35,7 +35,7 @@ class Counter:
 
     @property
     def values(self) -> Vector:
-        """One number a cell."""
+        """What the map says, a number for each cell."""
         return self.totals
 
 
@@ -64,7 +64,7 @@ class Orientations(Counter):
 
 
 class Manipulability(Counter):
-    """The largest seen."""
+    """The largest manipulability that was seen in each cell."""
 
     def quality(self, robot: Robot, Q: Matrix) -> Vector:
         """Product of the singular values of the Jacobian [31], as many as there are joints, at most six."""

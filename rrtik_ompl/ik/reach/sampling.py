@@ -5,7 +5,7 @@ A map is a lower bound: more samples fill more of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector, frozen, positive, whole_numbe
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, at_most
 from rrtik_ompl.ik.reach.grid_map import ReachMap
-from rrtik_ompl.ik.reach.measures import MEASURES
+from rrtik_ompl.ik.reach.measures import MEASURES, Counter
 from rrtik_ompl.model.robot import Robot, poses
 from rrtik_ompl.world.check_world import check_world
 from rrtik_ompl.world.world import World
@@ -73,12 +73,25 @@ def reach_map(
 
     base = poses(robot, np.zeros((1, robot.dof)), robot.link_names[0])[0, :3, 3]
     corner, size, shape = _grid(robot, base, cell)
-
     counter = MEASURES[measure](int(np.prod(shape)), robot.planar)
     counted = 0
+
+    for points, pointing, quality in _samples(robot, world, counter, "xyz".index(axis), count, rng):
+        places = np.floor((points - corner) / size).astype(int)
+        inside = ((places >= 0) & (places < shape)).all(axis=1)
+        cells = np.ravel_multi_index(tuple(places[inside].T), shape)
+        counter.add(cells, pointing[inside], quality[inside])
+        counted += len(cells)
+
+    return ReachMap(robot.name, measure, frozen(corner), size, frozen(counter.values.reshape(shape)), counted, base)
+
+
+def _samples(
+    robot: Robot, world: World | None, counter: Counter, axis: int, count: int, rng: np.random.Generator
+) -> Iterator[tuple[Matrix, Matrix, Vector]]:
+    """Where the tip of random postures is, which way it points, shape (m, 3) each, and their quality, shape (m,)."""
     low, high = robot.finite_range()
     turn = _first_turn(robot) if world is None else None
-
     for begin in range(0, count, BLOCK):
         Q = rng.uniform(low, high, (min(BLOCK, count - begin), robot.dof))
         if world is not None:
@@ -87,20 +100,16 @@ def reach_map(
         tips = poses(robot, Q)
         quality = counter.quality(robot, Q)
         points = tips[:, :3, 3]
-        pointing = tips[:, :3, "xyz".index(axis)]
+        pointing = tips[:, :3, axis]
+        yield points, pointing, quality
 
-        for number in range(1 if turn is None else TURNS):
-            if turn is not None and number:
-                angles = rng.uniform(low[0], high[0], len(Q))
-                points, pointing = turn(points, pointing, angles - Q[:, 0])
-                Q[:, 0] = angles
-            places = np.floor((points - corner) / size).astype(int)
-            inside = ((places >= 0) & (places < shape)).all(axis=1)
-            cells = np.ravel_multi_index(tuple(places[inside].T), shape)
-            counter.add(cells, pointing[inside], quality[inside])
-            counted += len(cells)
-
-    return ReachMap(robot.name, measure, frozen(corner), size, frozen(counter.values.reshape(shape)), counted, base)
+        if turn is None:
+            continue
+        for _ in range(TURNS - 1):  # the same arm turned about its first axis: its quality is the same
+            angles = rng.uniform(low[0], high[0], len(Q))
+            points, pointing = turn(points, pointing, angles - Q[:, 0])
+            Q[:, 0] = angles
+            yield points, pointing, quality
 
 
 def _first_turn(robot: Robot) -> Callable[[Matrix, Matrix, Vector], tuple[Matrix, Matrix]] | None:
