@@ -140,7 +140,7 @@ class Follower:
         self._paused = True
 
     def resume(self) -> None:
-        """Go on."""
+        """Go on after ``pause``; a stop is for good."""
         self._paused = False
 
     def stop(self, reason: str = "stopped") -> None:

@@ -99,7 +99,7 @@ class Pace:
         return None if self._changes else self._steady
 
     def advance(self, seconds: float) -> None:
-        """Let time pass."""
+        """Let time pass [s]: go on along the motion, and past changes of pace that end meanwhile."""
         self.place = self._after(seconds)[0]
         self.now += seconds
         while self._changes and self._ends(0) <= self.now:

@@ -41,7 +41,7 @@ class Bounds:
         return cls(Rows(none, none, none, none), np.minimum(cap, MOST))
 
     def and_also(self, other: Bounds) -> Bounds:
-        """Both."""
+        """These bounds and others at the same grid, both to be kept."""
         rows = Rows(*(np.hstack(pair) for pair in zip(self.rows, other.rows, strict=True)))
         return Bounds(rows, np.minimum(self.cap, other.cap))
 
@@ -62,7 +62,7 @@ class PathTiming:
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Of the whole motion [s]."""
         return float(self.times[-1])
 
     def places(self, clock: Vector) -> Vector:

@@ -1,4 +1,4 @@
-"""Timed motions from files."""
+"""Timed motions from files: those that `Trajectory.save` wrote, and messages of ROS."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class Run:
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Of all pieces together [s]."""
         return float(self.pieces.durations.sum())
 
 

@@ -36,7 +36,7 @@ class Spline:
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Of the whole spline [s]."""
         return (len(self.controls) - 3) * self.step
 
     def knots(self) -> tuple[Matrix, Matrix, Matrix]:
