@@ -128,7 +128,8 @@ class IkResult:
 def nearest_first(robot: Robot, rows: Matrix, near: Vector) -> NDArray[np.intp]:
     """Numbers of rows, shape (k, dof), those nearest to a posture first; joints count as their weights say."""
     away = weighted_difference(robot, rows, near)
-    return np.vecdot(away, away).argsort(kind="stable")
+    order: NDArray[np.intp] = np.vecdot(away, away).argsort(kind="stable")
+    return order
 
 
 def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:

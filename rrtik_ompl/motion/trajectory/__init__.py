@@ -94,9 +94,11 @@ def time_parameterize(
     require(bounds, RateLimits, "limits of a path to time", "use RateLimits.of(robot)")
     bounds = bounds.for_joints(path.waypoints.shape[1])
 
-    for robot in (limits if isinstance(limits, Robot) else None, None if world is None else world.robot):
-        if robot is not None:
-            require_joints(robot, path.joint_names, "path")
+    arms = [limits] if isinstance(limits, Robot) else []
+    if world is not None:
+        arms.append(world.robot)
+    for each in arms:
+        require_joints(each, path.joint_names, "path")
 
     corners = _corners(path)
     reach = float(bounded_array(blend, (), "blend"))
@@ -105,7 +107,7 @@ def time_parameterize(
     if clearance is not None:
         not_negative(clearance, "clearance")
 
-    arm = limits if isinstance(limits, Robot) else None if world is None else world.robot
+    arm = arms[0] if arms else None
     wanted = (tip_speed, tip_acceleration, torque, not_negative(payload, "payload") or None)
     more = None
     if any(option is not None for option in wanted):
