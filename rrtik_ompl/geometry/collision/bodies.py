@@ -83,20 +83,22 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
     for name in scene.names:
         if name in links:
             raise InputError(f"scene: '{name}' is also the name of a link of robot '{robot.name}'; rename the obstacle")
+
     found = []
     for obstacle in scene.obstacles:
         found += [
             Body(
                 obstacle.name,
-                0,
-                obstacle.pose * piece.placement,
-                piece.geometry,
-                "obstacle",
-                obstacle.margin,
+                joint=0,
+                placement=obstacle.pose * piece.placement,
+                geometry=piece.geometry,
+                kind="obstacle",
+                margin=obstacle.margin,
                 within=piece.placement,
             )
             for piece in _pieces(obstacle)
         ]
+
     for item in scene.attached:
         if item.link not in links:
             raise UnknownNameError(f"link of robot '{robot.name}'", item.link, links, where=f"attached '{item.name}'")
@@ -104,23 +106,65 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
             if name not in links and name not in scene.names:
                 known = (*links, *scene.names)
                 raise UnknownNameError("link or obstacle", name, known, where=f"allow of attached '{item.name}'")
+
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         mount = frame.placement * item.pose
         thickness = item.margin + (robot.padding.get(item.link, 0.0) if item.padding is None else item.padding)
         found += [
             Body(
                 item.name,
-                frame.parentJoint,
-                mount * piece.placement,
-                piece.geometry,
-                "attached",
-                margin,
-                thickness,
-                piece.placement,
+                joint=frame.parentJoint,
+                placement=mount * piece.placement,
+                geometry=piece.geometry,
+                kind="attached",
+                margin=margin,
+                padding=thickness,
+                within=piece.placement,
             )
             for piece in _pieces(item)
         ]
+
     return tuple(found)
+
+
+def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
+    try:
+        return pieces(item.shape)
+    except InputError as error:
+        raise InputError(f"scene: '{item.name}': {error}") from None
+
+
+def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
+    """The bodies of a world, with the contacts of its scene.
+
+    Raises:
+        UnknownNameError: If a contact names something that does not exist.
+        InputError: If it is between two links, or lets two overlap so deep that they could pass through each other.
+    """
+    if not scene.contacts:
+        return tuple(bodies)
+
+    known = {*robot.link_names, *scene.names}
+    found: dict[str, list[tuple[str, float]]] = {}
+    for contact in scene.contacts:
+        for name in contact.names:
+            if name not in known:
+                raise UnknownNameError("link or obstacle", name, known, where="contacts of a scene")
+
+        if not contact.pair & set(scene.names):
+            raise InputError(f"contacts of a scene: '{contact.first}' and '{contact.second}' are links; name an object")
+
+        deepest = deepest_contact(bodies, *contact.names)
+        if contact.distance < -deepest - DEPTH_TOLERANCE:
+            raise InputError(
+                f"contacts of a scene: {contact}, and could pass through each other: they are too thin for more than "
+                f"{1e3 * deepest:.3g} mm"
+            )
+
+        for name, other in (contact.names, contact.names[::-1]):
+            found.setdefault(name, []).append((other, contact.distance))
+
+    return tuple(replace(body, contacts=tuple(found[body.name])) if body.name in found else body for body in bodies)
 
 
 def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
@@ -136,41 +180,6 @@ def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
         if body.name in least:
             least[body.name] = min(least[body.name], least_width(body.geometry))
     return SHARE * sum(least.values())
-
-
-def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
-    """The bodies of a world, with the contacts of its scene.
-
-    Raises:
-        UnknownNameError: If a contact names something that does not exist.
-        InputError: If it is between two links, or lets two overlap so deep that they could pass through each other.
-    """
-    if not scene.contacts:
-        return tuple(bodies)
-    known = {*robot.link_names, *scene.names}
-    found: dict[str, list[tuple[str, float]]] = {}
-    for contact in scene.contacts:
-        for name in contact.names:
-            if name not in known:
-                raise UnknownNameError("link or obstacle", name, known, where="contacts of a scene")
-        if not contact.pair & set(scene.names):
-            raise InputError(f"contacts of a scene: '{contact.first}' and '{contact.second}' are links; name an object")
-        deepest = deepest_contact(bodies, *contact.names)
-        if contact.distance < -deepest - DEPTH_TOLERANCE:
-            raise InputError(
-                f"contacts of a scene: {contact}, and could pass through each other: they are too thin for more than "
-                f"{1e3 * deepest:.3g} mm"
-            )
-        for name, other in (contact.names, contact.names[::-1]):
-            found.setdefault(name, []).append((other, contact.distance))
-    return tuple(replace(body, contacts=tuple(found[body.name])) if body.name in found else body for body in bodies)
-
-
-def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
-    try:
-        return pieces(item.shape)
-    except InputError as error:
-        raise InputError(f"scene: '{item.name}': {error}") from None
 
 
 @collector_waits
@@ -198,28 +207,13 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
         if ((i, j) in of_links if bodies[j].kind == "link" else _may_meet(bodies[i], bodies[j]))
         and frozenset((bodies[i].name, bodies[j].name)) not in allowed
     ]
+
     obstacles = [(k, body.name) for k, body in enumerate(bodies) if body.kind == "obstacle"]
     for i in own:
         met = {name for pair in allowed if bodies[i].name in pair for name in pair}
         found += [(i, j) if i < j else (j, i) for j, name in obstacles if name not in met]
+
     return tuple(sorted(found))
-
-
-def by_motion(bodies: Sequence[Body], pairs: Pairs) -> tuple[Pairs, Pairs]:
-    """The pairs of which a body moves, and those that both stand still."""
-    moves = np.array([body.joint > 0 for body in bodies], dtype=bool)
-    some: list[bool] = np.logical_or(*moves[pair_array(pairs).T]).tolist()
-    return tuple(compress(pairs, some)), tuple(compress(pairs, map(not_, some)))
-
-
-def pair_array(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
-    """Pairs as an array, shape (n, 2); made of many tuples it takes numpy itself five times as long."""
-    return np.fromiter(chain.from_iterable(pairs), np.int64, 2 * len(pairs)).reshape(-1, 2)
-
-
-def _may_meet(first: Body, second: Body) -> bool:
-    """Whether two bodies of the robot, or what it holds, are neither one thing nor rigidly joined."""
-    return first.name != second.name and first.joint != second.joint
 
 
 def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
@@ -228,6 +222,7 @@ def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
         for name in pair:
             if name not in known:
                 raise UnknownNameError("link or obstacle", name, known, where="allowed_collisions")
+
     allowed = {frozenset(pair) for pair in scene.allowed_collisions}
     for item in scene.attached:
         allowed |= {frozenset((item.name, link)) for link in (item.link, *item.allow)}
@@ -249,8 +244,10 @@ def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
     nearest = _carrying_parents(robot, bodies)
     pairs: list[tuple[int, int]] = []
     doubtful: list[tuple[int, int]] = []
+
     for i, j in combinations(range(len(bodies)), 2):
-        first, second = bodies[i], bodies[j]
+        first = bodies[i]
+        second = bodies[j]
         names = frozenset((first.name, second.name))
         wanted = names in robot.checked_collisions
         if (
@@ -260,12 +257,19 @@ def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
             or frozenset((solids[i], solids[j])) in robot.unchecked_solids
         ):
             continue
+
         pairs.append((i, j))
         if not robot.allowed_collisions or wanted or _adjacent(first.joint, second.joint, nearest):
             doubtful.append((i, j))
+
     if not robot.self_collision:
         return frozenset(pairs)
     return frozenset(pairs) - _always_touching(robot, bodies, doubtful)
+
+
+def _may_meet(first: Body, second: Body) -> bool:
+    """Whether two bodies of the robot, or what it holds, are neither one thing nor rigidly joined."""
+    return first.name != second.name and first.joint != second.joint
 
 
 def _carrying_parents(robot: Robot, bodies: Iterable[Body]) -> dict[int, int]:
@@ -292,6 +296,7 @@ def _always_touching(robot: Robot, bodies: tuple[Body, ...], pairs: Sequence[tup
     suspects = set(pairs)
     for frames in samples:
         suspects = {p for p in suspects if _touch(bodies[p[0]], bodies[p[1]], frames)}
+
     if suspects:
         names = [" and ".join(_solid_name(bodies, k) for k in pair) for pair in sorted(suspects)]
         message = (
@@ -302,6 +307,14 @@ def _always_touching(robot: Robot, bodies: tuple[Body, ...], pairs: Sequence[tup
     return suspects
 
 
+def _touch(first: Body, second: Body, frames: Sequence[pin.SE3]) -> bool:
+    poses = [pin.SE3(frames[b.joint]) * b.placement for b in (first, second)]
+    transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
+    result = coal.CollisionResult()
+    request = coal.CollisionRequest()
+    return bool(coal.collide(first.geometry, transforms[0], second.geometry, transforms[1], request, result))
+
+
 def _solid_name(bodies: tuple[Body, ...], number: int) -> str:
     """The link of a body; with its number in the link, counted from 1, if that has several."""
     link = bodies[number].name
@@ -309,16 +322,20 @@ def _solid_name(bodies: tuple[Body, ...], number: int) -> str:
     return f"'{link}'" if len(own) == 1 else f"'{link}' (solid {own.index(number) + 1})"
 
 
+def by_motion(bodies: Sequence[Body], pairs: Pairs) -> tuple[Pairs, Pairs]:
+    """The pairs of which a body moves, and those that both stand still."""
+    moves = np.array([body.joint > 0 for body in bodies], dtype=bool)
+    some: list[bool] = np.logical_or(*moves[pair_array(pairs).T]).tolist()
+    return tuple(compress(pairs, some)), tuple(compress(pairs, map(not_, some)))
+
+
+def pair_array(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+    """Pairs as an array, shape (n, 2); made of many tuples it takes numpy itself five times as long."""
+    return np.fromiter(chain.from_iterable(pairs), np.int64, 2 * len(pairs)).reshape(-1, 2)
+
+
 def far_apart(first: Body, second: Body, distance: float) -> bool:
     """Whether the balls around two bodies that stand still are farther apart than a distance [m]."""
     one, other = (body.placement.act(body.geometry.aabb_center).tolist() for body in (first, second))
     reach = first.geometry.aabb_radius + second.geometry.aabb_radius + distance
     return bool(math.dist(one, other) > reach)  # no number where one of them has no end
-
-
-def _touch(first: Body, second: Body, frames: Sequence[pin.SE3]) -> bool:
-    poses = [pin.SE3(frames[b.joint]) * b.placement for b in (first, second)]
-    transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
-    result = coal.CollisionResult()
-    request = coal.CollisionRequest()
-    return bool(coal.collide(first.geometry, transforms[0], second.geometry, transforms[1], request, result))

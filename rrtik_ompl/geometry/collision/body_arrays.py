@@ -51,6 +51,7 @@ class BodyArrays:
         standing = (self.joints[first] == 0) & (self.joints[second] == 0)
         kept = self.margins[np.where(self.obstacles[second], second, first)]
         found: Vector = np.where(standing, 0.0, kept + self.paddings[first] + self.paddings[second])
+
         for row in np.flatnonzero(self.in_contact(pairs)):
             found[row] = min(found[row], self.contacts[_ordered(pairs[row])])
         return found
@@ -96,7 +97,9 @@ def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
     boxes = [body.geometry.aabb_local for body in bodies]
     half_spaces = np.array([isinstance(body.geometry, coal.Halfspace) for body in bodies], dtype=bool)
     low, high = (np.array(ends).reshape(-1, 3) for ends in ([b.min_ for b in boxes], [b.max_ for b in boxes]))
-    low[half_spaces], high[half_spaces] = -UNBOUNDED_METRES, UNBOUNDED_METRES
+    low[half_spaces] = -UNBOUNDED_METRES
+    high[half_spaces] = UNBOUNDED_METRES
+
     return BodyArrays(
         joints=np.array([body.joint for body in bodies], dtype=np.int64),
         placements=np.array([body.placement.homogeneous for body in bodies]).reshape(-1, 4, 4),

@@ -7,6 +7,8 @@ support points as a first guess and have been seen to miss about 3 overlaps in 1
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import coal
@@ -16,7 +18,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
-from rrtik_ompl.geometry.collision.boxes import Boxes, PlacedBoxes
 from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, request
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
@@ -35,7 +36,8 @@ class Certificate:
     """Collision test of configurations against fixed pairs of bodies."""
 
     def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> None:
-        self._robot, self._bodies = robot, bodies
+        self._robot = robot
+        self._bodies = bodies
         self._pairs = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         self._boxes = Boxes(bodies)
         self._approach = approach_weights(robot, bodies, pairs)  # [m per rad or m], shape (pairs, dof)
@@ -63,6 +65,7 @@ class Certificate:
         found: list[tuple[int, ...]] = [()] * len(Q)
         runs = RUNS if len(Q) > FEW else RUNS[-1:]
         together = runs[0] * max(1, MAX_PAIR_CHECKS // max(1, len(self._pairs)))
+
         for start in range(0, len(Q), together):
             begins = np.arange(start, min(start + together, len(Q)), runs[0])
             run, pair = (k.ravel() for k in np.indices((len(begins), len(self._pairs))))
@@ -72,6 +75,7 @@ class Certificate:
                     break
                 if shorter:
                     begins, run, pair = _shorter(begins, run[open_], pair[open_], size, shorter, len(Q))
+
         return found
 
     def _open(
@@ -81,12 +85,16 @@ class Certificate:
 
         Adds to found.
         """
-        middles, ends = np.minimum(begins + size // 2, len(Q) - 1), np.minimum(begins + size, len(Q))
+        middles = np.minimum(begins + size // 2, len(Q) - 1)
+        ends = np.minimum(begins + size, len(Q))
         near = np.array([np.abs(Q[a:b] - Q[m]).max(axis=0) for a, b, m in zip(begins, ends, middles, strict=True)])
+
         frames = self._robot.chain.joint_frames(Q[middles])
         placed = self._boxes.placed(frames)
         approach = DISTANCE_TOLERANCE + self._approached(near, run, pair)
         open_: Mask = self._gaps(placed, run, pair) <= approach
+
+        # What the boxes leave open is measured, one pair at a time.
         kept = np.flatnonzero(open_)
         columns = (kept, run[kept], pair[kept], approach[kept], self._reached(frames, run[kept], pair[kept]))
         for entry, r, p, most, reached in zip(*(k.tolist() for k in columns), strict=True):
@@ -99,6 +107,7 @@ class Certificate:
             elif reached and self._containment.holds((i, j), frames[r]):
                 rows = slice(middles[r], middles[r] + 1) if open_[entry] else slice(begins[r], ends[r])
                 found[rows] = [(i, j)] * (rows.stop - rows.start)  # where surfaces stay apart, what is held stays held
+
         return open_
 
     def _approached(self, near: Matrix, run: Numbers, pair: Numbers) -> Vector:
@@ -117,16 +126,85 @@ class Certificate:
         """Lower bounds of the distances between the pairs' boxes less their margins [m], shape (k,)."""
         sides = [placed.rows(run, self._pairs[pair, k]) for k in (0, 1)]
         gaps = np.full(len(pair), -np.inf)
+
         for axis in range(3):
-            centres, halves = placed.centres[:, axis], placed.halves[:, axis]
+            centres = placed.centres[:, axis]
+            halves = placed.halves[:, axis]
             apart = np.abs(centres[sides[0]] - centres[sides[1]]) - (halves[sides[0]] + halves[sides[1]])
             np.maximum(gaps, apart, out=gaps)
+
         for number, (side, normal, offset) in self._planes.items():
             mine = np.flatnonzero(pair == number)
             rows = sides[side][mine]
             gaps[mine] = placed.centres[rows] @ normal - offset - placed.halves[rows] @ np.abs(normal)
+
         gaps -= self._margins[pair]
         return gaps
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedBoxes:
+    """Axis-parallel boxes around bodies at m configurations of the arm; what does not move is held once.
+
+    Attributes:
+        centres, halves: Centres and half extents [m], shape (rows, 3) each; see :meth:`rows`.
+        poses: Poses of the bodies, shape (rows, 4, 4).
+        place: For each body its row in the first configuration.
+        step: For each body how many rows further on the next configuration is, 0 for what does not move.
+    """
+
+    centres: Matrix
+    halves: Matrix
+    poses: NDArray[np.float64]
+    place: NDArray[np.int64]
+    step: NDArray[np.int64]
+
+    def rows(self, configurations: NDArray[np.int64], bodies: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Rows of bodies at configurations, by their numbers, shape (k,) each."""
+        return np.asarray(self.place[bodies] + self.step[bodies] * configurations)
+
+    def pose(self, configuration: int, body: int) -> Matrix:
+        """Pose of a body at a configuration, shape (4, 4)."""
+        return np.asarray(self.poses[self.place[body] + self.step[body] * configuration])
+
+
+class Boxes:
+    """Axis-parallel boxes around bodies: a first test that never misses what touches."""
+
+    def __init__(self, bodies: Sequence[Body]) -> None:
+        own = body_arrays(bodies)
+        self._moving = np.flatnonzero(own.joints > 0)
+        self._standing = np.flatnonzero(own.joints == 0)
+        self._joints = own.joints[self._moving]
+        self._placements = own.placements
+        self._centres = own.centres
+        self._halves = own.halves
+        self._still = self._around(self._placements[self._standing], self._standing)
+
+    def placed(self, frames: NDArray[np.float64]) -> PlacedBoxes:
+        """The boxes where the joints' frames, shape (m, joints + 1, 4, 4), have these poses."""
+        poses = (frames[:, self._joints] @ self._placements[self._moving]).reshape(-1, 4, 4)
+        centres, halves = self._around(poses, np.tile(self._moving, len(frames)))
+        still = self._placements[self._standing]
+
+        place, step = (np.zeros(len(self._placements), dtype=np.int64) for _ in range(2))
+        place[self._moving] = np.arange(len(self._moving))
+        step[self._moving] = len(self._moving)
+        place[self._standing] = len(poses) + np.arange(len(still))
+
+        return PlacedBoxes(
+            np.concatenate([centres, self._still[0]]),
+            np.concatenate([halves, self._still[1]]),
+            np.concatenate([poses, still]),
+            place,
+            step,
+        )
+
+    def _around(self, poses: NDArray[np.float64], bodies: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
+        """Centres and half extents of the boxes around bodies at poses, shape (k, 4, 4): (k, 3) each."""
+        rotations = poses[:, :3, :3]
+        centres = np.einsum("kij,kj->ki", rotations, self._centres[bodies]) + poses[:, :3, 3]
+        return centres, np.einsum("kij,kj->ki", np.abs(rotations), self._halves[bodies])
 
 
 def fixed_contact(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> tuple[str, str] | None:
@@ -143,10 +221,12 @@ def fixed_contact(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int
 
 def _boxes_meet(bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
     """The pairs of standing bodies whose bounding boxes meet."""
-    own, (first, second) = body_arrays(bodies), np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    own = body_arrays(bodies)
+    first, second = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
     poses = own.placements
     centres = np.einsum("nij,nj->ni", poses[:, :3, :3], own.centres) + poses[:, :3, 3]
     halves = np.einsum("nij,nj->ni", np.abs(poses[:, :3, :3]), own.halves)
+
     gaps = np.abs(centres[first] - centres[second]) - (halves[first] + halves[second])
     meet = (gaps <= DISTANCE_TOLERANCE).all(axis=1)
     return tuple(pair for pair, near in zip(pairs, meet.tolist(), strict=True) if near)
@@ -158,9 +238,11 @@ def _shorter(
     """Begins of shorter runs in the place of those named by ``run``, and what is to be checked of them."""
     named, place = np.unique(run, return_inverse=True)
     parts = size // shorter
+
     starts = (begins[named, None] + np.arange(0, size, shorter)).ravel()
     runs = (parts * np.asarray(place).reshape(-1, 1) + np.arange(parts)).ravel()
     pairs = np.repeat(pair, parts)
+
     inside = starts[runs] < end
     return starts[: int((starts < end).sum())], runs[inside], pairs[inside]
 
@@ -178,9 +260,11 @@ def distance(
     """
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
     ends, margin = solids_of((first, transforms[0], second, transforms[1]), margin)
-    result = coal.CollisionResult()
+
     if is_ours(ends):
         return own_gap(ends, margin)
+
+    result = coal.CollisionResult()
     if coal.collide(*ends, request(margin), result):
         return None
     return float(result.distance_lower_bound)
@@ -190,8 +274,10 @@ def _half_space_pairs(
     bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]
 ) -> dict[int, tuple[int, Vector, float]]:
     """Pairs with a half-space that does not move, by number: side of the other body, outward normal and offset."""
-    own, found = body_arrays(bodies), {}
+    own = body_arrays(bodies)
+    found = {}
     standing = (own.half_spaces & (own.joints == 0))[np.array(pairs, dtype=np.int64).reshape(-1, 2)]
+
     for k, side in np.argwhere(standing).tolist():
         body = bodies[pairs[k][side]]
         normal = np.array(body.placement.rotation @ body.geometry.n)

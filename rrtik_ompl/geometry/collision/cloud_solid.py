@@ -36,8 +36,10 @@ class CloudSolid(coal.Sphere):  # type: ignore[misc]
         """Set the bounding box and sphere to those of the points' balls."""
         super().computeLocalAABB()
         low, high = self.cloud.bounds
-        self.aabb_local.min_, self.aabb_local.max_ = low, high
-        self.aabb_center, self.aabb_radius = 0.5 * (low + high), float(np.linalg.norm(0.5 * (high - low)))
+        self.aabb_local.min_ = low
+        self.aabb_local.max_ = high
+        self.aabb_center = 0.5 * (low + high)
+        self.aabb_radius = float(np.linalg.norm(0.5 * (high - low)))
 
 
 def cloud_solid(cloud: PointCloud) -> CloudSolid:
@@ -66,15 +68,21 @@ def cloud_gap(ends: Ends, margin: float) -> float | None:
     """
     cloud, other, to_other, _ = _sides(ends)
     points, _ = _near(cloud, other, to_other, cloud.radius + margin + LOOK)
-    ball, here, there, gap = coal.Sphere(cloud.radius), coal.Transform3s(), coal.Transform3s(), LOOK
+
+    ball = coal.Sphere(cloud.radius)
+    here = coal.Transform3s()
+    there = coal.Transform3s()
     asked = coal.CollisionRequest()
     asked.security_margin = margin
+
+    gap = LOOK
     for point in points:
         there.setTranslation(point)
         result = coal.CollisionResult()
         if coal.collide(other, here, ball, there, asked, result):
             return None
         gap = min(gap, float(result.distance_lower_bound))
+
     return None if is_mesh(other) and _one_inside(other, points) else gap
 
 
@@ -89,18 +97,26 @@ class Nearest(NamedTuple):
 def nearest_of_cloud(ends: Ends) -> Nearest:
     """The distance of two geometries, one of them a cloud."""
     cloud, other, to_other, swapped = _sides(ends)
-    reach, points, bounds = cloud.radius + LOOK, np.zeros((0, 3)), np.zeros(0)
+
+    reach = cloud.radius + LOOK
+    points = np.zeros((0, 3))
+    bounds = np.zeros(0)
     while not len(points):
         points, bounds = _near(cloud, other, to_other, reach)
         reach *= 4.0
-    ball, here, best = coal.Sphere(cloud.radius), coal.Transform3s(), None
+
+    ball = coal.Sphere(cloud.radius)
+    here = coal.Transform3s()
+    best = None
     for point, bound in zip(points, bounds, strict=True):
+        # The points come nearest to the box first: none that follows can be nearer than the best one.
         if best is not None and bound - cloud.radius >= best.min_distance:
             break
         result = coal.DistanceResult()
         coal.distance(other, here, ball, coal.Transform3s(np.eye(3), point), coal.DistanceRequest(), result)
         best = result if best is None or result.min_distance < best.min_distance else best
     assert best is not None
+
     pose = ends[1] if swapped else ends[3]
     found = [pose.transform(np.array(p)) for p in (best.getNearestPoint1(), best.getNearestPoint2())]
     return Nearest(float(best.min_distance), *(found if swapped else found[::-1]))
@@ -121,11 +137,15 @@ def _near(
 
     Also their distances from that box.
     """
-    turn, shift = np.array(to_other.getRotation()), np.array(to_other.getTranslation())
-    low, high = np.array(other.aabb_local.min_), np.array(other.aabb_local.max_)
+    turn = np.array(to_other.getRotation())
+    shift = np.array(to_other.getTranslation())
+    low = np.array(other.aabb_local.min_)
+    high = np.array(other.aabb_local.max_)
+
     centre = turn.T @ (0.5 * (low + high) - shift)
     half = np.abs(turn.T) @ (0.5 * (high - low)) + reach
     points = cloud.tree.within(centre - half, centre + half).astype(np.float64) @ turn.T + shift
+
     beyond = np.maximum(low - points, points - high)
     away: NDArray[np.float64] = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
     kept = np.flatnonzero(away <= reach)

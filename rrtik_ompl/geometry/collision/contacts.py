@@ -31,11 +31,13 @@ def measured(
     """
     poses = [pin.SE3(frames[b.joint]) * b.placement for b in bodies]
     transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
+
     for i, j in pairs:
         margin = kept_apart(bodies[i], bodies[j])
         ends = (bodies[i].geometry, transforms[i], bodies[j].geometry, transforms[j])
         if near_only and not _near(ends, margin):
             continue
+
         distance, first, second = _distance(ends, depth=near_only)
         distance = min(distance, margin) if near_only else distance
         yield Contact(bodies[i].name, bodies[j].name, distance, first, second, margin)
@@ -59,8 +61,11 @@ def _distance(ends: Ends, *, depth: bool) -> tuple[float, Vector, Vector]:
     """Signed distance of two geometries at their places [m], and the points that it is between."""
     if is_ours(ends):
         return own_nearest(ends)
-    touching, result = coal.CollisionResult(), coal.DistanceResult()
+
+    touching = coal.CollisionResult()
+    result = coal.DistanceResult()
     distance = float(coal.distance(*ends, coal.DistanceRequest(), result))
+
     meshes = depth and distance <= 0.0 and is_mesh(ends[0]) and is_mesh(ends[2])
     if meshes and coal.collide(*ends, request(0.0), touching):
         result = touching.getContact(0)  # between two meshes that overlap coal knows no distance

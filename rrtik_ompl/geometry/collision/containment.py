@@ -54,24 +54,33 @@ class Containment:
         """
         own = body_arrays(bodies)
         listed = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
         holding = np.full(len(bodies), -np.inf)  # [m] around the middle of a hollow body that may hold others
         for k in distinct(listed).tolist():
             if _has_inside(bodies[k]):
                 holding[k] = bodies[k].geometry.aabb_radius
+
         both_ways = np.concatenate([listed, listed[:, ::-1]])
         sizes = own.halves.max(axis=1, initial=0.0)
         sizes[[isinstance(body.geometry, CloudSolid) for body in bodies]] = np.inf  # its points are asked one by one
         may_hold = sizes[both_ways[:, 1]] <= holding[both_ways[:, 0]]
+
         outer, inner = both_ways[may_hold].T
         self.pairs: list[tuple[int, int]] = list(zip(outer.tolist(), inner.tolist(), strict=True))
         self.ways = np.where(may_hold, np.cumsum(may_hold) - 1, -1).reshape(2, -1).T
-        self._outer_joint, self._inner_joint = own.joints[outer], own.joints[inner]
+
+        self._outer_joint = own.joints[outer]
+        self._inner_joint = own.joints[inner]
+
         held = distinct(inner)
         points = _end_points([bodies[k].geometry for k in held.tolist()], own.halves[held])
         placed = points @ own.placements[held, :3, :3].transpose(0, 2, 1) + own.placements[held, None, :3, 3]
         self._points = placed[np.searchsorted(held, inner)]
+
         self._to_outer = np.linalg.inv(own.placements)[outer]
-        self._centres, self._halves = own.centres[outer], own.halves[outer] + ROUNDING
+        self._centres = own.centres[outer]
+        self._halves = own.halves[outer] + ROUNDING
+
         everywhere = np.array([[0.0, 0.0, 0.0, np.inf]])
         hollow = distinct(outer).tolist()
         self._covers = {o: everywhere if covers is None else covers[o] for o in hollow}
@@ -91,6 +100,17 @@ class Containment:
         """
         return any(self._holds(self._places[p], frames) for p in (pair, pair[::-1]) if p in self._places)
 
+    def _holds(self, k: int, frames: NDArray[np.float64]) -> bool:
+        inner = frames[self._inner_joint[k]]
+        outer = frames[self._outer_joint[k]]
+        world = self._points[k] @ inner[:3, :3].T + inner[:3, 3]
+        in_joint = (world - outer[:3, 3]) @ outer[:3, :3]  # the inverse of a rotation is its transpose
+        local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
+
+        if (np.abs(local - self._centres[k]) > self._halves[k]).any():
+            return False
+        return self._inside(k, local)
+
     def reached(self, places: NDArray[np.int64], frames: NDArray[np.float64]) -> Mask:
         """Which of some pairs may be such: the ends of the inner body are in the bounding box of the outer one.
 
@@ -99,22 +119,15 @@ class Containment:
             frames: Poses of all joint frames for each of them, shape (k, joints + 1, 4, 4).
         """
         every = np.arange(len(places))
-        inner, outer = frames[every, self._inner_joint[places]], frames[every, self._outer_joint[places]]
+        inner = frames[every, self._inner_joint[places]]
+        outer = frames[every, self._outer_joint[places]]
         to_outer = self._to_outer[places]
+
         turn = to_outer[:, :3, :3] @ outer[:, :3, :3].transpose(0, 2, 1)
         world = self._points[places] @ inner[:, :3, :3].transpose(0, 2, 1) + inner[:, None, :3, 3]
         local = (world - outer[:, None, :3, 3]) @ turn.transpose(0, 2, 1) + to_outer[:, None, :3, 3]
         inside: Mask = (np.abs(local - self._centres[places, None]) <= self._halves[places, None]).all(axis=(1, 2))
         return inside
-
-    def _holds(self, k: int, frames: NDArray[np.float64]) -> bool:
-        inner, outer = frames[self._inner_joint[k]], frames[self._outer_joint[k]]
-        world = self._points[k] @ inner[:3, :3].T + inner[:3, 3]
-        in_joint = (world - outer[:3, 3]) @ outer[:3, :3]  # the inverse of a rotation is its transpose
-        local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
-        if (np.abs(local - self._centres[k]) > self._halves[k]).any():
-            return False
-        return self._inside(k, local)
 
     def between(self, pairs: Iterable[tuple[int, int]], joints: Sequence[pin.SE3]) -> bool:
         """Whether in one of some pairs, in either order, a body holds the other.
@@ -131,6 +144,7 @@ class Containment:
             local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
             if (np.abs(local - self._centres[k]) > self._halves[k]).any():
                 continue
+
             balls = self._covers[pair[0]]
             away = ((balls[:, None, :3] - local) ** 2).sum(axis=2) - (balls[:, None, 3] + ROUNDING) ** 2
             if (away <= 0.0).any() and self._inside(k, local):

@@ -33,10 +33,13 @@ class Enclosure:
 
     def __init__(self, vertices: Matrix, triangles: NDArray[np.int64]) -> None:
         corners = vertices[triangles]
-        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        low = corners.min(axis=(0, 1))
+        high = corners.max(axis=(0, 1))
+
         self.size = float((high - low).max()) / CELLS
         self.origin: Vector = low - 1.5 * self.size
         shape = np.ceil((high - low) / self.size).astype(np.int64) + 3
+
         near = np.zeros(shape, dtype=bool)
         for part in _small((corners - self.origin) / self.size):
             _mark(near, part)
@@ -45,7 +48,8 @@ class Enclosure:
     def boxes(self) -> tuple[Matrix, Matrix]:
         """Boxes that make up the enclosed cells: lowest and highest corners [m], shape (k, 3) each."""
         runs = np.diff(self.inside.astype(np.int8), axis=2, prepend=0, append=0)
-        begin, end = np.argwhere(runs == 1), np.argwhere(runs == -1)  # along z, in the same order
+        begin = np.argwhere(runs == 1)
+        end = np.argwhere(runs == -1)  # along z, in the same order
         high = np.column_stack([end[:, :2] + 1, end[:, 2]])
         return self.origin + self.size * begin, self.origin + self.size * high
 
@@ -69,6 +73,7 @@ def _small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         large = (np.ptp(triangles, axis=1) > 1.0).any(axis=1)
         found.append(triangles[~large])
         triangles = triangles[large]
+
         edges = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)  # from each corner to the next
         first = edges.argmax(axis=1)
         rows = np.arange(len(triangles))
@@ -80,7 +85,8 @@ def _small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
 
 def _mark(near: NDArray[np.bool_], triangles: NDArray[np.float64]) -> None:
     """Flag all cells that the boxes around triangles reach into."""
-    low, high = np.floor(triangles.min(axis=1)).astype(np.int64), np.floor(triangles.max(axis=1)).astype(np.int64)
+    low = np.floor(triangles.min(axis=1)).astype(np.int64)
+    high = np.floor(triangles.max(axis=1)).astype(np.int64)
     for steps in np.ndindex(*(np.max(high - low, axis=0, initial=0) + 1)):
         cells = low + np.array(steps)
         near[tuple(cells[(cells <= high).all(axis=1)].T)] = True

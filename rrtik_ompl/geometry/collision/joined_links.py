@@ -37,14 +37,17 @@ def joined_links(robot: Robot) -> frozenset[frozenset[str]]:
         if link.fixed:
             beside.setdefault(link.name, []).append(link.parent)
             beside.setdefault(link.parent, []).append(link.name)
+
     found = set()
     for link in links:
         if link.fixed:
             continue
+
         below = _nearest(link.name, beside, solid)
         above = _nearest(link.parent, beside, solid)
         if len(below) == 1 and len(above) == 1:
             found.add(below | above)
+
     return frozenset(found)
 
 
@@ -55,11 +58,13 @@ def _links(robot: Robot) -> list[_Link]:
     for frame in frames:
         if frame.type != pin.FrameType.BODY:
             continue
+
         above = frames[frame.parentFrame]
         held = False
         if above.type != pin.FrameType.BODY:
             held = above.name in robot.movable
             above = frames[above.parentFrame]
+
         if above.type == pin.FrameType.BODY:
             moves = frame.parentJoint != above.parentJoint
             found.append(_Link(frame.name, above.name, not (moves or held)))
@@ -71,6 +76,7 @@ def _nearest(link: str, beside: Mapping[str, Iterable[str]], solid: set[str]) ->
     found = set()
     seen = {link}
     ahead = [link]
+
     while ahead:
         here = ahead.pop()
         if here in solid:
@@ -80,4 +86,5 @@ def _nearest(link: str, beside: Mapping[str, Iterable[str]], solid: set[str]) ->
             if other not in seen:
                 seen.add(other)
                 ahead.append(other)
+
     return frozenset(found)

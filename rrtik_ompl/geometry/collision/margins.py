@@ -15,7 +15,8 @@ def kept_apart(first: Body, second: Body) -> float:
     Negative is the depth to which two that are in contact may overlap. No margin between bodies of which neither moves,
     for no posture of the arm would give what is missing: they must only not touch.
     """
-    least, usual = contact_distance(first, second), usually_apart(first, second)
+    least = contact_distance(first, second)
+    usual = usually_apart(first, second)
     return usual if least is None else min(usual, least)
 
 

@@ -38,6 +38,7 @@ def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple
     for k, body in enumerate(bodies):
         if body.joint > 0:
             each[k] = _body_weights(robot, body)
+
     first, second = each[np.array(pairs, dtype=np.int64).reshape(-1, 2).T]
     return frozen(np.where((first > 0.0) & (second > 0.0), 0.0, first + second) @ np.abs(robot.chain.gain))
 
@@ -59,8 +60,12 @@ def joint_weights(robot: Robot, balls: list[tuple[int, Vector, float]]) -> Vecto
     For a revolute joint that is the largest distance that any point beyond it can have from its axis (over all
     postures), for a prismatic joint 1; 0 for one that carries none of the balls.
     """
-    chain, count = robot.chain, len(robot.chain.parent)
-    around_origin, around_axis, carries = np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool)
+    chain = robot.chain
+    count = len(robot.chain.parent)
+    around_origin = np.zeros(count)
+    around_axis = np.zeros(count)
+    carries = np.zeros(count, dtype=bool)
+
     for k in range(count - 1, -1, -1):  # children come after their parents, so they are done first
         axis = chain.axis[k]
         for joint, centre, radius in balls:
@@ -68,12 +73,14 @@ def joint_weights(robot: Robot, balls: list[tuple[int, Vector, float]]) -> Vecto
                 carries[k] = True
                 around_origin[k] = max(around_origin[k], float(np.linalg.norm(centre)) + radius)
                 around_axis[k] = max(around_axis[k], _from_axis(centre, axis) + radius)
+
         for child in (int(c) for c in np.flatnonzero((chain.parent == k) & carries)):
             carries[k] = True
             reach = around_origin[child] + (_stroke(robot, child) if chain.prismatic[child] else 0.0)
             origin = chain.placement[child][:3, 3]
             around_origin[k] = max(around_origin[k], float(np.linalg.norm(origin)) + reach)
             around_axis[k] = max(around_axis[k], _from_axis(origin, axis) + reach)
+
     return np.where(carries, np.where(chain.prismatic, 1.0, around_axis), 0.0)
 
 

@@ -30,7 +30,8 @@ class OverlapDepth:
     """
 
     def __init__(self, robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> None:
-        self._robot, self._bodies = robot, bodies
+        self._robot = robot
+        self._bodies = bodies
         self._pairs = [pair for pair in pairs if not any(_hollow(bodies[k].geometry) for k in pair)]
         self._data = working_memory(robot.model)
 
@@ -43,11 +44,13 @@ class OverlapDepth:
         return max((self._pair_travel(*pair) for pair in self._pairs), default=0.0)
 
     def _pair_travel(self, i: int, j: int) -> float:
-        first, second = self._bodies[i], self._bodies[j]
+        first = self._bodies[i]
+        second = self._bodies[j]
         ends = (first.geometry, self._transform(first), second.geometry, self._transform(second))
         margin = kept_apart(first, second)
         if not coal.collide(*ends, request(margin), coal.CollisionResult()):
             return 0.0
+
         depth = margin - float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult())) - DISTANCE_TOLERANCE
         both_move = first.joint > 0 and second.joint > 0
         return max(0.5 * depth if both_move else depth, 0.0)

@@ -35,10 +35,14 @@ def own_nearest(ends: Ends) -> Nearest:
     """The signed distance of two geometries and the points that it is between."""
     if has_cloud(ends):
         return nearest_of_cloud(ends)
-    first, second = _axis(ends[0], ends[1]), _axis(ends[2], ends[3])
+
+    first = _axis(ends[0], ends[1])
+    second = _axis(ends[2], ends[3])
+
     one, other = nearest_points(first, second)
     between = other - one
     apart = float(np.linalg.norm(between))
+
     radii = [_core(capsule).radius + float(capsule.getSweptSphereRadius()) for capsule in (ends[0], ends[2])]
     way = between / apart if apart > 0.0 else _across(first, second)
     return Nearest(apart - radii[0] - radii[1], one + radii[0] * way, other - radii[1] * way)

@@ -230,6 +230,7 @@ def pieces(shape: Shape) -> tuple[Piece, ...]:
     kind = type(shape)
     if kind not in _BY_SHAPE:
         raise TypeError(f"no coal geometry for {kind.__name__}")
+
     numbers = tuple(np.asarray(getattr(shape, measure.name)).tobytes() for measure in kind.measures)
     return _kept_pieces(_Measured(kind, numbers, shape)) if numbers else _pieces(shape)
 

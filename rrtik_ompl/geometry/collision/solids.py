@@ -22,12 +22,13 @@ Ends: TypeAlias = tuple[Any, Any, Any, Any]  # first geometry, its coal.Transfor
 # contains the mesh, so nothing that touches the mesh is missed. Volumes are compared first, as that is quick.
 DEEPEST_DENT = 1e-6
 CONVEX_VOLUME_RATIO = 0.999
-COMPARED_AT_ONCE, MOST_COMPARED = 20_000, 400_000_000  # triangles times faces of the hull; one of more stays a mesh
+COMPARED_AT_ONCE = 20_000  # triangles times faces of the hull
+MOST_COMPARED = 400_000_000  # the same; a mesh of more stays a mesh
 
 SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal, twice
 
-# Hulls below these are refused: thickness over extent, and extent [m].
-FLATTEST, SMALLEST = 1e-7, 1e-6
+FLATTEST = 1e-7  # thickness of a hull over its extent; what is flatter is refused
+SMALLEST = 1e-6  # [m] extent of a hull
 
 
 def once_per_geometry(find: Callable[[Any], Found]) -> Callable[[Any], Found]:
@@ -66,11 +67,13 @@ def hull(points: Matrix) -> coal.Convex:
     Raises:
         InputError: If the points lie (nearly) in a plane or are too far apart; qhull would end the process.
     """
-    extent, thickness = _extent(points), _thickness(points)
+    extent = _extent(points)
+    thickness = _thickness(points)
     if not thickness >= FLATTEST * extent or not SMALLEST <= extent <= LARGEST:
         raise InputError(
             f"a solid of {extent:.3g} m across and {thickness:.3g} m thick is too flat, too small or too large to check"
         )
+
     cloud = coal.StdVec_Vec3s()
     for point in points:
         cloud.append(np.array(point))
@@ -90,8 +93,10 @@ def convexified(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
     """The convex hull of a mesh that is convex (see ``DEEPEST_DENT``); any other geometry as it is."""
     if not fills_its_hull(geometry):
         return geometry
+
     vertices, triangles = mesh_arrays(geometry)
     solid = around(geometry)
+
     if len(triangles) * solid.num_polygons > MOST_COMPARED:
         return geometry
     return solid if _depth(vertices, triangles, solid) <= DEEPEST_DENT else geometry
@@ -107,6 +112,7 @@ def _fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
     solid = around(geometry)
     if is_mesh(solid):  # which is flat
         return False
+
     vertices, triangles = mesh_arrays(geometry)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
@@ -120,10 +126,13 @@ def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -
     is nearest to the triangle's middle.
     """
     normals, _ = face_normals(*convex_arrays(solid))
-    corners, parts = vertices[triangles], 1 + len(triangles) * len(normals) // COMPARED_AT_ONCE
+    corners = vertices[triangles]
+
+    parts = 1 + len(triangles) * len(normals) // COMPARED_AT_ONCE
     tops = np.concatenate([(vertices @ part.T).max(axis=0) for part in np.array_split(normals, parts)])
     middles = np.array_split(corners.mean(axis=1), parts)
     nearest = np.concatenate([(tops - part @ normals.T).argmin(axis=1) for part in middles])
+
     return float((tops[nearest, None] - np.einsum("tcj,tj->tc", corners, normals[nearest])).max())
 
 
@@ -192,7 +201,9 @@ def face_normals(points: Matrix, triangles: NDArray[np.int64]) -> tuple[Matrix, 
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
     faces = areas > SMALLEST_AREA
-    normals, outward = normals[faces] / areas[faces, None], (a - points.mean(axis=0))[faces]
+    normals = normals[faces] / areas[faces, None]
+
+    outward = (a - points.mean(axis=0))[faces]
     return normals * np.where(np.einsum("ij,ij->i", normals, outward) < 0.0, -1.0, 1.0)[:, None], areas[faces]
 
 
@@ -203,9 +214,12 @@ def is_closed(geometry: coal.CollisionGeometry) -> bool:
     Then winding numbers are whole, and change only where the surface is crossed.
     """
     vertices, triangles = mesh_arrays(geometry)
+    # Vertices at one place are one: many files give each triangle its own.
     _, welded = np.unique(vertices, axis=0, return_inverse=True)
     corners = np.asarray(welded).ravel()[triangles]
-    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+
+    start = corners.ravel()
+    end = np.roll(corners, -1, axis=1).ravel()
     edges = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
     _, which = np.unique(edges, return_inverse=True)
     return not np.bincount(np.asarray(which).ravel(), weights=np.sign(end - start)).any()
@@ -231,6 +245,7 @@ def inside_mesh(vertices: Matrix, triangles: NDArray[np.int64], point: Vector) -
     """
     a, b, c = (vertices[triangles[:, k]] - point for k in range(3))
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+
     numerator = np.einsum("ij,ij->i", a, np.cross(b, c))
     dot = np.einsum
     denominator = la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb

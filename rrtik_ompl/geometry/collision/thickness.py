@@ -39,9 +39,11 @@ def least_width(geometry: coal.CollisionGeometry) -> float:
         return float("inf")
     if isinstance(geometry, CloudSolid):
         return 2.0 * float(geometry.cloud.radius)
+
     if is_mesh(geometry):
         wall = _thinnest_wall(*mesh_arrays(geometry)) if is_closed(geometry) else 0.0
         return 0.5 * wall if np.isfinite(wall) else 0.0  # no ray came through: its wall is not known
+
     core = core_of(geometry)
     if core is not None:
         half = 0.0
@@ -50,6 +52,7 @@ def least_width(geometry: coal.CollisionGeometry) -> float:
         elif core.disc is not None:
             half = min(core.disc, core.half_length)
         return 2.0 * (half + core.radius + float(geometry.getSweptSphereRadius()))
+
     if isinstance(geometry, coal.Convex):
         points, triangles = convex_arrays(geometry)
         normals, _ = face_normals(points, triangles)
@@ -63,6 +66,7 @@ def _thinnest_wall(vertices: Matrix, triangles: NDArray[np.int64]) -> float:
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
+
     rays = np.argsort(-areas, kind="stable")[: max(1, min(MOST_RAYS, COMPARED // len(triangles)))]
     rays = rays[areas[rays] > 0.0]
     if not len(rays):
@@ -75,12 +79,17 @@ def _way_through(number: int, corners: tuple[Matrix, Matrix, Matrix], normals: M
     a, b, c = corners
     origin = (a[number] + b[number] + c[number]) / 3.0
     direction = normals[number] / areas[number]
+
     across = normals @ direction
     crossing = np.abs(across) > PARALLEL
     crossing[number] = False
-    a, b, c = a[crossing], b[crossing], c[crossing]
+
+    a = a[crossing]
+    b = b[crossing]
+    c = c[crossing]
     away = np.einsum("ij,ij->i", a - origin, normals[crossing]) / across[crossing]
     places = origin + away[:, None] * direction
+
     sides = [np.einsum("ij,ij->i", np.cross(q - p, places - p), normals[crossing]) for p, q in ((a, b), (b, c), (c, a))]
     hit = (np.array(sides) >= 0.0).all(axis=0)
     return float(np.abs(away[hit]).min(initial=np.inf))

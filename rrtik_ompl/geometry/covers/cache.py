@@ -32,9 +32,8 @@ def cached_outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | 
     covered = around(geometry) if fills_its_hull(geometry) else geometry
 
     def make() -> Matrix:
-        from rrtik_ompl.geometry.covers.spheres import (
-            outer_cover,  # with scipy, which takes longer to load than covers to read
-        )
+        # It comes with scipy, which takes longer to load than covers to read.
+        from rrtik_ompl.geometry.covers.spheres import outer_cover
 
         return outer_cover(covered, protrusion=protrusion)
 
@@ -73,6 +72,7 @@ def geometry_bytes(geometry: coal.CollisionGeometry) -> bytes | None:
     numbers = numbers_of(geometry)
     if numbers is None:
         return None
+
     swept = geometry.getSweptSphereRadius() if hasattr(geometry, "getSweptSphereRadius") else 0.0
     parts = [f"{type(geometry).__name__} {swept!r}".encode()]
     for array in numbers:
@@ -91,11 +91,15 @@ def cover_key(geometry: coal.CollisionGeometry, parameters: str) -> str | None:
 
 def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[], Matrix]) -> Matrix:
     """A cover from the package, from the user's cache, or made and kept there."""
-    folder, key = cache_folder("covers"), cover_key(geometry, parameters)
+    folder = cache_folder("covers")
+    key = cover_key(geometry, parameters)
+
     if key is not None and (shipped := shipped_cover(key)) is not None:
         return shipped
+
     file = None if folder is None or key is None else folder / f"{key}.npz"
     found = _read(file, key) if file is not None and key is not None and nobody_else_s(file) else None
+
     if found is None:
         if needs_long(geometry):
             tell_once(COVERING)
@@ -114,12 +118,15 @@ def _read(file: Path, key: str) -> Matrix | None:
     """The spheres in a file, or None if it is absent, damaged or another's."""
     try:
         stored = NamedArrays(file)
-        spheres, name, check = stored["spheres"], str(stored["key"]), str(stored["check"])
+        spheres = stored["spheres"]
+        name = str(stored["key"])
+        check = str(stored["check"])
     except InputError:
         return None
     whole = spheres.dtype == np.float64 and spheres.ndim == 2 and spheres.shape[1] == 4
     if not whole or name != key or check != _check(spheres):
         return None
+
     sound = np.isfinite(spheres[:, :3]).all() and (spheres[:, 3] >= 0.0).all()
     return np.asarray(spheres) if sound else None
 
@@ -129,5 +136,6 @@ def _check(spheres: Matrix) -> str:
 
 
 def _write(file: Path, key: str, spheres: Matrix) -> None:
-    name, check = np.array(key), np.array(_check(spheres))
+    name = np.array(key)
+    check = np.array(_check(spheres))
     write_whole(file, lambda stream: np.savez(stream, spheres=spheres, key=name, check=check))

@@ -20,7 +20,8 @@ from rrtik_ompl.geometry.covers.winding import EDGE_TOLERANCE, Flags, Shape, all
 
 MAX_CELLS = 120_000
 MAX_CELLS_ALONG_AXIS = 160.0  # cells along an axis: a long triangle is cut into many more pieces than cells
-LATTICE_CROSSED, MOST_LATTICE_CROSSED = 1500, 25_000
+LATTICE_CROSSED = 1500  # cells of a lattice that the surface crosses, at first
+MOST_LATTICE_CROSSED = 25_000
 LATTICE_LEAST = 4  # cells along every axis of a lattice, so that even a thin solid has points inside
 MARGINS = (0.0171, 0.0233, 0.0197)  # of a cell: keeps the faces of axis-aligned solids off the planes between cells
 
@@ -83,20 +84,26 @@ def elements(solid: Solid, crossed: int, detail: int = 4) -> Elements:
     pieces, cell = _pieces(grid.to_cells(solid.triangles), grid.shape)
     crossed_cells = np.zeros(grid.shape, dtype=bool)
     crossed_cells.ravel()[cell] = True
+
     count, doubtful = winding(grid.to_cells(np.concatenate([solid.triangles, solid.rim])), grid.shape)
     corner_inside = ((count != 0) | doubtful) & (len(solid.rim) == 0)
     points, owner = _corner_points(crossed_cells, corner_inside)
+
     boxes = np.concatenate([_boxes(*level) for level in _blocks(~crossed_cells & all_corners(corner_inside))])
     boxes = np.concatenate([boxes, grid.to_cells(solid.enclosed)])
+
     parts = np.concatenate([pieces.reshape(-1, 3), points])
     owners = np.concatenate([np.repeat(cell, 3), owner])
     parts, radii, owners = _thinned(parts, owners, detail, grid)
+
     return _assembled(grid, parts, radii, owners, boxes, np.argwhere((count != 0) & ~doubtful))
 
 
 def lattice_inside(solid: Solid, fewest: int) -> Matrix:
     """Points of a lattice that are surely inside a closed solid, shape (k, 3): ``fewest`` or more unless it is thin."""
-    crossed, found = LATTICE_CROSSED, np.empty((0, 3))
+    crossed = LATTICE_CROSSED
+    found = np.empty((0, 3))
+
     while len(found) < fewest and crossed <= MOST_LATTICE_CROSSED:
         grid = _grid(solid.triangles, crossed, LATTICE_LEAST)
         count, doubtful = winding(grid.to_cells(solid.triangles), grid.shape)
@@ -106,16 +113,20 @@ def lattice_inside(solid: Solid, fewest: int) -> Matrix:
 
 
 def _grid(triangles: Triangles, crossed: int, least: int = 1) -> Grid:
-    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    low = triangles.min(axis=(0, 1))
+    high = triangles.max(axis=(0, 1))
     extent = np.maximum(high - low, 1e-9)
+
     a, b, c = (triangles[:, k] for k in range(3))
     area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
     box = 2.0 * float(extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0])
     step = max(np.sqrt(1.5 * min(0.5 * area, 2.0 * box) / crossed), float(np.prod(extent) / MAX_CELLS) ** (1.0 / 3.0))
+
     number = np.maximum(np.ceil(extent / step), float(least))
     number = np.minimum(number, MAX_CELLS_ALONG_AXIS)
     while np.prod(number) > 4 * MAX_CELLS:
         number = np.maximum(np.ceil(number / 2.0), float(least))
+
     size = extent / (number - 2.0 * np.array(MARGINS) * 0.999)
     origin = low - size * MARGINS
     return Grid(origin, size, (int(number[0]), int(number[1]), int(number[2])))
@@ -124,15 +135,18 @@ def _grid(triangles: Triangles, crossed: int, least: int = 1) -> Grid:
 def _pieces(triangles: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int64]]:
     """Triangles (in cells) cut along the planes between cells, and the number of the cell that each piece is in."""
     for axis in range(3):
-        done, rest = [], triangles
+        done = []
+        rest = triangles
         while len(rest):
-            low, high = rest[:, :, axis].min(axis=1), rest[:, :, axis].max(axis=1)
+            low = rest[:, :, axis].min(axis=1)
+            high = rest[:, :, axis].max(axis=1)
             first = np.floor(low + EDGE_TOLERANCE) + 1.0
             spans = high > first + EDGE_TOLERANCE
             done.append(rest[~spans])
             last = np.ceil(high[spans] - EDGE_TOLERANCE) - 1.0
             rest = _cut(rest[spans], axis, np.floor(0.5 * (first[spans] + last)))
         triangles = np.concatenate(done)
+
     return _placed(triangles, shape)
 
 
@@ -140,11 +154,15 @@ def _cut(triangles: Triangles, axis: int, plane: Vector) -> Triangles:
     """Cut triangles in three by planes that pass through each."""
     if not len(triangles):
         return triangles
+
     beyond = triangles[:, :, axis] > plane[:, None]
+    # The corner that lies alone on its side comes first.
     lone = np.where((beyond.sum(axis=1) == 1)[:, None], beyond, ~beyond).argmax(axis=1)
     row = np.arange(len(triangles))
     a, b, c = (triangles[row, (lone + k) % 3] for k in range(3))
-    ab, ac = _meet(a, b, axis, plane), _meet(a, c, axis, plane)
+
+    ab = _meet(a, b, axis, plane)
+    ac = _meet(a, c, axis, plane)
     return np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ac), (ab, b, c), (ab, c, ac))])
 
 
@@ -164,7 +182,9 @@ def _placed(pieces: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int6
         for side in (-1.0, 0.0):
             twin = index[: len(flat)][flat]
             twin[:, axis] = level[flat] + side
-            pieces, index = np.concatenate([pieces, pieces[: len(flat)][flat]]), np.concatenate([index, twin])
+            pieces = np.concatenate([pieces, pieces[: len(flat)][flat]])
+            index = np.concatenate([index, twin])
+
     index = np.clip(index, 0, np.array(shape) - 1).astype(np.int64)
     return pieces, np.ravel_multi_index((index[:, 0], index[:, 1], index[:, 2]), shape)
 
@@ -180,13 +200,15 @@ def _corner_points(cells: Flags, inside: Flags) -> tuple[Matrix, NDArray[np.int6
 
 def _blocks(full: Flags) -> list[tuple[Matrix, int]]:
     """Full cells put together into cubes of 4, 2 and 1 cells: lowest corners and sizes."""
-    found, rest = [], full.copy()
+    found = []
+    rest = full.copy()
     for size in (4, 2, 1):
         pad = [(0, -n % size) for n in rest.shape]
         tiles = np.pad(rest, pad)
         nx, ny, nz = (n // size for n in tiles.shape)
         together = tiles.reshape(nx, size, ny, size, nz, size).all(axis=(1, 3, 5))
         found.append((np.argwhere(together).astype(np.float64) * size, size))
+
         taken = together.repeat(size, axis=0).repeat(size, axis=1).repeat(size, axis=2)
         rest &= ~taken[: rest.shape[0], : rest.shape[1], : rest.shape[2]]
     return found
@@ -203,9 +225,12 @@ def _thinned(
     cell = np.column_stack(np.unravel_index(owner, grid.shape))
     within = np.clip(np.floor((points - cell) * detail).astype(np.int64), 0, detail - 1)
     key = ((owner * detail + within[:, 0]) * detail + within[:, 1]) * detail + within[:, 2]
+
     order = np.argsort(key, kind="stable")
     first = np.r_[True, np.diff(key[order]) > 0]
-    start, group = np.flatnonzero(first), np.cumsum(first) - 1
+    start = np.flatnonzero(first)
+    group = np.cumsum(first) - 1
+
     sorted_points = points[order]
     middle = 0.5 * (np.minimum.reduceat(sorted_points, start) + np.maximum.reduceat(sorted_points, start))
     away = np.linalg.norm((sorted_points - middle[group]) * grid.size, axis=1)
@@ -224,6 +249,7 @@ def _assembled(
     poke = 4.0 * EDGE_TOLERANCE * float(np.linalg.norm(grid.size))
     start = np.flatnonzero(np.r_[True, np.diff(owner) > 0])
     middle = np.add.reduceat(points, start) / np.diff(np.r_[start, len(points)])[:, None]
+
     return Elements(
         grid.from_cells(np.concatenate([points, boxes.reshape(-1, 3)])),
         np.concatenate([radii, np.zeros(8 * len(boxes))]) + poke,

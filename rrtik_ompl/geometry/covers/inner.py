@@ -29,12 +29,14 @@ def inscribed(solid: Solid, surface: cKDTree, count: int) -> Matrix:
     sure = every(lattice_inside(solid, FEWEST), CENTRES)
     if not len(sure):
         return np.empty((0, 4))
-    start = np.concatenate([sure, sure])
+
     climbed, shallow, deep = _climbed(sure, surface)
     centres = np.concatenate([sure, climbed])
     samples: Matrix = np.array(surface.data[:: -(-len(surface.data) // SAMPLES)])
     chosen = _narrowing(centres, np.concatenate([shallow, deep]), samples, count)
+
     radii = solid.distance(centres[chosen]) - ROUNDING
+    start = np.concatenate([sure, sure])
     trusted = np.linalg.norm(centres[chosen] - start[chosen], axis=1) < radii
     return np.asarray(np.column_stack([centres[chosen], radii])[trusted])
 
@@ -42,14 +44,22 @@ def inscribed(solid: Solid, surface: cKDTree, count: int) -> Matrix:
 def _climbed(points: Matrix, surface: cKDTree) -> tuple[Matrix, Vector, Vector]:
     """Points moved away from the surface that is nearest, while that makes them deeper; depths before and after."""
     distance, nearest = surface.query(points)
-    best, start, depth, stride = points, distance, distance, 0.5 * distance
+    best = points
+    start = distance
+    depth = distance
+    stride = 0.5 * distance
+
     for _ in range(CLIMBS):
         way = (best - surface.data[nearest]) / np.maximum(depth, 1e-300)[:, None]
         moved = best + stride[:, None] * way
         distance, reached = surface.query(moved)
         deeper = distance > depth
-        best, depth = np.where(deeper[:, None], moved, best), np.where(deeper, distance, depth)
-        nearest, stride = np.where(deeper, reached, nearest), np.where(deeper, stride, 0.4 * stride)
+
+        best = np.where(deeper[:, None], moved, best)
+        depth = np.where(deeper, distance, depth)
+        nearest = np.where(deeper, reached, nearest)
+        stride = np.where(deeper, stride, 0.4 * stride)
+
     return best, start, depth
 
 
@@ -58,6 +68,7 @@ def _narrowing(centres: Matrix, radii: Vector, samples: Matrix, count: int) -> l
     room = np.linalg.norm(samples[:, None] - centres, axis=2).astype(np.float32) - radii.astype(np.float32)
     left = np.full(len(samples), 2.0 * float(room.max()) + 1.0, dtype=np.float32)
     chosen: list[int] = []
+
     while len(chosen) < count:
         gain = np.maximum(left[:, None] - room, 0.0).sum(axis=0)
         best = int(gain.argmax())
@@ -65,4 +76,5 @@ def _narrowing(centres: Matrix, radii: Vector, samples: Matrix, count: int) -> l
             break
         chosen.append(best)
         left = np.minimum(left, room[:, best])
+
     return chosen

@@ -86,16 +86,19 @@ class _Part:
     def _cut(self, axis: int, share: float) -> tuple[_Part, _Part]:
         place = float((1.0 - share) * self.low[axis] + share * self.high[axis])
         below, above = clipped(self.surface, axis, place)
-        first, second = self.boxes[self.boxes[:, 0, axis] < place], self.boxes[self.boxes[:, 1, axis] > place]
-        first[:, 1, axis], second[:, 0, axis] = (
-            np.minimum(first[:, 1, axis], place),
-            np.maximum(second[:, 0, axis], place),
-        )
-        ends, starts = self.high.copy(), self.low.copy()
-        ends[axis] = starts[axis] = place
-        return replace(self, high=ends, surface=below, boxes=first), replace(
-            self, low=starts, surface=above, boxes=second
-        )
+
+        first = self.boxes[self.boxes[:, 0, axis] < place]
+        second = self.boxes[self.boxes[:, 1, axis] > place]
+        first[:, 1, axis] = np.minimum(first[:, 1, axis], place)
+        second[:, 0, axis] = np.maximum(second[:, 0, axis], place)
+
+        ends = self.high.copy()
+        ends[axis] = place
+        starts = self.low.copy()
+        starts[axis] = place
+        lower = replace(self, high=ends, surface=below, boxes=first)
+        upper = replace(self, low=starts, surface=above, boxes=second)
+        return lower, upper
 
 
 def convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
@@ -110,15 +113,18 @@ def convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], list[Matrix], 
     """
     vertices, triangles = mesh_arrays(mesh)
     surface = vertices[triangles]
+
     if not 0 < len(surface) <= MAX_TRIANGLES or not np.isfinite(surface).all():
         return [], [], []
     if not np.ptp(surface, axis=(0, 1)).max() > 0.0:
         return [], [], []
+
     if not is_closed(mesh):
         boxes = np.stack(enclosure(mesh).boxes(), axis=1)
-        parts = [_whole(part, surface) for part in _parts([_start(surface, boxes)])]
+        parts = [_whole(part, surface) for part in _cut_up([_start(surface, boxes)])]
         points = [_outermost(part.surface.reshape(-1, 3)) for part in parts]
         return _not_empty([_hull(part.points)[1] for part in parts]), [], _not_empty(points)
+
     return _closed_pieces(_shells(vertices, triangles))
 
 
@@ -130,21 +136,29 @@ def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix],
     """Pieces of closed surfaces: what is in one of them, and not in one turned inside out, is inside the mesh."""
     volumes = np.array([_signed_volume(shell) for shell in shells])
     inverted = [shell for shell, turned in zip(shells, volumes * volumes.sum() < 0.0, strict=True) if turned]
-    around, inside, points = [], [], []
-    for part in _parts([_start(shell, NO_BOXES, number) for number, shell in enumerate(shells)]):
+
+    around = []
+    inside = []
+    points = []
+    for part in _cut_up([_start(shell, NO_BOXES, number) for number, shell in enumerate(shells)]):
         shell = shells[part.shell]
+        whole = _whole(part, shell)
         corners = np.where(OCTANTS, part.high, part.low)
         held = np.array([_holds(shell, corner) for corner in corners])
-        whole = _whole(part, shell)
         planes, span = _hull(np.concatenate([whole.points, corners[held]]))
         around.append(span)
         points.append(_outermost(whole.surface.reshape(-1, 3)))  # a corner of a cell may lie in another shell's hollow
-        if len(planes) and volumes[part.shell] * volumes.sum() > 0.0:
-            obstacles = np.concatenate([whole.surface, *(_within(other, part.low, part.high) for other in inverted)])
-            kernel = _kernel(planes, replace(part, surface=obstacles))
-            if kernel is not None and _holds(shell, kernel.mean(axis=0)):
-                centre = kernel.mean(axis=0)
-                inside += [] if any(_holds(other, centre) for other in inverted) else [kernel]
+        if not len(planes) or not volumes[part.shell] * volumes.sum() > 0.0:
+            continue
+
+        obstacles = np.concatenate([whole.surface, *(_within(other, part.low, part.high) for other in inverted)])
+        kernel = _kernel(planes, replace(part, surface=obstacles))
+        if kernel is None:
+            continue
+        centre = kernel.mean(axis=0)
+        if _holds(shell, centre) and not any(_holds(other, centre) for other in inverted):
+            inside.append(kernel)
+
     return _not_empty(around), inside, _not_empty(points)
 
 
@@ -152,9 +166,11 @@ def _shells(vertices: Matrix, triangles: NDArray[np.int64]) -> list[Triangles]:
     """The connected parts of a surface; all of it if there are many."""
     _, welded = np.unique(vertices, axis=0, return_inverse=True)
     corners = np.asarray(welded).ravel()[triangles]
+
     ends = corners.ravel(), np.roll(corners, 1, axis=1).ravel()
     size = int(corners.max()) + 1
     _, label = connected_components(coo_matrix((np.ones(corners.size), ends), shape=(size, size)), directed=False)
+
     numbers = np.unique(label[corners[:, 0]])
     if len(numbers) > MAX_PIECES:
         return [vertices[triangles]]
@@ -180,7 +196,8 @@ def _whole(part: _Part, surface: Triangles) -> _Part:
     return replace(part, surface=_within(surface, part.low, part.high))
 
 
-def _parts(parts: list[_Part]) -> list[_Part]:
+def _cut_up(parts: list[_Part]) -> list[_Part]:
+    """Parts after the best cuts, the one that takes most away first, while that is worth it."""
     least = SMALLEST_GAIN * sum(part.volume for part in parts)
     while len(parts) < MAX_PIECES:
         best = max(parts, key=lambda part: part.gain)
@@ -195,6 +212,7 @@ def _sketch(surface: Triangles) -> Triangles:
     """Fewer triangles of about the same shape: corners moved to a grid, what coincides left out."""
     low = surface.min(axis=(0, 1))
     size = max(float(np.ptp(surface, axis=(0, 1)).max()) / GRID, 1e-12)
+
     steps = np.round((surface - low) / size).astype(np.int64)
     numbers = np.sort(steps @ ((GRID + 1) ** np.arange(3)), axis=1)
     first = np.unique(numbers, axis=0, return_index=True)[1]
@@ -219,19 +237,24 @@ def clipped(surface: Triangles, axis: int, place: float) -> tuple[Triangles, Tri
     crossing = (count == 1) | (count == 2)
     lone_above = count[crossing] == 1
     lone = np.where(lone_above[:, None], above[crossing], ~above[crossing]).argmax(axis=1)
+
     rows = np.arange(len(lone))
     a, b, c = (surface[crossing][rows, (lone + k) % 3] for k in range(3))
-    p, q = _crossed(a, b, axis, place), _crossed(a, c, axis, place)
+    p = _crossed(a, b, axis, place)
+    q = _crossed(a, c, axis, place)
+
     tips = np.stack([a, p, q], axis=1)
     rests = np.stack([p, b, c], axis=1), np.stack([p, c, q], axis=1)
     low = [surface[count == 0], tips[~lone_above], *(rest[lone_above] for rest in rests)]
     high = [surface[count == 3], tips[lone_above], *(rest[~lone_above] for rest in rests)]
+
     return np.concatenate(low), np.concatenate(high)
 
 
 def _crossed(first: Matrix, second: Matrix, axis: int, place: float) -> Matrix:
     """Where edges cross the plane; their ends lie on different sides."""
-    from_first, from_second = first[:, axis] - place, second[:, axis] - place
+    from_first = first[:, axis] - place
+    from_second = second[:, axis] - place
     share = from_first / (from_first - from_second)
     points: Matrix = first + share[:, None] * (second - first)
     points[:, axis] = place
@@ -257,16 +280,19 @@ def _kernel(planes: Matrix, part: _Part) -> Matrix | None:
     """
     sides = np.concatenate([np.column_stack([np.eye(3), part.high]), np.column_stack([-np.eye(3), -part.low])])
     kept = np.concatenate([sides, most_different(planes, MAX_PLANES)])
-    lowest = np.min(
-        [part.surface[:, k] @ kept[:, :3].T for k in range(3)], axis=0
-    )  # of each triangle along each normal
+
+    # Of each triangle along each normal.
+    lowest = np.min([part.surface[:, k] @ kept[:, :3].T for k in range(3)], axis=0)
     nearest = (kept[:, 3] - lowest).argmin(axis=1)
     offsets = kept[:, 3].copy()
     np.minimum.at(offsets, nearest, lowest[np.arange(len(nearest)), nearest])
     offsets -= SHRINKAGE * float((part.high - part.low).max())
+
+    # The largest ball behind all planes: its centre is a point inside, which qhull asks for.
     found = linprog([0.0, 0.0, 0.0, -1.0], np.column_stack([kept[:, :3], np.ones(len(kept))]), offsets, bounds=FREELY)
     if found.status != 0 or not found.x[3] > THINNEST:
         return None
+
     try:
         return np.asarray(HalfspaceIntersection(np.column_stack([kept[:, :3], -offsets]), found.x[:3]).intersections)
     except (QhullError, ValueError):
@@ -281,5 +307,6 @@ def _outermost(points: Matrix) -> Matrix:
 def _directions() -> Matrix:
     """Unit vectors spread over all directions, shape (DIRECTIONS, 3)."""
     z = (2.0 * np.arange(DIRECTIONS) + 1.0) / DIRECTIONS - 1.0
-    turn, across = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(DIRECTIONS), np.sqrt(1.0 - z * z)
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(DIRECTIONS)
+    across = np.sqrt(1.0 - z * z)
     return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])

@@ -19,6 +19,7 @@ def most_different(planes: Matrix, count: int) -> Matrix:
     """At most ``count`` of the planes, each time the one whose normal is farthest from those already taken."""
     if len(planes) <= count:
         return planes
+
     taken = [0]
     nearest = planes[:, :3] @ planes[0, :3]
     while len(taken) < count:
@@ -48,9 +49,11 @@ def outward_planes(solid: coal.Convex) -> Matrix | None:
     points, triangles = convex_arrays(solid)
     if len(triangles) < 4:
         return None
+
     normals, areas = face_normals(points, triangles)
     if len(normals) < 4:
         return None
+
     normals = normals[np.argsort(-areas)]  # of almost parallel faces the largest stands for the others
     normals = normals[np.sort(np.unique(np.round(normals, 6), axis=0, return_index=True)[1])]
     return np.column_stack([normals, (points @ normals.T).max(axis=0)])

@@ -36,24 +36,28 @@ def spread(half: float, number: int) -> Vector:
 def row_on_z(heights: Vector, radius: float) -> Matrix:
     """Equal balls on the z axis, shape (n, 4)."""
     spheres = np.zeros((len(heights), 4))
-    spheres[:, 2], spheres[:, 3] = heights, radius
+    spheres[:, 2] = heights
+    spheres[:, 3] = radius
     return spheres
 
 
 def regular_cover(core: Core, limit: int, protrusion: float | None) -> Matrix | None:
     """Boxes as grids of balls, cylinders as rows of balls: the best one of at most ``limit`` balls."""
-    half, radius = core.half_sides, core.disc
+    half = core.half_sides
+    radius = core.disc
     if half is not None:
         pairs = ((a, b) for a in range(1, limit + 1) for b in range(1, limit // a + 1))
         grids = np.array([(a, b, c) for a, b in pairs for c in range(1, limit // (a * b) + 1)])
         cells = half / grids
         sticks = np.linalg.norm(cells, axis=1) - cells.min(axis=1)
         return _grid(half, _chosen(grids, sticks, protrusion))
+
     if radius is not None:
         grids = np.array([(1, 1, k) for k in range(1, limit + 1)])
         step = core.half_length / grids[:, 2]
         sticks = np.hypot(radius, step) - np.minimum(step, radius)
         return _row(radius, core.half_length, int(_chosen(grids, sticks, protrusion)[2]))
+
     return None
 
 

@@ -59,6 +59,7 @@ def smallest_cover(
     needs = reaches(parts, places.centres) - places.depth[:, None].astype(np.float32)
     spared = np.maximum(needs.min(axis=0), 0.0) if lenient else np.zeros_like(needs[0])
     needs -= spared
+
     chosen = _cover(needs, limit, wanted)
     found = _refined(parts, surface, places, needs, spared, places[chosen], max(limit, len(chosen)), wanted)
     return _shrunk(parts, found)
@@ -69,8 +70,10 @@ def surface_points(triangles: Triangles, count: int) -> Matrix:
     a, b, c = (triangles[:, k] for k in range(3))
     sizes = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
     which = np.searchsorted(sizes, (np.arange(count) + 0.5) / count * sizes[-1]).clip(0, len(triangles) - 1)
+
     u, v = ((np.arange(count) * step) % 1.0 for step in (0.7548776662466927, 0.5698402909980532))  # Roberts' sequence
     u, v = (np.where(u + v > 1.0, 1.0 - w, w)[:, None] for w in (u, v))
+
     spread = a[which] + u * (b - a)[which] + v * (c - a)[which]
     return np.concatenate([spread, triangles[:: -(-len(triangles) // count)].reshape(-1, 3)])
 
@@ -94,10 +97,13 @@ def every(points: Matrix, most: int) -> Matrix:
 def reaches(parts: Elements, centres: Matrix) -> Needs:
     """Radius that a ball around each centre needs to hold each element."""
     points = parts.points.astype(np.float32).T
-    squares, radii = (points**2).sum(axis=0), parts.radii.astype(np.float32)
+    squares = (points**2).sum(axis=0)
+    radii = parts.radii.astype(np.float32)
     found = np.empty((len(centres), len(parts.start)), dtype=np.float32)
+
     for k in range(0, len(centres), CHUNK):
         some = centres[k : k + CHUNK].astype(np.float32)
+        # |p - c|^2 = |p|^2 - 2 p c + |c|^2, in one array.
         square = some @ points
         square *= -2.0
         square += squares
@@ -106,38 +112,47 @@ def reaches(parts: Elements, centres: Matrix) -> Needs:
         np.sqrt(square, out=square)
         square += radii
         np.maximum.reduceat(square, parts.start, axis=1, out=found[k : k + CHUNK])
+
     return found
 
 
 def _cover(needs: Needs, limit: int, wanted: float | None) -> NDArray[np.int64]:
     """Numbers of the centres of a cover."""
-    low, high = float(needs.min(axis=0).max()), float(needs.max(axis=1).min())
+    low = float(needs.min(axis=0).max())
+    high = float(needs.max(axis=1).min())
+
     if wanted is not None:
         found = _greedy(needs <= max(low, wanted))
         if len(found) <= limit:
             return found
+
     best = np.array([int(needs.max(axis=1).argmin())])
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         found = _greedy(needs <= middle)
         if len(found) <= limit:
-            best, high = found, min(middle, float(needs[found].min(axis=0).max()))
+            best = found
+            high = min(middle, float(needs[found].min(axis=0).max()))
         else:
             low = middle
+
     return best
 
 
 def _greedy(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Rows that together hold every column, the one that adds most first."""
-    left, chosen = np.ones(holds.shape[1], dtype=bool), []
+    left = np.ones(holds.shape[1], dtype=bool)
+    chosen = []
     columns = np.array(holds.T, dtype=np.float32, order="C")
     gains = columns.sum(axis=0)  # whole numbers, exact
+
     while left.any():
         row = int(gains.argmax())
         chosen.append(row)
         added = np.flatnonzero(left & holds[row])
         left[added] = False
         gains -= columns[added].sum(axis=0)
+
     return np.array(chosen)
 
 
@@ -153,19 +168,25 @@ def _refined(
 ) -> Places:
     """Better places for the balls of a cover: the best set of all rounds."""
     element = np.repeat(np.arange(len(parts.start)), np.diff(np.r_[parts.start, len(parts.points)]))
-    best, least = places, np.inf
+    best = places
+    least = np.inf
+
     for turn in range(MATCHINGS + 1):
         needs = reaches(parts, places.centres) - places.depth[:, None].astype(np.float32) - spared
         worst = float(needs.min(axis=0).max())
         if worst < least:
-            best, least = places, worst
+            best = places
+            least = worst
+
         if turn == MATCHINGS or (wanted is not None and least <= wanted):
             break
         if turn < MATCHINGS - 2:
             places, needs = _moved_elsewhere(places, needs, spare, spare_needs, limit)
+
         owner = needs.argmin(axis=0)
         kept, owner = np.unique(owner, return_inverse=True)
         places = _descended(parts, surface, places[kept], owner.ravel()[element])
+
     return best
 
 
@@ -173,28 +194,39 @@ def _moved_elsewhere(
     places: Places, needs: Needs, spare: Places, spare_needs: Needs, limit: int
 ) -> tuple[Places, Needs]:
     """Balls that others can replace moved (or, below the limit, new ones put) to where the protrusion is worst."""
-    centres, depth, needs = places.centres.copy(), places.depth.copy(), needs.copy()
+    centres = places.centres.copy()
+    depth = places.depth.copy()
+    needs = needs.copy()
+
     for _ in range(MOVES):
         owner = needs.argmin(axis=0)
         least = needs.min(axis=0)
         if not least.max() > 0.0:
             break
+
         worst = int(owner[least.argmax()])
         bad = np.flatnonzero((owner == worst) & (least > 0.7 * least.max()))
         row = int(spare_needs[:, bad].max(axis=1).argmin())
         if spare_needs[row, bad].max() >= WORTH * least.max():
             break
+
         if len(centres) < limit:
-            centres, depth = np.concatenate([centres, spare.centres[[row]]]), np.r_[depth, spare.depth[row]]
+            centres = np.concatenate([centres, spare.centres[[row]]])
+            depth = np.r_[depth, spare.depth[row]]
             needs = np.concatenate([needs, spare_needs[[row]]])
             continue
+
         without = np.zeros(len(centres))
         np.maximum.at(without, owner, np.partition(needs, 1, axis=0)[1])
         without[worst] = np.inf
         poorest = int(without.argmin())
         if without[poorest] >= WORTH * least.max():
             break
-        centres[poorest], depth[poorest], needs[poorest] = spare.centres[row], spare.depth[row], spare_needs[row]
+
+        centres[poorest] = spare.centres[row]
+        depth[poorest] = spare.depth[row]
+        needs[poorest] = spare_needs[row]
+
     return Places(centres, depth), needs
 
 
@@ -205,29 +237,39 @@ def _descended(parts: Elements, surface: cKDTree, places: Places, owner: NDArray
     [43]). A step is shorter than the depth, so a centre stays inside.
     """
     order = np.argsort(owner, kind="stable")
-    points, radii, owner = parts.points[order], parts.radii[order], owner[order]
+    points = parts.points[order]
+    radii = parts.radii[order]
+    owner = owner[order]
     first = np.flatnonzero(np.r_[True, np.diff(owner) > 0])
-    centres, best, least = places.centres, places, np.full(len(places.centres), np.inf)
+
+    centres = places.centres
+    best = places
+    least = np.full(len(places.centres), np.inf)
     side = np.where(places.depth > 0.0, 1.0, -1.0)
     stride = 0.0
+
     for step in range(STEPS + 1):
         distance, nearest = surface.query(centres)
         away = points - centres[owner]
         reach = np.sqrt(np.einsum("ij,ij->i", away, away)) + radii
         radius = np.maximum.reduceat(reach, first)
+
         better = radius - side * distance < least
         least = np.where(better, radius - side * distance, least)
         best = Places(np.where(better[:, None], centres, best.centres), np.where(better, side * distance, best.depth))
+
         last = np.flatnonzero(reach >= radius[owner])
         farthest = np.empty(len(first), dtype=np.int64)
         farthest[owner[last]] = last
         if step == 0:
             stride = 0.5 * np.maximum(least, 0.0)
+
         out = points[farthest] - centres
         inward = centres - surface.data[nearest]
         way = _unit(out) + _unit(inward)
         length = np.minimum(stride / (step + 2.0), 0.25 * np.maximum(side * distance, 0.0))
         centres = centres + length[:, None] * way
+
     return best
 
 
@@ -241,6 +283,7 @@ def _shrunk(parts: Elements, places: Places) -> Matrix:
     element = np.repeat(np.arange(len(parts.start)), np.diff(np.r_[parts.start, len(parts.points)]))
     owner = needs.argmin(axis=0)[element]
     away = np.linalg.norm(parts.points - places.centres[owner], axis=1) + parts.radii
+
     radius = np.zeros(len(places.centres))
     np.maximum.at(radius, owner, away)
     used = np.bincount(owner, minlength=len(places.centres)) > 0

@@ -45,9 +45,12 @@ def _stored(file: Path) -> dict[str, bytes]:
     """All covers of a file by their hashes, packed; none if it is absent or damaged."""
     try:
         stored = NamedArrays(file)
-        keys, ends, packed = stored["keys"], stored["ends"].tolist(), stored["packed"].tobytes()
+        keys = stored["keys"]
+        ends = stored["ends"].tolist()
+        packed = stored["packed"].tobytes()
     except InputError:
         return {}
+
     starts = [0, *ends[:-1]]
     return {key.tobytes().hex(): packed[a:b] for key, a, b in zip(keys, starts, ends, strict=True)}
 

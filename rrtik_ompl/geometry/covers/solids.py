@@ -161,18 +161,23 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
     centre = middle + 0.5 * (turned.min(axis=0) + turned.max(axis=0)) @ axes
     extent = np.ptp(turned, axis=0)
     frame = Frame(centre, axes.T, float(np.linalg.norm(extent)))
+
     if not extent.min() > 1e-13 * frame.scale:
         raise ValueError("points in a plane")
+
     local = frame.to_local(points)
     stretch = extent / frame.scale
     hull = ConvexHull(local / stretch, qhull_options="Qt")
     normals = hull.equations[:, :3] / stretch
     length = np.linalg.norm(normals, axis=1)
-    normals, offsets = normals / length[:, None], -hull.equations[:, 3] / length
+    normals = normals / length[:, None]
+    offsets = -hull.equations[:, 3] / length
+
     triangles = local[hull.simplices]
     a, b, c = (triangles[:, k] for k in range(3))
     outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals)
     triangles[outward < 0.0] = triangles[outward < 0.0][:, ::-1]
+
     beyond = float((local @ normals.T - offsets).max())
     below = float((offsets[:, None] - np.einsum("ijk,ik->ij", triangles, normals)).max())
     return ConvexSolid(triangles, normals, offsets, max(beyond, 0.0) + max(below, 0.0) + ROUNDING), frame
@@ -181,7 +186,8 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
 def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Frame]:
     """A cylinder about z, inside a regular prism."""
     frame = Frame(np.zeros(3), np.eye(3), 2.0 * float(np.hypot(radius, half_length)))
-    small, high = radius / frame.scale, half_length / frame.scale
+    small = radius / frame.scale
+    high = half_length / frame.scale
     turn = (np.arange(CYLINDER_SIDES) + 0.5) * (TAU / CYLINDER_SIDES)
     ring = np.column_stack([np.cos(turn), np.sin(turn)]) * (small / np.cos(np.pi / CYLINDER_SIDES))
     return CylinderSolid(small, high, _prism(ring, high), ROUNDING), frame
@@ -190,9 +196,12 @@ def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Fr
 def _prism(ring: Matrix, high: float) -> Triangles:
     """Outward triangles of a prism over a convex counter-clockwise ring."""
     low, top = (np.column_stack([ring, np.full(len(ring), z)]) for z in (-high, high))
-    low_next, top_next = np.roll(low, -1, axis=0), np.roll(top, -1, axis=0)
+    low_next = np.roll(low, -1, axis=0)
+    top_next = np.roll(top, -1, axis=0)
     zeros = np.zeros_like(low)
-    floor, roof = zeros - np.array([0.0, 0.0, high]), zeros + np.array([0.0, 0.0, high])
+    floor = zeros - np.array([0.0, 0.0, high])
+    roof = zeros + np.array([0.0, 0.0, high])
+
     sides = [(low, low_next, top_next), (low, top_next, top), (floor, low_next, low), (roof, top, top_next)]
     return np.concatenate([np.stack(side, axis=1) for side in sides])
 
@@ -207,8 +216,11 @@ def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matr
     """
     used, number = np.unique(triangles, return_inverse=True)
     points, same = np.unique(vertices[used], axis=0, return_inverse=True)
-    low, high = points.min(axis=0), points.max(axis=0)
+
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     frame = Frame(0.5 * (low + high), np.eye(3), float(np.linalg.norm(high - low)))
+
     enclosed = np.where(CORNERS[None] == 1, boxes[1][:, None], boxes[0][:, None])
     local = frame.to_local(enclosed.reshape(-1, 3)).reshape(-1, 8, 3)
     return MeshSolid(frame.to_local(points), same.ravel()[number.reshape(-1, 3)], local), frame
@@ -230,17 +242,22 @@ def rim_caps(vertices: Matrix, faces: NDArray[np.int64]) -> Triangles:
         vertices: Shape (n, 3), no two of them equal.
         faces: Vertex numbers, shape (m, 3).
     """
-    start, end = faces.T.ravel(), np.roll(faces, -1, axis=1).T.ravel()
+    start = faces.T.ravel()
+    end = np.roll(faces, -1, axis=1).T.ravel()
     key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
     edges, which = np.unique(key, return_inverse=True)
     turns = np.bincount(which.ravel(), weights=np.sign(end - start), minlength=len(edges)).astype(np.int64)
+
     open_edges = np.flatnonzero(turns)
-    low, high = vertices[edges[open_edges] // len(vertices)], vertices[edges[open_edges] % len(vertices)]
+    low = vertices[edges[open_edges] // len(vertices)]
+    high = vertices[edges[open_edges] % len(vertices)]
     flip = (turns[open_edges] < 0)[:, None]
     ends = np.stack([np.where(flip, low, high), np.where(flip, high, low)], axis=1)
     ends = np.repeat(ends, np.abs(turns[open_edges]), axis=0)
+
     if not len(ends):
         return np.empty((0, 3, 3))
+
     apex = _loop_centres(ends)
     return np.concatenate([apex[:, None], ends], axis=1)
 
@@ -252,6 +269,7 @@ def _loop_centres(ends: NDArray[np.float64]) -> Matrix:
     size = int(number.max()) + 1
     links = coo_matrix((np.ones(len(start)), (start, end)), shape=(size, size))
     _, loop = connected_components(links, directed=False)
+
     edge_loop = loop[start]
     weight = np.bincount(edge_loop)
     middles = ends.mean(axis=1)
@@ -261,17 +279,22 @@ def _loop_centres(ends: NDArray[np.float64]) -> Matrix:
 
 def distance_to_triangles(points: Matrix, triangles: Triangles) -> Vector:
     """Distance of each point, shape (n, 3), to its own triangle, shape (n, 3, 3)."""
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    a = triangles[:, 0]
+    b = triangles[:, 1]
+    c = triangles[:, 2]
     normal = np.cross(b - a, c - a)
     area = np.einsum("ij,ij->i", normal, normal)
     above = np.ones(len(points), dtype=bool)
     nearest = np.full(len(points), np.inf)
+
     for p, q in ((a, b), (b, c), (c, a)):
-        side, away = q - p, points - p
+        side = q - p
+        away = points - p
         length = np.einsum("ij,ij->i", side, side)
         along = np.clip(np.einsum("ij,ij->i", away, side) / np.maximum(length, 1e-300), 0.0, 1.0)
         gap = away - along[:, None] * side
         nearest = np.minimum(nearest, np.einsum("ij,ij->i", gap, gap))
         above &= np.einsum("ij,ij->i", np.cross(side, away), normal) >= 0.0
+
     plane = np.einsum("ij,ij->i", points - a, normal) ** 2 / np.maximum(area, 1e-300)
     return np.asarray(np.sqrt(np.where(above & (area > 0.0), np.minimum(nearest, plane), nearest)))

@@ -25,25 +25,29 @@ def winding(triangles: Triangles, shape: Shape) -> tuple[NDArray[np.int64], Flag
     corners = (shape[0] + 1, shape[1] + 1, shape[2] + 1)
     passed = np.zeros(corners, dtype=np.int64)
     doubtful = np.zeros(corners, dtype=bool)
+
     which, y, z = _lines_near(triangles, corners)
     a, b, c = (triangles[which, k] for k in range(3))
     line = np.column_stack([y, z]).astype(np.float64)
-    offs = [_off_edge(p, q, line) for p, q in ((a, b), (b, c), (c, a))]
-    off = np.stack(offs)
+    off = np.stack([_off_edge(p, q, line) for p, q in ((a, b), (b, c), (c, a))])
     hit = (off > EDGE_TOLERANCE).all(axis=0) | (off < -EDGE_TOLERANCE).all(axis=0)
     near = ~hit & ((off >= -EDGE_TOLERANCE).all(axis=0) | (off <= EDGE_TOLERANCE).all(axis=0))
     doubtful[:, y[near], z[near]] = True
-    a, b, c, y, z, line = a[hit], b[hit], c[hit], y[hit], z[hit], line[hit]
+
+    a, b, c, line = (each[hit] for each in (a, b, c, line))
+    y, z = (each[hit] for each in (y, z))
     if len(a):
         x, blur = _crossing(a, b, c, line)
         sign = np.where(off[0, hit] > 0.0, 1, -1)
         before = np.clip(np.ceil(x), 0, corners[0]).astype(np.int64)  # corners with a smaller x see this crossing
         some = before > 0
         np.add.at(passed, (before[some] - 1, y[some], z[some]), sign[some])
+
         close = np.round(x)
         at = (np.abs(x - close) <= blur) & (close >= 0) & (close < corners[0])
         doubtful[close[at].astype(np.int64), y[at], z[at]] = True
         doubtful[:, y[blur > 0.1], z[blur > 0.1]] = True
+
     return np.asarray(passed[::-1].cumsum(axis=0)[::-1]), doubtful
 
 
@@ -51,9 +55,12 @@ def _lines_near(triangles: Triangles, corners: Shape) -> tuple[NDArray[np.int64]
     """Pairs of a triangle and a line of corners that passes through the box around it, seen along x."""
     low = np.ceil(triangles[:, :, 1:].min(axis=1) - EDGE_TOLERANCE).astype(np.int64)
     high = np.floor(triangles[:, :, 1:].max(axis=1) + EDGE_TOLERANCE).astype(np.int64)
-    low, high = np.maximum(low, 0), np.minimum(high, np.array(corners[1:]) - 1)
+    low = np.maximum(low, 0)
+    high = np.minimum(high, np.array(corners[1:]) - 1)
+
     count = np.maximum(high - low + 1, 0)
     total = count.prod(axis=1)
+
     which = np.repeat(np.arange(len(triangles)), total)
     place = np.arange(len(which)) - np.repeat(np.cumsum(total) - total, total)
     return which, low[which, 0] + place // count[which, 1], low[which, 1] + place % count[which, 1]
@@ -61,7 +68,8 @@ def _lines_near(triangles: Triangles, corners: Shape) -> tuple[NDArray[np.int64]
 
 def _off_edge(p: Matrix, q: Matrix, line: Matrix) -> Vector:
     """Signed distance of lines along x from the edge p q, seen along x."""
-    side, away = q[:, 1:] - p[:, 1:], line - p[:, 1:]
+    side = q[:, 1:] - p[:, 1:]
+    away = line - p[:, 1:]
     length = np.linalg.norm(side, axis=1)
     cross = side[:, 0] * away[:, 1] - side[:, 1] * away[:, 0]
     return np.asarray(np.where(length > EDGE_TOLERANCE, cross / np.maximum(length, EDGE_TOLERANCE), 0.0))
