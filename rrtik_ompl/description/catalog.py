@@ -56,6 +56,8 @@ OF_ALL: Mapping[str, Callable[..., Robot]] = {  # options of any robot
 }
 MOUNTING = ("base_pose", "tip", *OF_ALL)  # keys that stand beside that group
 
+_cache = RobotCache()
+
 
 def list_robots() -> tuple[str, ...]:
     """Names that `load_robot` knows."""
@@ -172,9 +174,11 @@ def load_robot(
         if option not in (*recipe.options, *OF_ALL):
             takes = ", ".join(sorted((*recipe.options, *OF_ALL)))
             raise InputError(f"robot '{os.fspath(name)}' takes no option '{option}'; it takes {takes}")
+
     given = {key: _absolute(key, value) for key, value in options.items() if value is not None}
     if "base_pose" in given:
         given["base_pose"] = base_pose(given["base_pose"], f"robot '{os.fspath(name)}': base_pose")
+
     key = json.dumps([recipe.target, plain(given)], sort_keys=True, default=repr)
     cached = _cache.get(key)
     if cached is None:
@@ -184,54 +188,8 @@ def load_robot(
             robot = of_all(robot, given[option]) if option in given else robot
         files = [recipe.target, *recipe.beside, *_paths(given), *_paths(robot.source)]
         cached = _cache.put(key, replace(robot, source=recipe.source(given)), files)
+
     return cached
-
-
-def robot_called(name: str, joint_names: tuple[str, ...]) -> Robot | None:
-    """The robot that a path names, if it can be loaded by that name and has these joints."""
-    try:
-        robot = load_robot(name)
-    except RrtikError:
-        return None
-    return robot if robot.joint_names == joint_names else None
-
-
-def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Robot:
-    """Robot that a problem file names under ``robot``.
-
-    Args:
-        entry: A name; or ``{name: .., options}``; or ``{urdf: FILE, options}``, ``{moveit: FOLDER, options}``, and so
-            with ``mjcf`` and ``dh``; ``{planar: {..}}``, ``{point2d: {..}}``, which take ``base_pose`` beside them.
-        folder: Folder of the problem file; files are named relative to it.
-
-    Raises:
-        InputError: If the entry has another form, or the robot cannot be loaded.
-    """
-    if isinstance(entry, str):
-        return load_robot(_beside(entry, folder) if Path(entry).suffix.lower() in FILE_KINDS else entry)
-    kinds = ("name", "moveit", "mjcf", "urdf", "dh", *PARAMETRIC)
-    if not isinstance(entry, Mapping):
-        raise InputError(f"robot: expected a name or one of the keys {', '.join(kinds)}")
-    _refuse_words_of_callers(entry)
-    found = [key for key in kinds if key in entry and not (key == "urdf" and "moveit" in entry)]
-    if len(found) != 1:
-        raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {', '.join(found) or 'none'}")
-    kind = found[0]
-    options: dict[str, Any] = {key: _resolved(key, value, folder) for key, value in entry.items() if key != kind}
-    if kind in PARAMETRIC:
-        if not isinstance(entry[kind], Mapping):
-            raise InputError(f"robot: {kind}: expected a group of keys such as {{radius: 0.1}}")
-        return load_robot(kind, **dict(entry[kind]), **options)
-    target = entry[kind]
-    if not isinstance(target, str):
-        raise InputError(f"robot: {kind}: expected text, found {target!r}")
-    return load_robot(target if kind == "name" else _beside(target, folder), **options)
-
-
-def _refuse_words_of_callers(entry: Mapping[str, object]) -> None:
-    for key in OF_CALLERS:
-        if key in entry:
-            raise InputError(f"robot: {key} is for whoever opens the file to give, not for the file; take it out")
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,27 +216,111 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
     if isinstance(name, str) and text in _offers("robots"):
         make = _load("robot", "robots", text)
         return _Recipe("name", text, make, tuple(sorted(inspect.signature(make).parameters)))
+
     suffix = path.suffix.lower()
     if suffix in (".yaml", ".yml"):  # what reads YAML is not loaded before there is some
         from rrtik_ompl.description.dh_file import DH_OPTIONS, robot_from_dh_file
 
         return _Recipe("dh", str(path.resolve()), lambda **given: robot_from_dh_file(path, **given), DH_OPTIONS)
+
     if suffix in (".xml", ".mjcf"):
         from rrtik_ompl.description.mjcf import MJCF_OPTIONS, is_mjcf, robot_from_mjcf
 
         if is_mjcf(path):
             return _Recipe("mjcf", str(path.resolve()), lambda **given: robot_from_mjcf(path, **given), MJCF_OPTIONS)
+
     if suffix in (".urdf", ".xml", ".xacro"):
         return _Recipe("urdf", str(path.resolve()), lambda **given: robot_from_urdf(path, **given), URDF_OPTIONS)
+
     if os.path.isdir(path):
         from rrtik_ompl.description.moveit_config import CHOOSING_FILES, CONFIG_OPTIONS, robot_from_moveit
 
         target = path.resolve()
         beside = tuple(str(target / file) for file in CHOOSING_FILES)
         return _Recipe("moveit", str(target), lambda **given: robot_from_moveit(path, **given), CONFIG_OPTIONS, beside)
+
     if path.parent != Path() or os.path.exists(path):  # which takes a name of any length
         raise InputError(f"{text}: not a robot file; expected a URDF (.urdf, .xacro), a DH table (.yaml) or a folder")
     raise UnknownNameError("robot", text, list_robots())
+
+
+def _absolute(key: str, value: object) -> object:
+    """Files by their absolute path, so that the cache does not depend on the current folder."""
+    if key in FILE_OPTIONS and isinstance(value, (str, os.PathLike)):
+        return Path(value).absolute()
+    if key == "packages" and isinstance(value, (str, os.PathLike)):
+        return [Path(value).absolute()]
+    if key == "packages" and isinstance(value, Iterable):
+        return [Path(item).absolute() for item in value]
+    return value
+
+
+def _paths(options: Mapping[str, Any]) -> list[str]:
+    return [os.fspath(options[key]) for key in FILE_OPTIONS if isinstance(options.get(key), (str, os.PathLike))]
+
+
+def robot_called(name: str, joint_names: tuple[str, ...]) -> Robot | None:
+    """The robot that a path names, if it can be loaded by that name and has these joints."""
+    try:
+        robot = load_robot(name)
+    except RrtikError:
+        return None
+    return robot if robot.joint_names == joint_names else None
+
+
+def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Robot:
+    """Robot that a problem file names under ``robot``.
+
+    Args:
+        entry: A name; or ``{name: .., options}``; or ``{urdf: FILE, options}``, ``{moveit: FOLDER, options}``, and so
+            with ``mjcf`` and ``dh``; ``{planar: {..}}``, ``{point2d: {..}}``, which take ``base_pose`` beside them.
+        folder: Folder of the problem file; files are named relative to it.
+
+    Raises:
+        InputError: If the entry has another form, or the robot cannot be loaded.
+    """
+    if isinstance(entry, str):
+        return load_robot(_beside(entry, folder) if Path(entry).suffix.lower() in FILE_KINDS else entry)
+
+    kinds = ("name", "moveit", "mjcf", "urdf", "dh", *PARAMETRIC)
+    if not isinstance(entry, Mapping):
+        raise InputError(f"robot: expected a name or one of the keys {', '.join(kinds)}")
+    _refuse_words_of_callers(entry)
+    found = [key for key in kinds if key in entry and not (key == "urdf" and "moveit" in entry)]
+    if len(found) != 1:
+        raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {', '.join(found) or 'none'}")
+    kind = found[0]
+    options: dict[str, Any] = {key: _resolved(key, value, folder) for key, value in entry.items() if key != kind}
+
+    if kind in PARAMETRIC:
+        if not isinstance(entry[kind], Mapping):
+            raise InputError(f"robot: {kind}: expected a group of keys such as {{radius: 0.1}}")
+        return load_robot(kind, **dict(entry[kind]), **options)
+
+    target = entry[kind]
+    if not isinstance(target, str):
+        raise InputError(f"robot: {kind}: expected text, found {target!r}")
+    return load_robot(target if kind == "name" else _beside(target, folder), **options)
+
+
+def _refuse_words_of_callers(entry: Mapping[str, object]) -> None:
+    for key in OF_CALLERS:
+        if key in entry:
+            raise InputError(f"robot: {key} is for whoever opens the file to give, not for the file; take it out")
+
+
+def _resolved(key: str, value: object, folder: str | os.PathLike[str]) -> object:
+    if key in FILE_OPTIONS and isinstance(value, str):
+        return _beside(value, folder)
+    if key == "packages" and isinstance(value, str):
+        return [_beside(value, folder)]
+    if key == "packages" and isinstance(value, Iterable) and not isinstance(value, Mapping):
+        return [_beside(str(item), folder) for item in value]
+    return value
+
+
+def _beside(path: str, folder: str | os.PathLike[str]) -> Path:
+    return Path(folder) / path
 
 
 @cache
@@ -315,35 +357,3 @@ def _shipped(what: str, group: str, below: str = "") -> dict[str, Path]:
 
 def _folders(what: str, group: str) -> tuple[Path, ...]:
     return tuple(Path(_load(f"{what} folder", group, name)) for name in _offers(group))
-
-
-def _beside(path: str, folder: str | os.PathLike[str]) -> Path:
-    return Path(folder) / path
-
-
-def _resolved(key: str, value: object, folder: str | os.PathLike[str]) -> object:
-    if key in FILE_OPTIONS and isinstance(value, str):
-        return _beside(value, folder)
-    if key == "packages" and isinstance(value, str):
-        return [_beside(value, folder)]
-    if key == "packages" and isinstance(value, Iterable) and not isinstance(value, Mapping):
-        return [_beside(str(item), folder) for item in value]
-    return value
-
-
-def _absolute(key: str, value: object) -> object:
-    """Files by their absolute path, so that the cache does not depend on the current folder."""
-    if key in FILE_OPTIONS and isinstance(value, (str, os.PathLike)):
-        return Path(value).absolute()
-    if key == "packages" and isinstance(value, (str, os.PathLike)):
-        return [Path(value).absolute()]
-    if key == "packages" and isinstance(value, Iterable):
-        return [Path(item).absolute() for item in value]
-    return value
-
-
-def _paths(options: Mapping[str, Any]) -> list[str]:
-    return [os.fspath(options[key]) for key in FILE_OPTIONS if isinstance(options.get(key), (str, os.PathLike))]
-
-
-_cache = RobotCache()

@@ -103,19 +103,23 @@ def robot_from_dh(
     table = _checked(name, rows)
     if convention not in CONVENTIONS:
         raise UnknownNameError("DH convention", convention, CONVENTIONS, where=f"robot '{name}'")
+
     radii = _radii(name, radius, len(table))
     T_last_tip = pin.SE3.Identity() if tool is None else rigid(tool, f"robot '{name}': tool")
     before, after = _fixed_parts(table, convention, T_last_tip)
+
     names = ["base", *(f"link{k}" for k in range(1, len(table) + 1))]
     joints = [
         Joint(row.joint, row.kind, parent, child, placement, (0, 0, 1), **_bounds(row), velocity=row.velocity)
         for row, placement, (parent, child) in zip(table, before, pairwise(names), strict=True)
     ]
     joints.append(Joint("tip_joint", "fixed", names[-1], "tip", after))
+
     corners = _corners(table, convention, T_last_tip)
     corners[1][0] = np.array([0.0, 0.0, np.clip(floor_gap, 0.0, abs(table[0].d)) * np.sign(table[0].d)])
     solids = [_capsules(points, r, colour) for points, r in zip(corners, [radii[0], *radii], strict=True)]
     links = [Link(link, solid, solid) for link, solid in zip(names, solids, strict=True)]
+
     allowed = {frozenset(pair) for pair in options.pop("allowed_collisions", ())} | _touching(links)
     return build_robot(
         name,
@@ -134,12 +138,14 @@ def robot_from_dh(
 def _checked(name: str, rows: Iterable[DhRow]) -> list[DhRow]:
     given = list(rows)
     at_most(len(given) + 1, MOST_JOINTS, f"robot '{name}': joints")
+
     table = [
         DhRow(**{f: getattr(row, f) for f in DhRow.__slots__} | {"joint": row.joint or f"joint{k}"})
         for k, row in enumerate(given, start=1)
     ]
     if not table:
         raise InputError(f"robot '{name}': the DH table has no rows; give one per joint")
+
     for row in table:
         where = f"robot '{name}': DH row '{row.joint}'"
         if row.kind not in ROW_KINDS:
@@ -157,14 +163,14 @@ def _radii(name: str, radius: float | Sequence[float], count: int) -> list[float
     return [max(float(value), SMALLEST_RADIUS) for value in values]
 
 
-def _bounds(row: DhRow) -> dict[str, float]:
-    lower, upper = (-np.inf, np.inf) if JOINT_KINDS[row.kind].endless else row.limits
-    return {"lower": lower, "upper": upper}
-
-
-def _posture(name: str, key: str, values: ArrayLike, table: Sequence[DhRow]) -> dict[str, float]:
-    numbers = finite_array(values, (len(table),), f"robot '{name}': posture '{key}'")
-    return {row.joint: float(value) for row, value in zip(table, numbers, strict=True)}
+def _fixed_parts(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3) -> tuple[list[pin.SE3], pin.SE3]:
+    """What lies before each joint's own motion (a turn about z or a slide along it), and what lies after the last."""
+    before = []
+    after = pin.SE3.Identity()
+    for row in table:
+        before.append(after * _x_part(row) if convention == "modified" else after)
+        after = _z_part(row) if convention == "modified" else _z_part(row) * _x_part(row)
+    return before, after * tool
 
 
 def _z_part(row: DhRow) -> pin.SE3:
@@ -177,27 +183,31 @@ def _x_part(row: DhRow) -> pin.SE3:
     return pin.SE3(pin.rpy.rpyToMatrix(row.alpha, 0.0, 0.0), np.array([row.a, 0.0, 0.0]))
 
 
-def _fixed_parts(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3) -> tuple[list[pin.SE3], pin.SE3]:
-    """What lies before each joint's own motion (a turn about z or a slide along it), and what lies after the last."""
-    before, after = [], pin.SE3.Identity()
-    for row in table:
-        before.append(after * _x_part(row) if convention == "modified" else after)
-        after = _z_part(row) if convention == "modified" else _z_part(row) * _x_part(row)
-    return before, after * tool
+def _bounds(row: DhRow) -> dict[str, float]:
+    lower, upper = (-np.inf, np.inf) if JOINT_KINDS[row.kind].endless else row.limits
+    return {"lower": lower, "upper": upper}
+
+
+def _posture(name: str, key: str, values: ArrayLike, table: Sequence[DhRow]) -> dict[str, float]:
+    numbers = finite_array(values, (len(table),), f"robot '{name}': posture '{key}'")
+    return {row.joint: float(value) for row, value in zip(table, numbers, strict=True)}
 
 
 def _corners(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3) -> list[list[Vector]]:
     """Corner points of each link, base first, in the frame of its joint: along d, then along the a that follows."""
     shift = 0 if convention == "standard" else 1
     corners = [[np.zeros(3)] + ([_x_part(table[0]).translation] if shift else [])]
+
     for k, row in enumerate(table):
-        place, points = _z_part(row), [np.zeros(3), np.array([0.0, 0.0, row.d])]
+        place = _z_part(row)
+        points = [np.zeros(3), np.array([0.0, 0.0, row.d])]
         if k + shift < len(table):
             place = place * _x_part(table[k + shift])
             points.append(place.translation)
         if k == len(table) - 1:
             points.append((place * tool).translation)
         corners.append(points)
+
     return corners
 
 

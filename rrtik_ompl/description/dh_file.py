@@ -90,14 +90,17 @@ def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_p
     """
     document = read_yaml(path)
     entry = parse(document, DhFile)
+
     rows = [_row(document, k, row) for k, row in enumerate(entry.dh.rows)]
     sliding = np.array([JOINT_KINDS[row.type].slides for row in entry.dh.rows])
     tool = entry.dh.tool
+
     postures = {}
     for key, values in entry.postures_deg.items():
         if len(values) != len(rows):
             raise document.error(("postures_deg", key), f"expected {len(rows)} numbers, found {len(values)}")
         postures[key] = np.where(sliding, values, np.radians(values))
+
     with document.at(("dh",)):
         return robot_from_dh(
             entry.name,
@@ -118,12 +121,15 @@ def _row(document: YamlDocument, number: int, row: RowEntry) -> DhRow:
     given, wrong = ("limits", "limits_deg") if slides else ("limits_deg", "limits")
     if getattr(row, wrong) is not None:
         raise document.error((*place, wrong), f"a {row.type} joint takes {given}; rename the key")
+
     limits = getattr(row, given)
     if slides and limits is None:
         raise document.error(place, f"a {row.type} joint needs limits: [lower, upper] in metres; add them")
+
     lower, upper = (-180.0, 180.0) if limits is None else limits
     if lower >= upper:
         raise document.error((*place, given), f"lower limit {lower:g} is not below upper limit {upper:g}; swap them")
+
     scale = 1.0 if slides else DEGREE
     return DhRow(
         a=row.a,

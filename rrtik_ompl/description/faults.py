@@ -27,8 +27,10 @@ def tell(faults: Sequence[str], strict: bool) -> None:
     """
     if not faults:
         return
+
     more = len(faults) - MOST_NAMED
     line = "; ".join(faults[:MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
+
     if strict:
         raise InputError(f"{line}; correct this, or load without strict")
     warnings.warn(DescriptionWarning(printable(line)), stacklevel=3)

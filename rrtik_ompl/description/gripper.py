@@ -56,6 +56,7 @@ class GripperJoints:
             raise InputError("width of a gripper: how far this one opens is not known; use its states open and closed")
         if not 0.0 <= wanted <= self.width:
             raise InputError(f"width of a gripper: it opens from 0 to {self.width:g} m, got {wanted:g}")
+
         share = wanted / self.width
         values = (shut + share * (wide - shut) for shut, wide in zip(self.closed, self.opened, strict=True))
         return dict(zip(self.joints, values, strict=True))

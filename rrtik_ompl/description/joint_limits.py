@@ -40,6 +40,7 @@ def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> di
     table = found.get("joint_limits")
     if not isinstance(table, Mapping):
         raise document.error((*top, "joint_limits"), "expected 'joint_limits:' with one group of keys per joint")
+
     limits = {}
     for joint, values in table.items():
         location: Location = (*top, "joint_limits", joint)
@@ -48,7 +49,39 @@ def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> di
         if not isinstance(values, Mapping):
             raise document.error(location, f"expected keys such as max_velocity, found {describe(values)}")
         limits[joint] = _joint(document, location, values)
+
     return limits
+
+
+def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]) -> JointLimits:
+    for key, value in values.items():
+        if key not in _KEYS:
+            raise UnknownNameError("key", key, _KEYS, where=document.place((*location, key)))
+        if key.startswith("has_") and not isinstance(value, bool):
+            raise document.error((*location, key), f"expected true or false, found {describe(value)}")
+        if key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False:  # else MoveIt writes 0
+            _number(document, (*location, key), value, positive=not key.endswith("position"))
+
+    found: dict[str, float | None] = {}
+    for rate in RATES:
+        has = values.get(f"has_{rate}_limits")
+        found[rate] = np.inf if has is False else values.get(f"max_{rate}")
+    if values.get("has_position_limits") is not False:
+        found |= {"lower": values.get("min_position"), "upper": values.get("max_position")}
+
+    low = found.get("lower")
+    high = found.get("upper")
+    if low is not None and high is not None and low >= high:
+        raise document.error((*location, "min_position"), f"{low:g} is not below max_position {high:g}; swap them")
+
+    return JointLimits(**{key: None if value is None else float(value) for key, value in found.items()})
+
+
+def _number(document: YamlDocument, location: Location, value: object, *, positive: bool) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        raise document.error(location, f"expected a finite number, found {describe(value)}")
+    if positive and value <= 0:
+        raise document.error(location, f"must be greater than 0, got {value:g}")
 
 
 def unread_limits(path: str | os.PathLike[str]) -> list[str]:
@@ -60,30 +93,3 @@ def unread_limits(path: str | os.PathLike[str]) -> list[str]:
             if values.get(key) is not None and values.get(f"has_{flag}_limits") is not False:
                 named.setdefault(key, []).append(f"'{joint}'")
     return [f"{key} of {few(joints, 3)}" for key, joints in named.items()]
-
-
-def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]) -> JointLimits:
-    for key, value in values.items():
-        if key not in _KEYS:
-            raise UnknownNameError("key", key, _KEYS, where=document.place((*location, key)))
-        if key.startswith("has_") and not isinstance(value, bool):
-            raise document.error((*location, key), f"expected true or false, found {describe(value)}")
-        if key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False:  # else MoveIt writes 0
-            _number(document, (*location, key), value, positive=not key.endswith("position"))
-    found: dict[str, float | None] = {}
-    for rate in RATES:
-        has = values.get(f"has_{rate}_limits")
-        found[rate] = np.inf if has is False else values.get(f"max_{rate}")
-    if values.get("has_position_limits") is not False:
-        found |= {"lower": values.get("min_position"), "upper": values.get("max_position")}
-    low, high = found.get("lower"), found.get("upper")
-    if low is not None and high is not None and low >= high:
-        raise document.error((*location, "min_position"), f"{low:g} is not below max_position {high:g}; swap them")
-    return JointLimits(**{key: None if value is None else float(value) for key, value in found.items()})
-
-
-def _number(document: YamlDocument, location: Location, value: object, *, positive: bool) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
-        raise document.error(location, f"expected a finite number, found {describe(value)}")
-    if positive and value <= 0:
-        raise document.error(location, f"must be greater than 0, got {value:g}")

@@ -31,7 +31,9 @@ def narrowed(robot: Robot, ranges: Mapping[str, Sequence[float]]) -> Robot:
     """
     require(robot, Robot, "robot with narrower ranges", "use load_robot(name or file)")
     require(ranges, Mapping, "joint_ranges of a robot", "give two numbers by name of joint")
-    lower, upper = robot.lower.copy(), robot.upper.copy()
+
+    lower = robot.lower.copy()
+    upper = robot.upper.copy()
     kept: dict[str, list[float]] = {}
     for joint, given in ranges.items():
         if joint not in robot.joint_names:
@@ -41,11 +43,16 @@ def narrowed(robot: Robot, ranges: Mapping[str, Sequence[float]]) -> Robot:
         k = robot.joint_names.index(joint)
         if robot.continuous[k]:
             raise InputError(f"{what}: it turns without limits; give it limits in the robot's description")
-        first, last = max(low, lower[k]), min(high, upper[k])
+
+        first = max(low, lower[k])
+        last = min(high, upper[k])
         if not first < last:
             limits = f"its limits are {lower[k]:g} to {upper[k]:g}"
             raise InputError(f"{what}: {low:g} to {high:g} leaves it no room, {limits}")
-        lower[k], upper[k] = first, last
+
+        lower[k] = first
+        upper[k] = last
         kept[joint] = [float(low), float(high)]
+
     source = dict(robot.source) | {"joint_ranges": dict(robot.source.get("joint_ranges", {})) | kept}
     return replace(robot, lower=frozen(lower), upper=frozen(upper), source=MappingProxyType(source))

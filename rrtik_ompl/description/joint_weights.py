@@ -15,7 +15,8 @@ from rrtik_ompl.description.named_numbers import by_name
 from rrtik_ompl.model.goal import joint_difference
 from rrtik_ompl.model.robot import Robot
 
-LIGHTEST, HEAVIEST = 1e-3, 1e3
+LIGHTEST = 1e-3
+HEAVIEST = 1e3
 
 
 def given_weights(robot: Robot) -> list[float]:
@@ -70,6 +71,7 @@ def weighted(robot: Robot, weights: Mapping[str, float]) -> Robot:
     """
     require(robot, Robot, "robot to weight", "use load_robot(name or file)")
     require(weights, Mapping, f"joint weights of robot '{robot.name}'", "use {name of a joint: weight}")
+
     given = by_name(robot, "joint_weights", "joint", robot.joint_names, weights, _in_range)
     source = dict(robot.source) | {"joint_weights": dict(given)}
     kept = {joint: weight for joint, weight in given.items() if weight != 1.0}

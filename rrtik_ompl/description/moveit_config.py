@@ -57,21 +57,26 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
     config = home / "config" if os.path.isdir(home / "config") else home
     if not os.path.isdir(config):
         raise InputError(f"{folder}: no such folder; give a MoveIt configuration folder")
+
     packages = package_roots(given.get("packages", ()))
     named = _assistant(home, config)
     srdf = given.get("srdf") or _srdf(home, config, named)
     urdf = Path(given.get("urdf") or _urdf(home, config, named, packages))
+
     found: dict[str, Any] = {"urdf": urdf, "srdf": Path(srdf)}
     arguments = dict(given.get("xacro_args") or {})
     if is_xacro(urdf) and not given.get("urdf"):
         arguments = _xacro_args(home, named) | arguments
     if arguments:
         found["xacro_args"] = arguments
+
     limits = given.get("joint_limits") or config / "joint_limits.yaml"
     if given.get("joint_limits") or os.path.isfile(limits):
         found["joint_limits"] = Path(limits)
+
     if given.get("group") is None and given.get("joints") is None:
         found["group"] = _group(home, config, found, packages)
+
     return found
 
 
@@ -80,6 +85,7 @@ def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
     file = next((each for each in (home / ASSISTANT, config.parent / ASSISTANT) if os.path.isfile(each)), None)
     if file is None:
         return {}
+
     document = read_yaml(file)
     top = document.data.get("moveit_setup_assistant_config")
     if not isinstance(top, Mapping):
@@ -92,6 +98,42 @@ def _srdf(home: Path, config: Path, named: Mapping[str, Any]) -> Path:
     if isinstance(relative, str) and os.path.isfile(home / relative):
         return home / relative
     return _only(config, ("*.srdf", "*.srdf.xacro"), "SRDF", "srdf") or _missing(config, "SRDF", "srdf")
+
+
+def _only(config: Path, patterns: Iterable[str], kind: str, option: str) -> Path | None:
+    """The only file of the first pattern that any file has; None if none has. Those for Gazebo must be asked for."""
+    for pattern in patterns:
+        asked_for = pattern.startswith(SIMULATED)
+        found = sorted(file for file in config.glob(pattern) if asked_for or not file.name.startswith(SIMULATED))
+        if len(found) > 1:
+            names = ", ".join(each.name for each in found)
+            raise InputError(f"{config}: {len(found)} files are an {kind}: {names}; choose one by {option}=FILE")
+        if found:
+            return found[0]
+    return None
+
+
+def _missing(config: Path, kind: str, option: str) -> Path:
+    raise InputError(f"{config}: no {kind} in this folder; is it of MoveIt? give {option}=FILE")
+
+
+def _urdf(home: Path, config: Path, named: Mapping[str, Any], packages: Iterable[Path]) -> Path:
+    own = _only(config, ("*.urdf",), "URDF", "urdf")
+    if own is not None:
+        return own
+
+    package, relative = (named.get("urdf", {}).get(key) for key in ("package", "relative_path"))
+    where = package_folder(package, home.resolve(), packages) if isinstance(package, str) else None
+    if where is not None and isinstance(relative, str) and os.path.isfile(where / relative):
+        return where / relative
+
+    own = _only(config, ("*.urdf.xacro",), "URDF", "urdf") or _only(config, (f"{SIMULATED}*.urdf",), "URDF", "urdf")
+    if own is None and isinstance(package, str):
+        raise InputError(
+            f"{home / ASSISTANT}: the URDF {relative} of package '{package}' is not found; "
+            f"give packages=[the folder that holds '{package}'], or urdf=FILE"
+        )
+    return own or _missing(config, "URDF", "urdf")
 
 
 def _xacro_args(home: Path, named: Mapping[str, Any]) -> dict[str, str]:
@@ -108,41 +150,8 @@ def _xacro_args(home: Path, named: Mapping[str, Any]) -> dict[str, str]:
             found[name] = value
         elif not name.startswith("-"):
             raise InputError(f"{home / ASSISTANT}: xacro_args: expected words such as name:=value, found '{word}'")
+
     return found
-
-
-def _urdf(home: Path, config: Path, named: Mapping[str, Any], packages: Iterable[Path]) -> Path:
-    own = _only(config, ("*.urdf",), "URDF", "urdf")
-    if own is not None:
-        return own
-    package, relative = (named.get("urdf", {}).get(key) for key in ("package", "relative_path"))
-    where = package_folder(package, home.resolve(), packages) if isinstance(package, str) else None
-    if where is not None and isinstance(relative, str) and os.path.isfile(where / relative):
-        return where / relative
-    own = _only(config, ("*.urdf.xacro",), "URDF", "urdf") or _only(config, (f"{SIMULATED}*.urdf",), "URDF", "urdf")
-    if own is None and isinstance(package, str):
-        raise InputError(
-            f"{home / ASSISTANT}: the URDF {relative} of package '{package}' is not found; "
-            f"give packages=[the folder that holds '{package}'], or urdf=FILE"
-        )
-    return own or _missing(config, "URDF", "urdf")
-
-
-def _missing(config: Path, kind: str, option: str) -> Path:
-    raise InputError(f"{config}: no {kind} in this folder; is it of MoveIt? give {option}=FILE")
-
-
-def _only(config: Path, patterns: Iterable[str], kind: str, option: str) -> Path | None:
-    """The only file of the first pattern that any file has; None if none has. Those for Gazebo must be asked for."""
-    for pattern in patterns:
-        asked_for = pattern.startswith(SIMULATED)
-        found = sorted(file for file in config.glob(pattern) if asked_for or not file.name.startswith(SIMULATED))
-        if len(found) > 1:
-            names = ", ".join(each.name for each in found)
-            raise InputError(f"{config}: {len(found)} files are an {kind}: {names}; choose one by {option}=FILE")
-        if found:
-            return found[0]
-    return None
 
 
 def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Path]) -> str:
@@ -151,14 +160,17 @@ def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Pa
     urdf = files["urdf"]
     text = robot_text(urdf, packages, files.get("xacro_args"))
     tree = read_urdf(text, where=str(urdf), folder=urdf.resolve().parent, packages=packages).tree
+
     sizes = {name: _size(semantics, name, tree) for name in semantics.groups}
     moving = [name for name, size in sizes.items() if size > 0]
     solved = _solved(config, semantics)
     grippers = _grippers(semantics, sizes, solved)
     arms = [name for name in moving if name not in grippers] or moving
+
     for names in ([name for name in arms if name in solved], arms):
         if len(names) == 1:
             return names[0]
+
     choice = ", ".join(arms) or "none that moves"
     raise InputError(f"{home}: which group is the arm? choose one by group=, of {choice}")
 
@@ -169,6 +181,19 @@ def _size(semantics: Srdf, group: str, tree: Tree) -> int:
         return len(semantics.movable(group, tree))
     except InputError:
         return 1
+
+
+def _solved(config: Path, semantics: Srdf) -> set[str]:
+    """Groups for which ``kinematics.yaml`` names a solver."""
+    file = config / "kinematics.yaml"
+    if not os.path.isfile(file):
+        return set()
+    document = read_yaml(file)
+    top, found = parameters(document, "robot_description_kinematics")
+    for name in found:
+        if name not in semantics.groups:
+            raise UnknownNameError("group", name, semantics.groups, where=document.place((*top, name)))
+    return set(found)
 
 
 def _grippers(semantics: Srdf, sizes: Mapping[str, int], solved: set[str]) -> set[str]:
@@ -183,16 +208,3 @@ def _grippers(semantics: Srdf, sizes: Mapping[str, int], solved: set[str]) -> se
             if (sizes[end.group], end.group in solved) <= (most, False):
                 found.add(end.group)
     return found
-
-
-def _solved(config: Path, semantics: Srdf) -> set[str]:
-    """Groups for which ``kinematics.yaml`` names a solver."""
-    file = config / "kinematics.yaml"
-    if not os.path.isfile(file):
-        return set()
-    document = read_yaml(file)
-    top, found = parameters(document, "robot_description_kinematics")
-    for name in found:
-        if name not in semantics.groups:
-            raise UnknownNameError("group", name, semantics.groups, where=document.place((*top, name)))
-    return set(found)

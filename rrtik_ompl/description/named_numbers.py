@@ -31,7 +31,8 @@ def by_name(
         UnknownNameError: If there is no such name.
         InputError: If a value is no number, or as ``checked`` says.
     """
-    known, found = tuple(names), {}
+    known = tuple(names)
+    found = {}
     for name, value in given.items():
         if name not in known:
             raise UnknownNameError(f"{kind} of robot '{robot.name}'", name, known, where=option)

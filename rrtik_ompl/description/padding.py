@@ -37,6 +37,7 @@ def padded(robot: Robot, padding: Padding) -> Robot:
         0.01
     """
     require(robot, Robot, "robot to pad", "use load_robot(name or file)")
+
     given = padding if isinstance(padding, Mapping) else dict.fromkeys(robot.link_names, padding)
     thick = by_name(robot, "padding", "link", robot.link_names, given, not_negative)
     source = dict(robot.source) | {"padding": dict(thick) if isinstance(padding, Mapping) else float(padding)}

@@ -104,28 +104,34 @@ def build_robot(
     movable = {joint.name: joint for joint in tree.walk() if joint.moves}
     actuated = tuple(joints) if joints is not None else tuple(n for n in movable if n not in ties)
     _check_joints(name, tuple(movable), actuated, ties, locked or {})
+
     for tie in ties.values():
         if movable[tie.joint].slides and movable[tie.source].endless:
             raise InputError(
                 f"robot '{name}': prismatic joint '{tie.joint}' mimics '{tie.source}', which turns without end; "
                 "give that one limits"
             )
+
     limited = _followed(name, movable, actuated, ties, limits or {})
     held = _held_values(name, limited, actuated, ties, locked or {})
     model, collision, looks = build_models(tree.hold(held), checked_base(base_pose, f"robot '{name}': base_pose"))
+
     tip_name = _last_link(name, tree, actuated) if tip is None else name_of(tip, f"the tip of robot '{name}'")
     if not model.existFrame(tip_name):
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
+
     chain = _chain(model, actuated, ties)
     whole = chain.whole_turns()
     moving = [movable[joint] for joint in actuated]
     limited |= _periods(name, moving, limited, ties, whole)
     bounds = _limits(name, moving, limited)
+
     named = {
         key: frozen(_turned_inside(np.array([values[j] for j in actuated]), bounds, whole))
         for key, values in (postures or {}).items()
         if all(j in values for j in actuated)
     }
+
     return Robot(
         name=name,
         joint_names=actuated,
@@ -147,15 +153,12 @@ def build_robot(
     )
 
 
-def _pairs(given: Iterable[Iterable[str]]) -> frozenset[frozenset[str]]:
-    return frozenset(frozenset(pair) for pair in given)
-
-
 def _check_joints(
     name: str, known: tuple[str, ...], actuated: tuple[str, ...], ties: Mapping[str, Mimic], locked: Mapping[str, float]
 ) -> None:
     if not actuated:
         raise InputError(f"robot '{name}': no movable joint; its description holds only fixed joints")
+
     for joint in (*actuated, *ties, *(m.source for m in ties.values()), *locked):
         if joint not in known:
             raise UnknownNameError(f"movable joint of robot '{name}'", joint, known)
@@ -169,81 +172,6 @@ def _check_joints(
             raise InputError(f"robot '{name}': joint '{joint}' mimics '{ties[joint].source}' and cannot be moved alone")
         if joint in locked:
             raise InputError(f"robot '{name}': joint '{joint}' is both actuated and locked; leave it out of one")
-
-
-def _held_values(
-    name: str,
-    limits: Mapping[str, Mapping[str, float]],
-    actuated: tuple[str, ...],
-    ties: Mapping[str, Mimic],
-    locked: Mapping[str, float],
-) -> dict[str, float]:
-    """Value of every joint that is neither actuated nor follows an actuated one."""
-    values: dict[str, float] = {}
-    for joint, own in limits.items():
-        given = locked.get(joint, min(max(0.0, own["lower"]), own["upper"]))
-        values[joint] = float(bounded_array(given, (), f"robot '{name}': locked value of joint '{joint}'"))
-    for tie in ties.values():
-        if tie.joint not in locked:
-            values[tie.joint] = tie.multiplier * values[tie.source] + tie.offset
-    moving = {joint for joint in limits if joint in actuated or (joint in ties and ties[joint].source in actuated)}
-    return {joint: value for joint, value in values.items() if joint not in moving}
-
-
-def _chain(model: pin.Model, actuated: tuple[str, ...], ties: Mapping[str, Mimic]) -> Chain:
-    count, place = model.njoints - 1, {name: number for number, name in enumerate(actuated)}
-    axis, prismatic = np.zeros((count, 3)), np.zeros(count, dtype=bool)
-    gain, offset = np.zeros((count, len(actuated))), np.zeros(count)
-    neutral = pin.neutral(model)
-    names, joints = list(model.names)[1:], model.joints
-    for k in range(count):
-        own = joints[k + 1].createData()  # of this joint alone: all joints' data are looked up by copying them
-        joints[k + 1].calc(own, neutral)
-        subspace = np.asarray(own.S).reshape(-1)  # (linear; angular)
-        prismatic[k] = np.linalg.norm(subspace[:3]) > 0.5
-        axis[k] = subspace[:3] if prismatic[k] else subspace[3:]
-        tie = ties.get(names[k])
-        if tie is None:
-            gain[k, place[names[k]]] = 1.0
-        else:
-            gain[k, place[tie.source]], offset[k] = tie.multiplier, tie.offset
-    return Chain(
-        parent=frozen([model.parents[k + 1] - 1 for k in range(count)], np.int64),
-        placement=frozen([model.jointPlacements[k + 1].homogeneous for k in range(count)]),
-        axis=frozen(axis),
-        prismatic=frozen(prismatic, bool),
-        gain=frozen(gain),
-        offset=frozen(offset),
-    )
-
-
-def _limits(name: str, joints: Iterable[Joint], found: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
-    rows = []
-    for joint in joints:
-        limits = found[joint.name]
-        low, high = limits["lower"], limits["upper"]
-        if not low < high:
-            raise InputError(
-                f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; "
-                "lower must be below upper: correct the limits, or leave the joint out of joints=[...]"
-            )
-        if joint.slides and not max(abs(low), abs(high)) <= LARGEST:
-            raise InputError(
-                f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres, up to {LARGEST:g}; "
-                "give them in the file or by joint_limits=FILE, or leave the joint out of joints=[...]"
-            )
-        rates = [limits[key] for key in RATES]
-        for what, rate in zip(RATES, rates, strict=True):
-            if not rate > 0.0:
-                raise InputError(
-                    f"robot '{name}': joint '{joint.name}' has {what} limit {rate:g}; it must be greater than 0"
-                )
-        endless = joint.endless and bool(np.isinf(low) and np.isinf(high))
-        rows.append((low, high, *rates, endless, joint.slides))
-    columns = list(zip(*rows, strict=True))
-    keys = ("lower", "upper", *RATES)
-    bounds: dict[str, Any] = {key: frozen(column) for key, column in zip(keys, columns, strict=False)}
-    return bounds | {"continuous": frozen(columns[5], bool), "prismatic": frozen(columns[6], bool)}
 
 
 def _followed(
@@ -260,8 +188,10 @@ def _followed(
     """
     own = {joint.name: _own_limits(joint, given.get(joint.name)) for joint in movable.values()}
     found = dict(own)
+
     for tie in ties.values():
-        leader, follower = found[tie.source], own[tie.joint]
+        leader = found[tie.source]
+        follower = own[tie.joint]
         cut = _cut(leader, follower, tie)
         if cut["lower"] < cut["upper"]:
             found[tie.source] = cut
@@ -291,9 +221,87 @@ def _cut(leader: Mapping[str, float], follower: Mapping[str, float], tie: Mimic)
     if tie.multiplier == 0.0:  # it stands still
         inside = follower["lower"] - LIMIT_TOLERANCE <= tie.offset <= follower["upper"] + LIMIT_TOLERANCE
         return dict(leader) if inside else {**leader, "lower": np.inf}
+
     ends = [(follower[key] - tie.offset) / tie.multiplier for key in ("lower", "upper")]
     rates = {key: min(leader[key], follower[key] / abs(tie.multiplier)) for key in RATES}
     return {"lower": max(leader["lower"], min(ends)), "upper": min(leader["upper"], max(ends)), **rates}
+
+
+def _held_values(
+    name: str,
+    limits: Mapping[str, Mapping[str, float]],
+    actuated: tuple[str, ...],
+    ties: Mapping[str, Mimic],
+    locked: Mapping[str, float],
+) -> dict[str, float]:
+    """Value of every joint that is neither actuated nor follows an actuated one."""
+    values: dict[str, float] = {}
+    for joint, own in limits.items():
+        given = locked.get(joint, min(max(0.0, own["lower"]), own["upper"]))
+        values[joint] = float(bounded_array(given, (), f"robot '{name}': locked value of joint '{joint}'"))
+
+    for tie in ties.values():
+        if tie.joint not in locked:
+            values[tie.joint] = tie.multiplier * values[tie.source] + tie.offset
+
+    moving = {joint for joint in limits if joint in actuated or (joint in ties and ties[joint].source in actuated)}
+    return {joint: value for joint, value in values.items() if joint not in moving}
+
+
+def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
+    """The leaf with the most actuated joints above it; among equals the longest branch, then the last described.
+
+    A warning says which it is where others move too.
+    """
+    parents = {joint.parent for joint in tree.joints}
+
+    def rank(leaf: str) -> tuple[int, int]:
+        above = tree.chain(leaf)
+        return sum(joint.name in actuated for joint in above), sum(joint.moves for joint in above)
+
+    leaves = [link.name for link in tree.links if link.name not in parents]
+    found = max(reversed(leaves), key=rank)
+    others = [leaf for leaf in leaves if leaf != found and rank(leaf)[0]]
+
+    if others:
+        some = ", ".join(others[:4]) + (", ..." if len(others) > 4 else "")
+        message = f"robot '{name}': the tip is taken to be '{found}'; tip= names another link, such as {some}"
+        warnings.warn(TipWarning(message), stacklevel=2)
+    return found
+
+
+def _chain(model: pin.Model, actuated: tuple[str, ...], ties: Mapping[str, Mimic]) -> Chain:
+    count = model.njoints - 1
+    place = {name: number for number, name in enumerate(actuated)}
+    axis = np.zeros((count, 3))
+    prismatic = np.zeros(count, dtype=bool)
+    gain = np.zeros((count, len(actuated)))
+    offset = np.zeros(count)
+    neutral = pin.neutral(model)
+    names = list(model.names)[1:]
+    joints = model.joints
+
+    for k in range(count):
+        own = joints[k + 1].createData()  # of this joint alone: all joints' data are looked up by copying them
+        joints[k + 1].calc(own, neutral)
+        subspace = np.asarray(own.S).reshape(-1)  # (linear; angular)
+        prismatic[k] = np.linalg.norm(subspace[:3]) > 0.5
+        axis[k] = subspace[:3] if prismatic[k] else subspace[3:]
+        tie = ties.get(names[k])
+        if tie is None:
+            gain[k, place[names[k]]] = 1.0
+        else:
+            gain[k, place[tie.source]] = tie.multiplier
+            offset[k] = tie.offset
+
+    return Chain(
+        parent=frozen([model.parents[k + 1] - 1 for k in range(count)], np.int64),
+        placement=frozen([model.jointPlacements[k + 1].homogeneous for k in range(count)]),
+        axis=frozen(axis),
+        prismatic=frozen(prismatic, bool),
+        gain=frozen(gain),
+        offset=frozen(offset),
+    )
 
 
 def _periods(
@@ -313,6 +321,7 @@ def _periods(
         limited = np.isfinite(own["lower"]) or np.isfinite(own["upper"])
         if turns_alike or limited or joint.slides:
             continue
+
         following = {tie.joint: tie.multiplier for tie in ties.values() if tie.source == joint.name}
         turns = _turns_of(following.values())
         found[joint.name] = {**own, "lower": -turns * TAU, "upper": turns * TAU}
@@ -336,6 +345,40 @@ def _turns_of(gains: Iterable[float]) -> int:
     return MOST_TURNS
 
 
+def _limits(name: str, joints: Iterable[Joint], found: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+    rows = []
+    for joint in joints:
+        limits = found[joint.name]
+        low = limits["lower"]
+        high = limits["upper"]
+
+        if not low < high:
+            raise InputError(
+                f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; "
+                "lower must be below upper: correct the limits, or leave the joint out of joints=[...]"
+            )
+        if joint.slides and not max(abs(low), abs(high)) <= LARGEST:
+            raise InputError(
+                f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres, up to {LARGEST:g}; "
+                "give them in the file or by joint_limits=FILE, or leave the joint out of joints=[...]"
+            )
+
+        rates = [limits[key] for key in RATES]
+        for what, rate in zip(RATES, rates, strict=True):
+            if not rate > 0.0:
+                raise InputError(
+                    f"robot '{name}': joint '{joint.name}' has {what} limit {rate:g}; it must be greater than 0"
+                )
+
+        endless = joint.endless and bool(np.isinf(low) and np.isinf(high))
+        rows.append((low, high, *rates, endless, joint.slides))
+
+    columns = list(zip(*rows, strict=True))
+    keys = ("lower", "upper", *RATES)
+    bounds: dict[str, Any] = {key: frozen(column) for key, column in zip(keys, columns, strict=False)}
+    return bounds | {"continuous": frozen(columns[5], bool), "prismatic": frozen(columns[6], bool)}
+
+
 def _turned_inside(q: Vector, bounds: Mapping[str, Any], whole: Mask) -> Vector:
     """The same posture with joints that lie outside their limits turned by a full turn, if that brings them inside."""
     for turn in (TAU, -TAU):
@@ -346,22 +389,5 @@ def _turned_inside(q: Vector, bounds: Mapping[str, Any], whole: Mask) -> Vector:
     return q
 
 
-def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
-    """The leaf with the most actuated joints above it; among equals the longest branch, then the last described.
-
-    A warning says which it is where others move too.
-    """
-    parents = {joint.parent for joint in tree.joints}
-
-    def rank(leaf: str) -> tuple[int, int]:
-        above = tree.chain(leaf)
-        return sum(joint.name in actuated for joint in above), sum(joint.moves for joint in above)
-
-    leaves = [link.name for link in tree.links if link.name not in parents]
-    found = max(reversed(leaves), key=rank)
-    others = [leaf for leaf in leaves if leaf != found and rank(leaf)[0]]
-    if others:
-        some = ", ".join(others[:4]) + (", ..." if len(others) > 4 else "")
-        message = f"robot '{name}': the tip is taken to be '{found}'; tip= names another link, such as {some}"
-        warnings.warn(TipWarning(message), stacklevel=2)
-    return found
+def _pairs(given: Iterable[Iterable[str]]) -> frozenset[frozenset[str]]:
+    return frozenset(frozenset(pair) for pair in given)

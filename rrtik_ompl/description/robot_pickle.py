@@ -49,9 +49,10 @@ def robot_from_bytes(data: bytes) -> Robot:
     with _lock:
         if key in _known:
             return _known[key]
+
     state: dict[str, Any] = {name: unpacked(value) for name, value in pickle.loads(data).items()}
-    state["collision"], looks = _geometry(state["collision"]), state["looks"]
-    state["looks"] = Once(_geometry, looks)
+    state["collision"] = _geometry(state["collision"])
+    state["looks"] = Once(_geometry, state["looks"])
     state["model"] = _with_limits(*state["model"])
     return _remember(key, Robot(**state))
 

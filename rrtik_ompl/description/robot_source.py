@@ -52,9 +52,11 @@ def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
         return None
     if not isinstance(value, Mapping):
         return rigid(value, what)
+
     for key in value:
         if key not in POSE_KEYS:
             raise UnknownNameError("key", key, POSE_KEYS, where=what)
+
     xyz = value.get("xyz", (0.0, 0.0, 0.0))
     if "rpy_deg" not in value:
         return pose(xyz, value.get("quat_xyzw", (0.0, 0.0, 0.0, 1.0)), what)

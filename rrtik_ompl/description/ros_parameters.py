@@ -22,5 +22,6 @@ def parameters(document: YamlDocument, name: str) -> tuple[Location, Mapping[str
     for key in (*ROS, name):
         below = found.get(key)
         if isinstance(below, Mapping):
-            location, found = (*location, key), below
+            location = (*location, key)
+            found = below
     return location, found

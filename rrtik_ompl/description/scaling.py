@@ -40,6 +40,7 @@ def scaled(robot: Robot, scale: Mapping[str, float]) -> Robot:
     require(robot, Robot, "robot to scale", "use load_robot(name or file)")
     require(scale, Mapping, "scale of a robot", "give factors by name of link")
     factors = by_name(robot, "scale", "link", robot.link_names, scale, positive)
+
     model = pin.GeometryModel()
     for item in robot.collision.geometryObjects:
         link = robot.link_of(item)
@@ -59,6 +60,7 @@ def scaled(robot: Robot, scale: Mapping[str, float]) -> Robot:
                 item.meshColor,
             )
         )
+
     before = dict(robot.source.get("scale", {}))
     kept = before | {link: factor * before.get(link, 1.0) for link, factor in factors.items()}
     return replace(robot, collision=model, source=MappingProxyType(dict(robot.source) | {"scale": kept}))

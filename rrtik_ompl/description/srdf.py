@@ -103,10 +103,12 @@ class Srdf:
             "joint": {joint.name for joint in tree.joints} | self.virtual,
             "group": set(self.groups),
         }
+
         first: dict[tuple[str, str], Mention] = {}
         for mention in self.mentions:
             if mention.name not in known[mention.kind]:
                 first.setdefault((mention.kind, mention.name), mention)
+
         return [
             f"{each.place}: <{each.tag}>: no {each.kind} '{each.name}'{nearest_name(each.name, known[each.kind])}"
             for each in first.values()
@@ -163,39 +165,18 @@ class Srdf:
         wanted = self._members(group, tree, ()) - self.passive
         return tuple(joint.name for joint in tree.walk() if joint.name in wanted and joint.moves)
 
-    def allowed_pairs(self, tree: Tree) -> frozenset[frozenset[str]]:
-        """Pairs of links of a robot that are never checked against each other."""
-        everything = {frozenset((link, other.name)) for link in self.never for other in tree.links}
-        return self.allowed | frozenset(pair for pair in everything - self.checked if len(pair) == 2)
-
-    def group_tip(self, group: str, tree: Tree) -> str:
-        """Link at the end of a group: its chain's, else its end effector's, else the child of its last joint."""
-        chains = self.groups[group].chains
-        if chains:
-            return chains[-1][1]
-        links = {link.name for link in tree.links}
-        for end in self.end_effectors:
-            if group in (end.parent_group, end.group) and end.parent_link in links:
-                return end.parent_link
-        last = self.group_joints(group, tree)[-1]
-        return next(joint.child for joint in tree.joints if joint.name == last)
-
-    def postures(self, group: str | None) -> dict[str, dict[str, float]]:
-        """Named states merged over all groups; those of ``group`` win where two share a name."""
-        merged: dict[str, dict[str, float]] = {}
-        for (_, state), values in sorted(self.states.items(), key=lambda item: item[0][0] == group):
-            merged.setdefault(state, {}).update(values)
-        return merged
-
     def _members(self, name: str, tree: Tree, above: tuple[str, ...]) -> set[str]:
         if name not in self.groups:
             raise UnknownNameError("group", name, self.groups, where=self.where)
         if name in above:
             raise InputError(f"{self.where}: group '{name}' contains itself; take it out")
-        group, where = self.groups[name], f"{self.where}: group '{name}'"
+
+        group = self.groups[name]
+        where = f"{self.where}: group '{name}'"
         joints = [joint.name for joint in tree.joints]
         above_link = {joint.child: joint.name for joint in tree.joints}
         members = set()
+
         for joint in group.joints:
             if joint not in joints and joint not in self.virtual:
                 raise UnknownNameError("joint", joint, joints, where=where)
@@ -208,7 +189,34 @@ class Srdf:
             members |= {joint.name for joint in tree.chain(tip, base)}
         for subgroup in group.subgroups:
             members |= self._members(subgroup, tree, (*above, name))
+
         return members
+
+    def allowed_pairs(self, tree: Tree) -> frozenset[frozenset[str]]:
+        """Pairs of links of a robot that are never checked against each other."""
+        everything = {frozenset((link, other.name)) for link in self.never for other in tree.links}
+        return self.allowed | frozenset(pair for pair in everything - self.checked if len(pair) == 2)
+
+    def group_tip(self, group: str, tree: Tree) -> str:
+        """Link at the end of a group: its chain's, else its end effector's, else the child of its last joint."""
+        chains = self.groups[group].chains
+        if chains:
+            return chains[-1][1]
+
+        links = {link.name for link in tree.links}
+        for end in self.end_effectors:
+            if group in (end.parent_group, end.group) and end.parent_link in links:
+                return end.parent_link
+
+        last = self.group_joints(group, tree)[-1]
+        return next(joint.child for joint in tree.joints if joint.name == last)
+
+    def postures(self, group: str | None) -> dict[str, dict[str, float]]:
+        """Named states merged over all groups; those of ``group`` win where two share a name."""
+        merged: dict[str, dict[str, float]] = {}
+        for (_, state), values in sorted(self.states.items(), key=lambda item: item[0][0] == group):
+            merged.setdefault(state, {}).update(values)
+        return merged
 
 
 def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
@@ -220,22 +228,26 @@ def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
     robot = parse_xml(text, "robot", where)
     lines = element_lines(robot, text, where)
     groups = [_group(element, where) for element in robot.findall("group")]
+
     states: dict[tuple[str, str], dict[str, float]] = {}
     places: dict[tuple[str, str], str] = {}
     for element in robot.findall("group_state"):
         name = attribute(element, "group_state", "name", where)
         states[(element.get("group", ""), name)] = _state(element, f"{where}: group_state '{name}'")
         places[(element.get("group", ""), name)] = lines[element]
+
     mentions = tuple(
         Mention(lines[element], element.tag, kind, element.get(key, ""))
         for tags, key, kind in MENTIONS
         for element in robot.findall(tags)
         if element.get(key)
     )
+
     ends = tuple(
         EndEffector(*(element.get(key, "") for key in ("name", "parent_link", "group", "parent_group")))
         for element in robot.findall("end_effector")
     )
+
     return Srdf(
         where=where,
         name=robot.get("name", ""),

@@ -25,9 +25,11 @@ def srdf_gripper(semantics: Srdf, tree: Tree, mimics: Iterable[Mimic], actuated:
 
     Its width is how much farther its fingers' solids are apart where it is open than where it is closed.
     """
-    ties, arm = tuple(mimics), set(actuated)
+    ties = tuple(mimics)
+    arm = set(actuated)
     followers = {tie.joint for tie in ties}
     found: dict[tuple[str, ...], GripperJoints] = {}
+
     for end in semantics.end_effectors:
         if end.group not in semantics.groups or not _carries(tree, end.parent_link, arm):
             continue
@@ -35,11 +37,13 @@ def srdf_gripper(semantics: Srdf, tree: Tree, mimics: Iterable[Mimic], actuated:
             joints = tuple(joint for joint in semantics.movable(end.group, tree) if joint not in followers)
         except InputError:  # an SRDF for several forms of a robot, of which this one has no such hand
             continue
+
         states = [_state(semantics, end.group, joints, names) for names in NAMES.values()]
         if joints and not arm & set(joints) and None not in states:
             opened, closed = (dict(zip(joints, state or (), strict=True)) for state in states)
             width = max(_apart(tree, ties, opened) - _apart(tree, ties, closed), 0.0)
             found[joints] = GripperJoints(joints, tuple(opened.values()), tuple(closed.values()), width)
+
     return next(iter(found.values())) if len(found) == 1 else None
 
 
@@ -68,17 +72,21 @@ def _apart(tree: Tree, mimics: tuple[Mimic, ...], values: Mapping[str, float]) -
     held = dict(values) | {
         tie.joint: tie.multiplier * values[tie.source] + tie.offset for tie in mimics if tie.source in values
     }
+
     above: dict[str, str] = {}  # for each link of a finger the joint that carries the finger
     for joint in tree.walk():
         if joint.parent in above or joint.name in held:
             above[joint.child] = above.get(joint.parent, joint.name)
+
     links = [link if link.name in above else replace(link, collision=()) for link in tree.links]
     bare = Tree(tree.where, links, tree.joints)
     still = {joint.name: held.get(joint.name, 0.0) for joint in tree.joints if joint.moves}
     model, solids, _ = build_models(bare.hold(still))
+
     fingers: dict[str, list[Any]] = {}
     for solid in solids.geometryObjects:
         fingers.setdefault(above[model.frames[solid.parentFrame].name], []).append(solid)
+
     pairs = [(a, b) for one, other in combinations(fingers.values(), 2) for a in one for b in other]
     return max(min((_distance(a, b) for a, b in pairs), default=0.0), 0.0)
 

@@ -120,14 +120,25 @@ class Joint:
     ) -> None:
         if kind not in JOINT_KINDS:
             raise UnknownNameError("joint type", kind, JOINT_KINDS, where=f"joint '{name}'")
+
         direction = bounded_array(axis, (3,), f"joint '{name}': axis")
         length = float(np.linalg.norm(direction))
         if length < 1e-9:
             raise InputError(f"joint '{name}': axis is the zero vector; give a direction such as 0 0 1")
+
         where = f"joint '{name}': pose in its parent"
-        values = {"name": name, "kind": kind, "parent": parent, "child": child, "lower": lower, "upper": upper}
-        values |= {"T_parent_joint": pin.SE3.Identity() if T_parent_joint is None else rigid(T_parent_joint, where)}
-        values |= {"axis": frozen(direction / length), "velocity": velocity, "effort": effort}
+        values = {
+            "name": name,
+            "kind": kind,
+            "parent": parent,
+            "child": child,
+            "T_parent_joint": pin.SE3.Identity() if T_parent_joint is None else rigid(T_parent_joint, where),
+            "axis": frozen(direction / length),
+            "lower": lower,
+            "upper": upper,
+            "velocity": velocity,
+            "effort": effort,
+        }
         for key, value in values.items():
             object.__setattr__(self, key, value)
 
@@ -179,6 +190,7 @@ class Tree:
         below: dict[str, list[Joint]] = {link.name: [] for link in self.links}
         for joint in self.joints:
             below[joint.parent].append(joint)
+
         stack = below[self.root.name][::-1]
         while stack:
             joint = stack.pop()
@@ -194,14 +206,17 @@ class Tree:
         """
         names = [link.name for link in self.links]
         above = {joint.child: joint for joint in self.joints}
+
         for link in (tip, base):
             if link is not None and link not in names:
                 raise UnknownNameError("link", link, names, where=self.where)
+
         joints: list[Joint] = []
         link = tip
         while link != base and link in above:
             joints.append(above[link])
             link = above[link].parent
+
         if base is not None and link != base:
             raise InputError(f"{self.where}: link '{tip}' does not hang on link '{base}'; swap them or choose others")
         return tuple(reversed(joints))
@@ -227,6 +242,7 @@ def _check_names(tree: Tree) -> None:
             raise InputError(f"{tree.where}: {what} name '{twice[0]}' stands there twice; rename one")
         for name in names:
             name_of(name, f"a {what} of {tree.where}")
+
     known = {link.name for link in tree.links}
     for joint in tree.joints:
         for role, link in (("parent", joint.parent), ("child", joint.child)):
@@ -243,12 +259,14 @@ def _check_connected(tree: Tree) -> None:
                 f"'{joint.name}'); a robot must be a tree, cut the loop by deleting one"
             )
         above[joint.child] = joint
+
     roots = [link.name for link in tree.links if link.name not in above]
     if len(roots) > 1:
         raise InputError(
             f"{tree.where}: {len(roots)} links hang on nothing ({', '.join(roots[:6])}); "
             "connect all but the base by joints"
         )
+
     reached = {joint.child for joint in tree.walk()} if roots else set()
     lost = [joint.name for joint in tree.joints if joint.child not in reached]
     if lost:

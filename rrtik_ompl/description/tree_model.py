@@ -46,11 +46,13 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
     """
     model = pin.Model()
     model.name = tree.where
+
     links = {link.name: link for link in tree.links}
     # Pinocchio finds frames by name alone in places, so a joint that is called like a link gets no frame.
     framed = {joint.name for joint in tree.joints} - set(links)
     places = {tree.root.name: _Place(0, pin.SE3.Identity() if T_world_base is None else T_world_base, 0)}
     _add_link(model, tree.root, places)
+
     for joint in tree.walk():
         place = places[joint.child] = _add_joint(model, joint, places[joint.parent])
         if joint.name in framed:
@@ -58,6 +60,7 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
             frame = pin.Frame(joint.name, place.joint, place.frame, place.T_joint_link, kind)
             place.frame = model.addFrame(frame, False)
         _add_link(model, links[joint.child], places)
+
     meshes: dict[MeshFile, Any] = {}
     hard = _geometry(tree, places, meshes, "collision")
     drawn = (solid.shape for link in tree.links for solid in link.visual)
@@ -78,6 +81,7 @@ def _add_joint(model: pin.Model, joint: Joint, parent: _Place) -> _Place:
     placement = parent.T_joint_link * joint.T_parent_joint
     if not joint.moves:
         return _Place(parent.joint, placement, parent.frame)
+
     kind, rotation = JOINT_MODELS[joint.kind](joint)
     turn = pin.SE3(rotation, np.zeros(3))
     size = kind.nq
@@ -154,19 +158,22 @@ def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]
 
 
 def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.CollisionGeometry:
-    if mesh not in meshes:
-        data = read_bytes(mesh.path, MAX_BYTES)
-        if not finite_numbers(data):
-            raise InputError(f"{where}: mesh {mesh.path} holds numbers that are not finite; export it again")
-        try:
-            scale = np.array(mesh.scale) * stated_unit(mesh.path, data)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from error
-        try:
-            meshes[mesh] = coal.MeshLoader().load(str(mesh.path), scale)
-        except (ValueError, RuntimeError) as error:
-            raise InputError(
-                f"{where}: mesh {mesh.path} cannot be read as triangles; export it again as STL, OBJ or DAE"
-            ) from error
-        bounded_array(meshes[mesh].vertices(), (None, 3), f"{where}: mesh {mesh.path}: vertices")
+    if mesh in meshes:
+        return meshes[mesh]
+
+    data = read_bytes(mesh.path, MAX_BYTES)
+    if not finite_numbers(data):
+        raise InputError(f"{where}: mesh {mesh.path} holds numbers that are not finite; export it again")
+    try:
+        scale = np.array(mesh.scale) * stated_unit(mesh.path, data)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+
+    try:
+        meshes[mesh] = coal.MeshLoader().load(str(mesh.path), scale)
+    except (ValueError, RuntimeError) as error:
+        raise InputError(
+            f"{where}: mesh {mesh.path} cannot be read as triangles; export it again as STL, OBJ or DAE"
+        ) from error
+    bounded_array(meshes[mesh].vertices(), (None, 3), f"{where}: mesh {mesh.path}: vertices")
     return meshes[mesh]

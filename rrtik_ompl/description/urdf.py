@@ -119,12 +119,17 @@ def robot_from_urdf_text(
     home = None if folder is None else Path(folder)
     description = read_urdf(text, where=where, folder=home, packages=roots)
     tree = description.tree
+
     semantics = Srdf(where) if srdf is None else read_srdf(robot_text(Path(srdf), roots), str(srdf))
     if group is not None and srdf is None:
         raise InputError(f"{where}: group '{group}' needs an SRDF file; give srdf=FILE, or joints=[...] in its place")
-    end = semantics.group_tip(group, tree) if group in semantics.groups and tip is None and group is not None else tip
+
+    end = tip
+    if tip is None and group is not None and group in semantics.groups:
+        end = semantics.group_tip(group, tree)
     actuated = _actuated(description, semantics, group, joints, tip)
     from_file, unread_limits = ({}, []) if joint_limits is None else _limits_of_file(joint_limits, tree)
+
     with located(where):
         robot = build_robot(
             name or description.name or Path(where).stem,
@@ -143,6 +148,7 @@ def robot_from_urdf_text(
             source=source,
         )
         robot = replace(robot, gripper=srdf_gripper(semantics, tree, description.mimics, actuated))
+
     tell(
         [
             *semantics.of_another(description.name, where),
@@ -157,6 +163,41 @@ def robot_from_urdf_text(
         strict,
     )
     return robot
+
+
+def package_roots(packages: FilePath | Iterable[FilePath]) -> list[Path]:
+    """Folders that hold packages, given as one or several."""
+    return [Path(each) for each in ([packages] if isinstance(packages, (str, os.PathLike)) else packages)]
+
+
+def _actuated(
+    description: UrdfDescription, semantics: Srdf, group: str | None, joints: Iterable[str] | None, tip: str | None
+) -> tuple[str, ...]:
+    tree = description.tree
+    followers = {tie.joint for tie in description.mimics}
+    movable = tuple(j.name for j in tree.walk() if j.moves and j.name not in followers)
+
+    if joints is not None:
+        chosen = tuple(joints)
+        for joint in chosen:
+            if joint not in movable and joint not in followers:
+                raise UnknownNameError("movable joint", joint, movable, where=tree.where)
+        return chosen
+
+    if group is not None:
+        members = semantics.group_joints(group, tree)
+        return tuple(joint for joint in members if joint not in followers)
+
+    if tip is not None and tip in {link.name for link in tree.links}:
+        return tuple(joint.name for joint in tree.chain(tip) if joint.name in movable)
+    return movable
+
+
+def _limits_of_file(file: FilePath, tree: Tree) -> tuple[dict[str, JointLimits], list[str]]:
+    """Limits by joint, and what the file says about limits besides."""
+    from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits  # most need no YAML
+
+    return read_joint_limits(file, [joint.name for joint in tree.joints]), unread_limits(file)
 
 
 def _outside(robot: Robot, others: Collection[str], semantics: Srdf, group: str | None) -> Iterator[str]:
@@ -179,35 +220,3 @@ def _hand_outside(gripper: GripperJoints | None, tree: Tree, semantics: Srdf) ->
                     f"{semantics.where}: a state of the gripper: joint '{name}' is at {value:g}, outside its limits "
                     f"{low:g} .. {high:g}"
                 )
-
-
-def package_roots(packages: FilePath | Iterable[FilePath]) -> list[Path]:
-    """Folders that hold packages, given as one or several."""
-    return [Path(each) for each in ([packages] if isinstance(packages, (str, os.PathLike)) else packages)]
-
-
-def _actuated(
-    description: UrdfDescription, semantics: Srdf, group: str | None, joints: Iterable[str] | None, tip: str | None
-) -> tuple[str, ...]:
-    tree = description.tree
-    followers = {tie.joint for tie in description.mimics}
-    movable = tuple(j.name for j in tree.walk() if j.moves and j.name not in followers)
-    if joints is not None:
-        chosen = tuple(joints)
-        for joint in chosen:
-            if joint not in movable and joint not in followers:
-                raise UnknownNameError("movable joint", joint, movable, where=tree.where)
-        return chosen
-    if group is not None:
-        members = semantics.group_joints(group, tree)
-        return tuple(joint for joint in members if joint not in followers)
-    if tip is not None and tip in {link.name for link in tree.links}:
-        return tuple(joint.name for joint in tree.chain(tip) if joint.name in movable)
-    return movable
-
-
-def _limits_of_file(file: FilePath, tree: Tree) -> tuple[dict[str, JointLimits], list[str]]:
-    """Limits by joint, and what the file says about limits besides."""
-    from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits  # most need no YAML
-
-    return read_joint_limits(file, [joint.name for joint in tree.joints]), unread_limits(file)

@@ -56,13 +56,16 @@ def read_urdf(
     robot = parse_xml(text, "robot", where)
     if robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
         raise InputError(f"{where}: holds xacro macros; name it .xacro, or expand them first: xacro FILE > robot.urdf")
+
     reader = _Reader(where, folder, tuple(packages), {})
     for material in robot.iter("material"):
         reader.learn_material(material)
     links = [reader.link(element) for element in robot.findall("link")]
+
     if reader.undrawn:
         message = f"{where}: {len(reader.undrawn)} visual meshes are missing ({reader.undrawn[0]} and so on)"
         warnings.warn(MeshWarning(f"{message}; collision shapes are drawn instead"), stacklevel=2)
+
     joints = [reader.joint(element) for element in robot.findall("joint")]
     mimics = [tie for element in robot.findall("joint") for tie in reader.mimics(element)]
     tree = Tree(where, links, joints)
@@ -90,11 +93,13 @@ def element_lines(root: Element, text: str, where: str) -> dict[Element, str]:
 
     The file alone if macros have made the text, for they move its lines.
     """
+    # ElementTree forgets the lines, so the parser below it is asked once more.
     lines: list[int] = []
     if not where.lower().endswith(".xacro"):
         parser = expat.ParserCreate()
         parser.StartElementHandler = lambda *_: lines.append(parser.CurrentLineNumber)
         parser.Parse(text.strip(), True)
+
     above = text[: len(text) - len(text.lstrip())].count("\n")
     elements = list(root.iter())
     places = [f"{where}:{line + above}" for line in lines] or [where] * len(elements)
@@ -112,10 +117,12 @@ def numbers(element: Element, key: str, count: int, default: Sequence[float] | N
         if default is None:
             raise InputError(f'{where}: <{element.tag}> has no {key}; add {key}="{" ".join(["0"] * count)}"')
         return list(default)
+
     try:
         values = [float(word) for word in text.split()]
     except ValueError:
         values = []
+
     if len(values) != count or not np.isfinite(values).all():
         plural = "number" if count == 1 else "numbers"
         raise InputError(f'{where}: <{element.tag} {key}="{text}"> must hold {count} finite {plural}')
@@ -191,12 +198,14 @@ class _Reader:
         kind = SHAPES.get(element.tag)
         if kind is not None and kind.in_urdf:
             return kind(**{measure.name: _measured(element, measure, where) for measure in kind.measures})
+
         if element.tag == "mesh":
             uri = attribute(element, "mesh", "filename", where)
             x, y, z = numbers(element, "scale", 3, (1.0, 1.0, 1.0), where)
             if x * y * z == 0.0:
                 raise InputError(f"{where}: mesh '{uri}' has a scale of 0; every axis needs another number")
             return MeshFile(resolve_mesh(uri, self.folder, self.packages, where), (x, y, z))
+
         known = (key for key, kind in SHAPES.items() if kind.in_urdf)
         raise UnknownNameError("shape", element.tag, (*known, "mesh"), where=where)
 
@@ -215,15 +224,18 @@ class _Reader:
         kind = attribute(element, "joint", "type", where)
         if kind not in JOINT_KINDS:
             raise UnknownNameError("usable joint type", kind, JOINT_KINDS, where=where)
+
         parent = attribute(element.find("parent"), "parent", "link", where)
         child = attribute(element.find("child"), "child", "link", where)
+
         axis_element = element.find("axis")
         axis = [1.0, 0.0, 0.0] if axis_element is None else numbers(axis_element, "xyz", 3, (1.0, 0.0, 0.0), where)
         bounds = _limits(element.find("limit"), kind, where)
+        if not JOINT_KINDS[kind].moves:
+            axis = [1.0, 0.0, 0.0]  # that of a fixed joint says nothing, and may be zero
+
         with located(self.where):
-            axis = axis if JOINT_KINDS[kind].moves else [1.0, 0.0, 0.0]
-            origin = _origin(element, where)
-            return Joint(name, kind, parent, child, origin, axis, **bounds)
+            return Joint(name, kind, parent, child, _origin(element, where), axis, **bounds)
 
     def mimics(self, element: Element) -> Iterator[Mimic]:
         tie = element.find("mimic")
@@ -242,9 +254,11 @@ def _measured(element: Element, measure: Measure, where: str) -> float | list[fl
 
 def _limits(limit: Element | None, kind: str, where: str) -> dict[str, float]:
     """Limits of position, velocity and effort; infinite where the kind of joint has none, or the file says none."""
-    moves, endless = JOINT_KINDS[kind].moves, JOINT_KINDS[kind].endless
+    moves = JOINT_KINDS[kind].moves
+    endless = JOINT_KINDS[kind].endless
     bounded = moves and not endless
     bounds = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}
+
     if limit is None and bounded:
         raise InputError(
             f'{where}: a {kind} joint needs <limit lower=".." upper=".." velocity=".." effort=".."/>; add it'
@@ -252,14 +266,17 @@ def _limits(limit: Element | None, kind: str, where: str) -> dict[str, float]:
         )
     if limit is None or not moves:
         return bounds
+
     velocity = numbers(limit, "velocity", 1, (0.0,), where)[0]
     if velocity < 0.0:
         raise InputError(f"{where}: velocity limit {velocity:g} is negative; give its size")
+
     if bounded:
         lower, upper = (numbers(limit, key, 1, (0.0,), where)[0] for key in ("lower", "upper"))
         if lower > upper:
             raise InputError(f"{where}: lower limit {lower:g} is above upper limit {upper:g}; swap them")
         bounds |= {"lower": lower, "upper": upper}
+
     effort = numbers(limit, "effort", 1, (0.0,), where)[0]
     return bounds | {"velocity": velocity or np.inf, "effort": effort if effort > 0.0 else np.inf}
 
@@ -277,10 +294,12 @@ def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
     tensor = None if inertial is None else inertial.find("inertia")
     if inertial is None or mass is None or tensor is None:
         return None
+
     xx, xy, xz, yy, yz, zz = (numbers(tensor, key, 1, (0.0,), where)[0] for key in _TENSOR)
     placement = _origin(inertial, where)
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     turned = placement.rotation @ matrix @ placement.rotation.T
+
     weight = numbers(mass, "value", 1, None, where)[0]
     if weight < 0.0 or np.linalg.eigvalsh(turned)[0] < 0.0:
         return None  # impossible, but common in the files of real robots, and without effect on planning
@@ -292,8 +311,12 @@ def flattened(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> t
     ties = {tie.joint: tie for tie in mimics}
     movable = [joint.name for joint in joints if joint.moves]
     flat = []
+
     for tie in mimics:
-        source, multiplier, offset, seen = tie.source, tie.multiplier, tie.offset, {tie.joint}
+        source = tie.source
+        multiplier = tie.multiplier
+        offset = tie.offset
+        seen = {tie.joint}
         while True:
             if source not in movable:
                 raise UnknownNameError("movable joint to mimic", source, movable, where=f"{where}: joint '{tie.joint}'")
@@ -301,8 +324,13 @@ def flattened(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> t
                 raise InputError(f"{where}: joint '{tie.joint}' mimics itself by way of '{source}'; break the ring")
             if source not in ties:
                 break
+
+            # What follows a follower: m (m' x + o') + o.
             above = ties[source]
             seen.add(source)
-            source, offset, multiplier = above.source, multiplier * above.offset + offset, multiplier * above.multiplier
+            source = above.source
+            offset = multiplier * above.offset + offset
+            multiplier = multiplier * above.multiplier
+
         flat.append(Mimic(tie.joint, source, multiplier, offset))
     return tuple(flat)

@@ -45,6 +45,7 @@ def unread_of_urdf(robot: Element) -> list[str]:
     found = [f"<{tag}>" for tag in _others(robot, OF_ROBOT)]
     if robot.find("gazebo/joint") is not None:
         found.append("joints within <gazebo>")
+
     for tag, known in (("link", OF_LINK), ("joint", OF_JOINT)):
         named: dict[str, list[str]] = {}
         for element in robot.findall(tag):
@@ -64,7 +65,9 @@ def _of_joint(joint: Element) -> Iterator[str]:
     for tag, known in (("limit", OF_LIMIT), ("mimic", OF_MIMIC)):
         part = joint.find(tag)
         yield from (f"{tag} {key}" for key in (() if part is None else part.keys()) if key not in known)
-    soft, hard = joint.find("safety_controller"), joint.find("limit")
+
+    soft = joint.find("safety_controller")
+    hard = joint.find("limit")
     if soft is not None and hard is not None and any(_narrower(soft, hard, *names) for names in SOFT):
         yield "safety_controller"
 

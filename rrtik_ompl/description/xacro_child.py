@@ -33,11 +33,12 @@ class Places:
 
     def __init__(self, file: str, packages: Iterable[str]) -> None:
         real = Path(file).resolve()
+        own = _package_of(real)
         self.folder = real.parent
         self.packages = [Path(each) for each in packages]
-        own = _package_of(real)
         self.roots = [*self.packages] if own is None else [own, *self.packages]
         self.beside = [self.folder, Path(file).absolute().parent]
+
         home = own or self.folder
         users = Path.home()  # neither all that the user has nor the whole disk is a robot's
         self.near = [folder for folder in (home, *list(home.parents)[:2]) if not users.is_relative_to(folder)]
@@ -49,6 +50,7 @@ class Places:
 
         plain = re.fullmatch(r"\w[\w.-]*", name) is not None
         found = package_folder(name, self.folder, self.packages) if plain else None
+
         if found is None:
             try:
                 found = Path(str(usual(name)))
@@ -75,6 +77,7 @@ class Places:
             return True
         if real.suffix.lower() in READABLE and any(_shows(real, folder) for folder in self.near):
             return True
+
         # installed packages of ROS may be links to their sources, which are packages as well
         named = Path(os.path.abspath(path))
         linked = any(named.is_relative_to(root.absolute()) for root in [*self.roots, *self.beside])
@@ -113,13 +116,16 @@ def expand(job: Mapping[str, Any]) -> dict[str, Any]:
     places = Places(job["file"], job["packages"])
     usual = substitution_args._eval_find
     substitution_args._eval_find = substitution_args._eval_dict["find"] = lambda name: places.find(name, usual)
+
     if not job["trust"]:
         _restrict(xacro, substitution_args, places)
     _note_places(xacro, places)
+
     try:
         text = xacro.process_file(job["file"], mappings=dict(job["arguments"])).toxml()
     except (Exception, SystemExit) as error:  # of anything that a macro may do
         return _told(error, job)
+
     if len(text) > job["longest"]:
         return {"error": f"expands to more than {job['longest'] // 2**20} MiB"}
     return {"text": text, "files": [job["file"], *xacro.all_includes]}
@@ -133,6 +139,7 @@ def _restrict(xacro: Package, substitution_args: Package, places: Places) -> Non
     for space, names in ((symbols, ("range", "sorted")), (symbols["python"], ("range", "type"))):
         for name in names:
             dict.__setitem__(space, name, FUNCTIONS[name])
+
     own = [space[name] for space in (symbols, symbols["xacro"]) for name in MACRO_FUNCTIONS if name in space]
 
     def argument(name: str) -> Value:
@@ -170,6 +177,7 @@ def _restrict(xacro: Package, substitution_args: Package, places: Places) -> Non
     for module in (xacro, substitution_args):
         module.open = opened
         module.eval = module.exec = module.compile = refused
+
     sys.addaudithook(_forbid)
 
 
@@ -191,8 +199,8 @@ def _note_places(xacro: Package, places: Places) -> None:
             except Exception as error:
                 if not hasattr(error, "place"):
                     macros = [macro.history[-1][-1] for macro in reversed(xacro.macrostack)]
-                    place = places.line_of(text_of(subject), [before, *macros])
-                    error.place, error.expression = place, text_of(subject)  # type: ignore[attr-defined]
+                    error.place = places.line_of(text_of(subject), [before, *macros])  # type: ignore[attr-defined]
+                    error.expression = text_of(subject)  # type: ignore[attr-defined]
                 raise
 
         return noted
@@ -209,9 +217,11 @@ def _told(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any]:
     chain = [error]
     while (inner := getattr(chain[-1], "exc", None)) is not None and inner not in chain:
         chain.append(inner)
+
     placed = [each for each in chain if hasattr(each, "place")]
     where = placed[-1].place if placed else ""
     last = chain[-1]
+
     if isinstance(last, MemoryError):
         return {"where": where, "error": f"needs more than {job['bytes'] / 1e9:g} GB of memory; {job['more']}"}
     if isinstance(last, RecursionError):
@@ -222,6 +232,7 @@ def _told(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any]:
             expression = placed[-1].expression  # type: ignore[attr-defined]
             said = f"expression '{shown(expression)}': {said}; write it otherwise, or {TRUST}"
         return {"where": where, "error": said}
+
     said = " ".join(str(error).split()) or type(error).__name__
     return {"where": where, "error": said.removeprefix("<class 'LookupError'>: ")}  # how xacro passes that on
 
@@ -232,6 +243,7 @@ def _limit(seconds: float, memory: float) -> None:
         import resource
     except ImportError:
         return
+
     whole = int(seconds) + 1
     for kind, most in ((resource.RLIMIT_CPU, whole), (resource.RLIMIT_AS, int(memory)), (resource.RLIMIT_CORE, 0)):
         _, highest = resource.getrlimit(kind)
@@ -247,14 +259,17 @@ def main() -> None:
     job = json.load(sys.stdin)
     sys.path[:] = job["path"]
     _limit(job["seconds"], job["bytes"])
+
     answer_to = os.fdopen(os.dup(1), "w")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for number in (1, 2):  # what macros print is not an answer
         os.dup2(nowhere, number)
+
     try:
         answer = expand(job)
     except MemoryError:
         answer = {"error": f"needs more than {job['bytes'] / 1e9:g} GB of memory; {job['more']}"}
+
     json.dump(answer, answer_to)
     answer_to.close()
 

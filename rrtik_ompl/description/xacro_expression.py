@@ -26,64 +26,23 @@ Value: TypeAlias = Any  # of an expression: a number, text, list, function, ..
 Lookup: TypeAlias = Callable[[str], Value]
 
 METHODS: Mapping[type, frozenset[str]] = {
-    str: frozenset(
-        [
-            "capitalize",
-            "count",
-            "endswith",
-            "find",
-            "format",
-            "index",
-            "isalnum",
-            "isalpha",
-            "isdecimal",
-            "isdigit",
-            "islower",
-            "isnumeric",
-            "isspace",
-            "isupper",
-            "join",
-            "lower",
-            "lstrip",
-            "partition",
-            "removeprefix",
-            "removesuffix",
-            "replace",
-            "rfind",
-            "rindex",
-            "rpartition",
-            "rsplit",
-            "rstrip",
-            "split",
-            "splitlines",
-            "startswith",
-            "strip",
-            "swapcase",
-            "title",
-            "upper",
-            "zfill",
-        ]
-    ),
+    str: frozenset([
+        "capitalize", "count", "endswith", "find", "format", "index", "isalnum", "isalpha", "isdecimal", "isdigit",
+        "islower", "isnumeric", "isspace", "isupper", "join", "lower", "lstrip", "partition", "removeprefix",
+        "removesuffix", "replace", "rfind", "rindex", "rpartition", "rsplit", "rstrip", "split", "splitlines",
+        "startswith", "strip", "swapcase", "title", "upper", "zfill",
+    ]),
     list: frozenset(["append", "copy", "count", "extend", "index", "insert", "pop", "remove", "reverse", "sort"]),
     tuple: frozenset(["count", "index"]),
     dict: frozenset(["copy", "get", "items", "keys", "pop", "setdefault", "update", "values"]),
-    set: frozenset(
-        [
-            "copy",
-            "difference",
-            "intersection",
-            "isdisjoint",
-            "issubset",
-            "issuperset",
-            "symmetric_difference",
-            "union",
-            "add",
-        ]
-    ),
+    set: frozenset([
+        "copy", "difference", "intersection", "isdisjoint", "issubset", "issuperset", "symmetric_difference", "union",
+        "add",
+    ]),
     frozenset: frozenset(["copy", "difference", "intersection", "isdisjoint", "issubset", "issuperset", "union"]),
     float: frozenset(["is_integer"]),
     int: frozenset(["bit_length"]),
-}
+}  # fmt: skip
 ARITHMETIC: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -231,6 +190,7 @@ class Evaluator:
                 return holder[node.attr]
             except KeyError:
                 raise NameError(f"name '{node.attr}' is not defined") from None
+
         if isinstance(holder, str) and node.attr in CHECKED:
             return partial(CHECKED[node.attr], holder)
         methods = next((METHODS[kind] for kind in METHODS if isinstance(holder, kind)), frozenset())

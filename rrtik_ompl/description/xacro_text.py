@@ -41,11 +41,6 @@ class Expansion:
     gigabytes: float = 1.0
 
 
-_expansion: ContextVar[Expansion] = ContextVar("expansion", default=Expansion())  # noqa: B039 - it is frozen
-_lock = threading.Lock()
-_kept: OrderedDict[str, _Kept] = OrderedDict()
-
-
 @dataclass(frozen=True, slots=True)
 class _Kept:
     """An expanded text, and the files that it came from with their times and sizes."""
@@ -53,6 +48,11 @@ class _Kept:
     text: str
     files: tuple[str, ...]
     stamps: tuple[tuple[int, int] | None, ...]
+
+
+_expansion: ContextVar[Expansion] = ContextVar("expansion", default=Expansion())  # noqa: B039 - it is frozen
+_lock = threading.Lock()
+_kept: OrderedDict[str, _Kept] = OrderedDict()
 
 
 @contextmanager
@@ -71,11 +71,13 @@ def expanding(*, trusted: bool = False, limits: Mapping[str, float] | None = Non
     outer = _expansion.get()
     if not isinstance(trusted, bool):
         raise InputError(f"trust_xacro: expected True or False, got {trusted!r}")
+
     own = {"seconds": outer.seconds, "gigabytes": outer.gigabytes}
     for key, value in (limits or {}).items():
         if key not in own:
             raise UnknownNameError("key", key, own, where="xacro_limits")
         own[key] = positive(value, f"xacro_limits: {key}")
+
     token = _expansion.set(Expansion(trusted or outer.trusted, **own))
     try:
         yield
@@ -108,7 +110,9 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
         if arguments:
             raise InputError(f"{path}: xacro_args are for files named .xacro; leave them out")
         return read_text(path)
+
     read_text(path)  # which says what is wrong with the file itself
+
     words = {str(key): str(value) for key, value in (arguments or {}).items()}
     roots = [str(each) for each in packages]
     key = json.dumps([str(path), os.getcwd(), roots, words, dict(os.environ)], sort_keys=True)
@@ -116,18 +120,21 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
         kept = _kept.get(key)
     if kept is not None and kept.stamps == _stamps(kept.files):
         return kept.text
+
     if find_spec("xacro") is None:
         expanded = f"{path.stem.removesuffix('.urdf')}.urdf"  # by this ending it is read
         raise InputError(
             f"{path}: holds macros, and the package xacro is not installed: pip install xacro, "
             f"or expand it by hand: xacro {path.name} > {expanded}"
         )
+
     answer = _expanded(path, roots, words, _expansion.get())
     files = tuple(dict.fromkeys(answer["files"]))
     with _lock:
         _kept[key] = _Kept(answer["text"], files, _stamps(files))
         if len(_kept) > MOST_KEPT:
             _kept.popitem(last=False)
+
     return str(answer["text"])
 
 
@@ -144,8 +151,10 @@ def _expanded(path: Path, packages: list[str], words: Mapping[str, str], expansi
         "longest": MAX_BYTES,
         "more": MORE,
     }
+
     environment = os.environ | {"PYTHONHASHSEED": "0"}  # sets are in the same order each time
     slow = f"{path}: xacro: takes more than {expansion.seconds:g} s; does a macro call itself? else {MORE}"
+
     try:
         done = subprocess.run(
             [sys.executable, str(CHILD)],
@@ -160,12 +169,14 @@ def _expanded(path: Path, packages: list[str], words: Mapping[str, str], expansi
         raise InputError(slow) from None
     except OSError as error:
         raise InputError(f"{path}: no process could be started to expand it: {error.strerror or error}") from None
+
     if done.returncode == -getattr(signal, "SIGXCPU", 0):
         raise InputError(slow)
     try:
         answer: dict[str, Any] = json.loads(done.stdout)
     except ValueError:
         raise InputError(f"{path}: xacro: its process ended with code {done.returncode}; expand it by hand") from None
+
     if "error" in answer:
         raise InputError(f"{answer.get('where') or path}: xacro: {answer['error']}")
     return answer

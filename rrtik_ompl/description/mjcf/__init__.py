@@ -67,6 +67,7 @@ def robot_from_mjcf(
     options = {"joints": joints, "tip": tip, "joint_limits": joint_limits, "locked": locked, "base_pose": base_pose}
     limits = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in found.tree.joints])
     actuated = _actuated(found, joints, tip)
+
     with located(str(path)):
         robot = build_robot(
             found.name or Path(path).stem,
@@ -83,6 +84,7 @@ def robot_from_mjcf(
             unchecked_solids=found.apart,
             source={"mjcf": str(Path(path).resolve())} | source_entry(options),
         )
+
     tell(
         [
             *(f"{path}: key '{name}': {fault}" for name, fault in postures_outside(robot, found.postures)),
@@ -97,6 +99,7 @@ def robot_from_mjcf(
 def _actuated(found: Mjcf, joints: Iterable[str] | None, tip: str | None) -> tuple[str, ...]:
     if joints is not None:
         return tuple(joints)
+
     followers = {tie.joint for tie in found.mimics}
     over = found.tree.walk() if tip is None else found.tree.chain(tip)
     return tuple(joint.name for joint in over if joint.moves and joint.name not in followers)
@@ -111,6 +114,7 @@ def _other_trees(found: Mjcf, actuated: Sequence[str], locked: Mapping[str, floa
         while above[link].parent != WORLD:
             link = above[link].parent
         roots[joint.name] = link
+
     moving = {roots[joint] for joint in actuated if joint in roots}
     followers = {tie.joint for tie in found.mimics if tie.source in actuated}
     held = [

@@ -53,6 +53,7 @@ def joined_bodies(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
         for name in moving
         for pair in product(rigid[name], rigid[_carrier(bodies[name].parent, bodies)])
     }
+
     return frozenset(found) - touchable(bodies)
 
 

@@ -42,14 +42,17 @@ def solid_of(geom: Element, settings: Settings, meshes: Mapping[str, tuple[MeshF
     if kind not in KINDS:
         raise UnknownNameError("usable type of geom", kind, KINDS, where=where)
     place = settings.placement(geom, where)
+
     if kind == "mesh":
         name = attribute(geom, "geom", "mesh", where)
         if name not in meshes:
             raise UnknownNameError("mesh", name, meshes, where=where)
         mesh, T_mesh = meshes[name]
         return Solid(mesh, place * T_mesh, rgba)
+
     if geom.get("mesh") is not None:
         raise InputError(f"{where}: a {kind} fitted to a mesh cannot be read; save the compiled model and load that")
+
     length = None
     if geom.get("fromto") is not None and kind in ("capsule", "cylinder", "box"):
         ends = np.array(numbers(geom, "fromto", 6, None, where)).reshape(2, 3)
@@ -62,9 +65,11 @@ def solid_of(geom: Element, settings: Settings, meshes: Mapping[str, tuple[MeshF
 
 
 def _shape(kind: str, geom: Element, length: float | None, where: str) -> Shape:
+    # `fromto` gives the length in the place of a size; a box between two points has one width for both other axes.
     count = _COUNTS[kind] - (length is not None) - (length is not None and kind == "box")
     words = (geom.get("size") or "").split()
     size = numbers(Element("geom", {"size": " ".join(words[:count])}), "size", count, None, where)  # more are unused
+
     if kind == "sphere":
         return Sphere(size[0])
     if kind == "box":
@@ -84,6 +89,7 @@ def meshes_of(root: Element, settings: Settings, folder: Path, where: str) -> di
         mesh = settings.filled(element, MAIN, where)
         if mesh.get("file") is None:
             raise InputError(f"{where}: mesh '{mesh.get('name', '')}' has no file; save it as STL or OBJ and name that")
+
         path = folder / settings.meshes / attribute(mesh, "mesh", "file", where)
         x, y, z = numbers(mesh, "scale", 3, (1.0, 1.0, 1.0), where)
         if x * y * z == 0.0:
@@ -92,6 +98,7 @@ def meshes_of(root: Element, settings: Settings, folder: Path, where: str) -> di
             raise InputError(f"{where}: mesh {path.name} is of no kind that can be read; export it as STL or OBJ")
         if not os.path.isfile(path):
             raise MissingFileError(f"{where}: mesh file '{path}' does not exist; check meshdir and the name")
+
         reference = Element("mesh", {"pos": mesh.get("refpos", "0 0 0"), "quat": mesh.get("refquat", "1 0 0 0")})
         back = settings.placement(reference, where).inverse()
         found[mesh.get("name") or path.stem] = MeshFile(path.resolve(), (x, y, z)), back

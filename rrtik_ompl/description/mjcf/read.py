@@ -65,12 +65,15 @@ def read_mjcf(path: Path) -> Mjcf:
     settings = Settings()
     settings.read(root, where)
     reader = _Reader(where, settings, meshes_of(root, settings, path.resolve().parent, where))
+
     for world in root.findall("worldbody"):
         reader.read(world)
+
     tree = Tree(where, reader.finished(), reader.joints)
     sites = tuple(dict.fromkeys(reader.sites))
     excluded = _excluded(root, reader)
     unread = unread_of_mjcf(root, reader.bodies, reader.scenery, {name for name, _ in reader.moving})
+
     return Mjcf(
         name=root.get("model", ""),
         tree=tree,
@@ -86,7 +89,8 @@ def read_mjcf(path: Path) -> Mjcf:
 
 def _include(root: Element, folder: Path) -> None:
     """Put the contents of included files in the places of ``<include>``; their top elements have any name."""
-    stack, count = [root], 0
+    stack = [root]
+    count = 0
     while stack:
         element = stack.pop()
         children = list(element)
@@ -98,6 +102,7 @@ def _include(root: Element, folder: Path) -> None:
                 file = folder / attribute(item, "include", "file", str(folder))
                 text = read_text(file)
                 children[place : place + 1] = list(parse_xml(text, None, str(file)))
+
         element[:] = children
         if any(item.tag == "include" for item in element):
             stack.append(element)
@@ -135,16 +140,19 @@ class _Reader:
         for item in element:
             if item.tag in UNREAD:
                 raise InputError(f"{place}: <{item.tag}> cannot be read; save the compiled model and load that")
+
         for item in element.findall("geom"):
             geom = self.settings.filled(item, style, place)
             if geom.get("type") in OF_THE_SCENE:
                 self.scenery.append(f"{geom.get('type')} '{geom.get('name', link)}'")
                 continue
             with located(place):
-                solid, mask = solid_of(geom, self.settings, self.meshes, place), masks(geom, place)
+                solid = solid_of(geom, self.settings, self.meshes, place)
+                mask = masks(geom, place)
             self.solids[link][not any(mask)].append(solid)
             if any(mask):
                 self.masks.setdefault(link, []).append(mask)
+
         for item in element.findall("site"):
             site = self.settings.filled(item, style, place)
             name = site.get("name", "")
@@ -158,8 +166,11 @@ class _Reader:
         place = f"{self.where}: body '{name}'"
         if name in self.solids:
             raise InputError(f"{place}: its name stands there twice; rename one body or site")
-        link, offset = parent, self.settings.placement(body, place)
+
+        link = parent
+        offset = self.settings.placement(body, place)
         kinds = []
+
         for number, item in enumerate([*body.findall("joint"), *body.findall("freejoint")]):
             joint = self.settings.filled(item, style, place)
             called = joint.get("name") or f"{name}/joint{number + 1}"
@@ -170,6 +181,7 @@ class _Reader:
             kinds.append(kind)
             if kind != "free":
                 link, offset = self.turned(joint, kind, called, link, offset)
+
         self.bodies[name] = Body(parent, tuple(kinds))
         self.solids[name] = [], []
         self.fix(link, name, offset)
@@ -179,17 +191,21 @@ class _Reader:
         place = f"{self.where}: joint '{name}'"
         at = pin.SE3(np.eye(3), np.array(numbers(joint, "pos", 3, (0.0, 0.0, 0.0), place)))
         axis = np.array(numbers(joint, "axis", 3, (0.0, 0.0, 1.0), place))
+
         slides = kind == "slide"
         unit = 1.0 if slides else self.settings.angle(1.0)
         low, high = (unit * value for value in numbers(joint, "range", 2, (0.0, 0.0), place))
+
         usual = "true" if self.settings.limited and joint.get("range") is not None else "false"
         limited = joint.get("limited", "auto").replace("auto", usual) == "true"
         known = "prismatic" if slides else "revolute" if limited else "continuous"
         bounds = {"lower": low, "upper": high} if limited else {"lower": -np.inf, "upper": np.inf}
+
         child = f"{name}/link"
         with located(place):
             self.joints.append(Joint(name, known, link, child, offset * at, axis, **bounds))
         self.solids[child] = [], []
+
         zero = unit * numbers(joint, "ref", 1, (0.0,), place)[0]
         self.zeros[name] = zero
         way = -zero * self.joints[-1].axis
@@ -216,7 +232,9 @@ def _below(body: Element, name: str, style: str) -> list[tuple[Element, str, str
 
 def _followers(root: Element, reader: _Reader) -> tuple[Mimic, ...]:
     """Joints that follow others: by how much from where the file draws them."""
-    where, found = reader.where, []
+    where = reader.where
+    found = []
+
     for tie in root.findall("equality/joint"):
         if tie.get("joint2") is None or tie.get("active", "true") != "true":
             continue
@@ -249,12 +267,12 @@ def _apart(reader: _Reader) -> frozenset[frozenset[str]]:
 
 def _keys(root: Element, reader: _Reader) -> dict[str, dict[str, float]]:
     found = {}
-    total = sum(SIZES[kind] for _, kind in reader.moving)
+    sizes = [SIZES[kind] for _, kind in reader.moving]
+    starts = np.cumsum([0, *sizes]).tolist()
     for number, key in enumerate(root.findall("keyframe/key")):
         if key.get("qpos") is None:
             continue
-        values = numbers(key, "qpos", total, None, f"{reader.where}: key '{key.get('name', number)}'")
-        starts = np.cumsum([0, *(SIZES[kind] for _, kind in reader.moving)]).tolist()
+        values = numbers(key, "qpos", sum(sizes), None, f"{reader.where}: key '{key.get('name', number)}'")
         own = {name: values[at] for (name, kind), at in zip(reader.moving, starts, strict=False) if kind != "free"}
         found[key.get("name") or f"key{number}"] = own
     return found

@@ -51,8 +51,10 @@ class Settings:
             self.sequence = compiler.get("eulerseq", self.sequence)
             self.limited = compiler.get("autolimits", "true" if self.limited else "false") == "true"
             self.meshes = compiler.get("meshdir", compiler.get("assetdir", self.meshes))
+
         if len(self.sequence) != 3 or set(self.sequence.lower()) - set("xyz"):
             raise InputError(f"{where}: eulerseq '{self.sequence}' must be three of the letters x, y, z")
+
         stack = [(element, MAIN) for element in root.findall("default")]
         while stack:
             element, above = stack.pop()
@@ -71,6 +73,7 @@ class Settings:
         name = element.get("class", above)
         if name not in self.classes:
             raise UnknownNameError("default class", name, self.classes, where=where)
+
         filled = ElementTree.Element(element.tag, {**self.classes[name].get(element.tag, {}), **element.attrib})
         for key in _ORIENTATIONS:  # an orientation of its own takes the place of any other
             if key in element.attrib:

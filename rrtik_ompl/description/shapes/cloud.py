@@ -59,14 +59,19 @@ def load_cloud(
     suffix = Path(path).suffix.lower()
     if suffix not in _READERS:
         raise InputError(f"{path}: unknown kind of cloud; have {', '.join(_READERS)}; export it as PLY")
+
     data = read_bytes(path, MAX_BYTES)
     points = _READERS[suffix](data, str(path))
+
     if factor != 1.0:
         points = points * factor
-    if radius is None:
-        radius = factor * 0.5 * np.sqrt(3.0) * octree_resolution(data, str(path)) if suffix == ".bt" else RADIUS
-        if suffix == ".bt":  # points are kept in single precision
-            radius += float(np.finfo(np.float32).eps) * float(np.abs(points).max(initial=0.0))
+
+    if radius is None and suffix == ".bt":
+        radius = factor * 0.5 * np.sqrt(3.0) * octree_resolution(data, str(path))
+        radius += float(np.finfo(np.float32).eps) * float(np.abs(points).max(initial=0.0))  # they are kept in float32
+    elif radius is None:
+        radius = RADIUS
+
     return PointCloud(points, radius, invalid=invalid, source=os.path.abspath(path), scale=factor)
 
 

@@ -55,13 +55,17 @@ def load_height_field(
     Example:
         >>> seabed = load_height_field("seabed.npy", cell=0.1)  # doctest: +SKIP
     """
-    factor, suffix = positive(scale, f"{file_name(path)}: scale"), Path(path).suffix.lower()
+    factor = positive(scale, f"{file_name(path)}: scale")
+    suffix = Path(path).suffix.lower()
     if suffix not in (".npy", *TABLES, *PICTURES):
         have = ", ".join((".npy", *TABLES, *PICTURES))
         raise InputError(f"{path}: unknown kind of heights; have {have}; export it as one of these")
+
     data = read_bytes(path, MAX_BYTES)
-    what, mark = str(path), None if nodata is None else finite_number(nodata, f"{path}: nodata")
+    what = str(path)
+    mark = None if nodata is None else finite_number(nodata, f"{path}: nodata")
     known_choice(invalid, what)
+
     picture = suffix in PICTURES
     if suffix == ".npy":
         rows = npy_rows(data, what)
@@ -71,8 +75,10 @@ def load_height_field(
         mark = header.nodata if mark is None else mark
     else:
         rows = text_rows(data, None, what)
+
     rows = _marked(rows, mark, invalid, what, from_above=picture)
     source = os.path.abspath(path)
+
     return HeightField(
         factor * rows,
         cell,
@@ -99,11 +105,14 @@ def _marked(rows: NDArray[Any], mark: float | None, invalid: Invalid, what: str,
     """
     guess = next((usual for usual in USUAL if _is_mark(rows, usual)), None) if mark is None else None
     number = guess if mark is None else mark
+
     missing = ~np.isfinite(rows)
     if number is not None:
         missing |= rows == (rows.dtype.type(number) if rows.dtype.kind == "f" else number)
+
     if not missing.any():
         return rows
+
     if invalid == "refuse" or guess is not None:
         in_file = missing[::-1] if from_above else missing
         row, column = np.argwhere(in_file)[0].tolist()
@@ -114,6 +123,7 @@ def _marked(rows: NDArray[Any], mark: float | None, invalid: Invalid, what: str,
         if guess is not None:
             remedy = f"nodata={guess:g} with invalid='drop' leaves out their columns; if it is a height, state another"
         raise InputError(f"{what}: {some}, the first in row {row}, column {column} (from 0); {remedy}")
+
     return np.where(missing, np.nan, rows)
 
 
@@ -133,10 +143,12 @@ def _picture(data: bytes, what: str) -> NDArray[Any]:
     except ImportError:
         remedy = "pip install 'rrtik-ompl[markers]', or save it as .npy"
         raise InputError(f"{what}: pictures need OpenCV: {remedy}") from None
+
     try:
         found = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     except cv2.error:  # a header with a size larger than memory
         found = None
+
     if found is None:
         raise InputError(f"{what}: not a picture that can be read; save it as a grey PNG of 16 bits")
     if found.ndim != 2:

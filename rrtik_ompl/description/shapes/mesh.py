@@ -53,13 +53,16 @@ def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
     factor = positive(scale, f"{path}: scale")
     if Path(path).suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: unknown kind of mesh; have {', '.join(SUFFIXES)}; export it as STL")
+
     data = read_bytes(path, MAX_BYTES)
     if not data:
         raise InputError(f"{path}: the file is empty; export the mesh again")
     if not finite_numbers(data):
         raise InputError(f"{path}: not a usable mesh: it holds numbers that are not finite; export it again")
+
     if len(data) > LONG_BYTES:
         tell_once(f"reading {os.fspath(path)}, {len(data) / 1e6:.0f} MB: about ten seconds for a million triangles")
+
     vertices, triangles = _read(path, factor * stated_unit(path, data))
     mesh = Mesh(vertices, triangles, source=os.path.abspath(path), scale=factor)
     if not mesh.closed:
@@ -75,6 +78,7 @@ def _read(path: str | os.PathLike[str], scale: float) -> tuple[Matrix, NDArray[n
         model = coal.MeshLoader().load(os.fspath(path), np.full(3, scale))
     except (ValueError, RuntimeError) as error:
         raise InputError(f"{path}: not a usable mesh: {_reason(error)}; export it again as STL, OBJ or DAE") from error
+
     corners: list[Any] = [model.tri_indices(k) for k in range(model.num_tris)]
     triangles = np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
     return np.array(model.vertices(), dtype=np.float64), triangles
@@ -102,12 +106,14 @@ def stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
     """
     if Path(path).suffix.lower() != ".dae":
         return 1.0
+
     try:
         asset = _asset(data)
         unit = None if asset is None else asset.find("{*}unit")
         metres = 1.0 if unit is None else float(unit.get("meter", "1"))
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # LookupError: an encoding nobody knows
         raise InputError(f"{path}: not a usable mesh: {error}; export it again as STL, OBJ or DAE") from error
+
     if not 0.0 < metres < float("inf"):
         raise InputError(f"{path}: its unit must be greater than 0 metres, found {metres:g}; export it again")
     return metres

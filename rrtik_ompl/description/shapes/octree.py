@@ -18,7 +18,7 @@ from rrtik_ompl.model.shapes.octree import Octree
 from rrtik_ompl.model.shapes.point_cloud import MOST_POINTS
 
 FIRST_LINE = b"# Octomap OcTree binary file"
-OCCUPIED, INNER = 2, 3
+OCCUPIED = 2  # two bits of a child; 3 is a node of its own
 DEPTH = 16  # levels of cells below the root
 MAX_BYTES = 256 * 1024 * 1024
 
@@ -84,12 +84,15 @@ def octree_points(data: bytes, what: str) -> Matrix:
     """
     places, levels, resolution, _ = _occupied(data, what)
     widths = np.exp2(DEPTH - levels)
+
     if (count := float((widths**3).sum())) > MOST_POINTS:
         raise InputError(f"{what}: {count:.0f} occupied cells, more than {MOST_POINTS}; take it as an octree instead")
+
     found = [np.zeros((0, 3))]
     for width in np.unique(widths).astype(int).tolist():
         inside = np.indices((width, width, width)).reshape(3, -1).T
         found.append((places[widths == width][:, None] + inside).reshape(-1, 3))
+
     return resolution * (np.concatenate(found) + 0.5 - float(1 << (DEPTH - 1)))
 
 
@@ -132,13 +135,18 @@ def _cells_in(
     if header.get("id", "OcTree") != "OcTree":
         raise InputError(f"{what}: a tree of type '{header['id'][:20]}' is unknown; write it as OcTree")
     resolution = _resolution(header, what)
+
     occupied: list[tuple[int, int, int, int]] = []
-    open_, at = [(0, 0, 0, 0)] if body else [], 0
+    open_ = [(0, 0, 0, 0)] if body else []
+    at = 0
     while open_:
         x, y, z, level = open_.pop()
         if level == DEPTH or at + 2 > len(body):
             raise InputError(f"{what}: the tree {'is too deep' if level == DEPTH else 'ends too early'}; save it again")
-        bits, at, half = body[at] | body[at + 1] << 8, at + 2, 1 << (DEPTH - 1 - level)
+
+        bits = body[at] | body[at + 1] << 8
+        at += 2
+        half = 1 << (DEPTH - 1 - level)
         inner: list[tuple[int, int, int, int]] = []
         for child in range(8):
             kind = bits >> (2 * child) & 3
@@ -146,5 +154,6 @@ def _cells_in(
                 place = (x + half * (child & 1), y + half * (child >> 1 & 1), z + half * (child >> 2), level + 1)
                 (occupied if kind == OCCUPIED else inner).append(place)
         open_ += inner[::-1]  # the first one follows first
+
     rows = np.array(occupied, dtype=np.float64).reshape(-1, 4)
     return rows[:, :3], rows[:, 3], resolution, at
