@@ -26,10 +26,12 @@ def cache_folder(kind: str) -> Path | None:
     named = os.environ.get(FOLDER_VARIABLE)
     if named is not None:
         return Path(named) / kind if named else None
+
     try:
         home = Path.home()
     except RuntimeError:
         return None
+
     default = home / "Library" / "Caches" if sys.platform == "darwin" else home / ".cache"
     return Path(os.environ.get("XDG_CACHE_HOME") or default) / "rrtik-ompl" / kind
 
@@ -52,8 +54,10 @@ def nobody_else_s(file: Path, *, among: int = OTHERS_WRITE) -> bool:
         states = {place: os.lstat(place) for place in places}
     except (OSError, RuntimeError):  # a loop of links
         return False
+
     if not hasattr(os, "geteuid"):  # Windows keeps a user's folders from others by itself
         return True
+
     trusted = {os.geteuid(), 0, states[Path(named.anchor)].st_uid}
     own = {named, named.parent, real, real.parent}
     for place, state in states.items():
@@ -100,12 +104,14 @@ def one_at_a_time(file: Path | None) -> Iterator[None]:
     except ImportError:
         yield
         return
+
     lock = None
     with contextlib.suppress(OSError):
         if file is not None:
             _make_closed(file.parent)
             lock = os.open(file.with_suffix(".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
             fcntl.flock(lock, fcntl.LOCK_EX)
+
     try:
         yield
     finally:

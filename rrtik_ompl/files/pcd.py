@@ -27,12 +27,15 @@ def pcd_points(data: bytes, what: str) -> NDArray[Any]:
     head, found, rest = data.partition(b"\nDATA ")
     if not found:
         raise InputError(f"{what}: not a PCD file: its header has no line DATA; export it again")
+
     way, _, body = rest.partition(b"\n")
     lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
     header = {line[0]: line[1:] for line in lines if line and not line[0].startswith("#")}
-    names, count = header.get("FIELDS", []), claimed(" ".join(header.get("POINTS", [])), f"{what}: POINTS")
+    names = header.get("FIELDS", [])
+    count = claimed(" ".join(header.get("POINTS", [])), f"{what}: POINTS")
     if missing := [axis for axis in AXES if names.count(axis) != 1]:
         raise InputError(f"{what}: FIELDS needs one '{missing[0]}'; it has {', '.join(names) or 'none'}")
+
     kind = _record(header, names, what)
     stored = way.strip().decode("ascii", "replace")
     if stored == "ascii":
@@ -50,15 +53,18 @@ def pcd_points(data: bytes, what: str) -> NDArray[Any]:
 
 def _record(header: dict[str, list[str]], names: list[str], what: str) -> np.dtype[Any]:
     """The type of one point."""
-    sizes, kinds = header.get("SIZE", []), header.get("TYPE", [])
+    sizes = header.get("SIZE", [])
+    kinds = header.get("TYPE", [])
     counts = header.get("COUNT", ["1"] * len(names))
     if not len(names) == len(sizes) == len(kinds) == len(counts):
         raise InputError(f"{what}: FIELDS, SIZE, TYPE and COUNT must have as many entries each")
+
     known = all(
         size in SIZES and kind in KINDS and (kind, size) != ("F", "1") for size, kind in zip(sizes, kinds, strict=True)
     )
     if not known or not all(count.isdigit() and 0 < int(count) < 10_000 for count in counts):
         raise InputError(f"{what}: SIZE, TYPE or COUNT has an entry that is unknown; export it again")
+
     fields = []
     for k, (name, size, kind, many) in enumerate(zip(names, sizes, kinds, counts, strict=True)):
         own = f"<{KINDS[kind]}{size}"
@@ -75,9 +81,12 @@ def _columns(body: bytes, kind: np.dtype[Any], count: int, what: str) -> NDArray
         raise InputError(f"{what}: its header claims {count} points, which the compressed data are not; save it again")
     if size > MOST_UNPACKED:
         raise InputError(f"{what}: {size >> 20} MiB of compressed points, more than is read; save it as DATA binary")
+
     plain = unpacked(body[8 : 8 + packed], size, what)
-    points, begin = np.empty((count, len(AXES))), 0
     assert kind.names is not None
+
+    points = np.empty((count, len(AXES)))
+    begin = 0
     for name in kind.names:
         if name in AXES:
             points[:, AXES.index(name)] = np.frombuffer(plain, kind[name], count, begin)
@@ -91,19 +100,24 @@ def unpacked(packed: bytes, size: int, what: str) -> bytes:
     Raises:
         InputError: If they are damaged.
     """
-    plain, place = bytearray(), 0
+    plain = bytearray()
+    place = 0
     try:
         while place < len(packed):
             control = packed[place]
             place += 1
+            # As many bytes as this says follow as they are.
             if control < 32:
                 plain += packed[place : place + control + 1]
                 place += control + 1
                 continue
+
+            # Or it is a copy: of how many bytes, and from how far back.
             count = control >> 5
             if count == 7:
                 count += packed[place]
                 place += 1
+
             begin = len(plain) - ((control & 31) << 8) - packed[place] - 1
             place += 1
             if begin < 0:
@@ -116,6 +130,7 @@ def unpacked(packed: bytes, size: int, what: str) -> bytes:
                     plain.append(plain[k])
     except IndexError:
         raise InputError(f"{what}: the compressed points are damaged; save it again") from None
+
     if len(plain) != size:
         raise InputError(f"{what}: the compressed points are damaged; save it again")
     return bytes(plain)

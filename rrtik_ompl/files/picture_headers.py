@@ -12,8 +12,14 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
 
-PNG, PNG_BITS, PNG_COLOUR = b"\x89PNG\r\n\x1a\n", 24, 25  # signature; places of the bits of a sample, of its kind
-BITS, PHOTOMETRIC, GDAL_METADATA, GDAL_NODATA = 258, 262, 42112, 42113  # tags of TIFF
+PNG = b"\x89PNG\r\n\x1a\n"  # signature
+PNG_BITS = 24  # place of the bits of a sample
+PNG_COLOUR = 25  # place of its kind
+# Tags of TIFF.
+BITS = 258
+PHOTOMETRIC = 262
+GDAL_METADATA = 42112
+GDAL_NODATA = 42113
 TIFF_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 11: 4, 12: 8, 16: 8}  # bytes of the types of values
 MOST_TAGS = 4096
 
@@ -38,7 +44,8 @@ def picture_header(data: bytes, what: str) -> PictureHeader:
         InputError: If its numbers are no heights: a bitmap, a picture whose white is 0, or scaled by what it says.
     """
     if data.startswith(PNG) and len(data) > PNG_COLOUR:
-        bits, grey = data[PNG_BITS], data[PNG_COLOUR] == 0
+        bits = data[PNG_BITS]
+        grey = data[PNG_COLOUR] == 0
         return PictureHeader(most=2**bits - 1 if grey and bits < 8 else None)
     if data[:2] in (b"P1", b"P4"):
         raise InputError(f"{what}: a bitmap of black and white holds no heights; save it as a grey PNG of 16 bits")
@@ -65,11 +72,13 @@ def _tiff_header(data: bytes, what: str) -> PictureHeader:
         raise InputError(f"{what}: {bits} bits a height are stretched by readers; save it with 8 bits or more")
     if _numbers(tags.get(PHOTOMETRIC))[:1] == [0]:
         raise InputError(f"{what}: a picture whose white is 0 (WhiteIsZero); save it with black as 0")
+
     for role in re.findall(rb'role="(scale|offset)"[^>]*>([^<]*)<', tags.get(GDAL_METADATA, (0, b""))[1]):
         neutral = 1.0 if role[0] == b"scale" else 0.0
         if (given := _number(role[1])) is not None and given != neutral:
             said = f"{role[0].decode()} of {given:g}"
             raise InputError(f"{what}: its heights have a {said} (GDAL's metadata); save the heights themselves")
+
     return PictureHeader(nodata=_number(tags.get(GDAL_NODATA, (0, b""))[1]))
 
 
@@ -82,10 +91,12 @@ def _tags(data: bytes) -> Iterator[tuple[int, tuple[int, bytes]]]:
         (at,) = struct.unpack_from(f"{order}{'Q' if big else 'I'}", data, 8 if big else 4)
         (count,) = struct.unpack_from(f"{order}{'Q' if big else 'H'}", data, at)
         at += 8 if big else 2
+
         for _ in range(min(count, MOST_TAGS)):
             tag, kind, values = struct.unpack_from(f"{order}HH{'Q' if big else 'I'}", data, at)
             inline, size = (8, 20) if big else (4, 12)
-            length, place = TIFF_SIZES.get(kind, 1) * values, at + size - inline
+            length = TIFF_SIZES.get(kind, 1) * values
+            place = at + size - inline
             if length > inline:
                 (place,) = struct.unpack_from(f"{order}{'Q' if big else 'I'}", data, place)
             found = data[place : place + length]

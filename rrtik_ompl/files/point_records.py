@@ -51,9 +51,11 @@ def npy_rows(data: bytes, what: str, columns: int | None = None) -> NDArray[Any]
         shape, columnwise, kind = read(stream)
     except (ValueError, KeyError) as error:
         raise InputError(f"{what}: not a .npy file of numpy: {str(error).splitlines()[0]}") from None
+
     if kind.kind not in "fiu" or len(shape) != 2 or columns not in (None, shape[1]):
         wanted = f"(any, {'any' if columns is None else columns})"
         raise InputError(f"{what}: expected numbers of shape {wanted}, got {kind} of shape {shape}")
+
     if not columnwise:
         return records(data, stream.tell(), np.dtype((kind, (shape[1],))), shape[0], what)
     return records(data, stream.tell(), kind, shape[1] * shape[0], what).reshape(shape[::-1]).T
@@ -70,9 +72,11 @@ def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int |
         if data.find(b"\n", begin, end) < 0 and data.find(b"\r", begin, end) < 0:
             most = LONGEST_LINE // 2**20
             raise InputError(f"{what}: not rows of numbers: a line is longer than {most} MiB, the most that is read")
+
     plain = data.replace(b",", b" ") if b"," in data else data
     if not plain or plain.isspace():
         return np.zeros((0, len(columns or ())))
+
     lines = io.TextIOWrapper(io.BytesIO(plain), "ascii", errors="replace")  # read line by line: all at once take memory
     try:
         rows = np.loadtxt(lines, usecols=columns, ndmin=2, max_rows=most, dtype=np.float64)

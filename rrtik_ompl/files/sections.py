@@ -39,7 +39,8 @@ def _one(value: object) -> object:
 
 Version = Annotated[Literal[1], BeforeValidator(_one)]
 
-_NO_KIND, _ONE_OF = "no_kind", "needs one of the keys "
+_NO_KIND = "no_kind"
+_ONE_OF = "needs one of the keys "
 _TAG = "<"  # tags of unions begin with it, so that they differ from the keys in an error's location
 
 
@@ -164,10 +165,11 @@ def _message(error: ErrorDetails) -> str:
 
 def _unknown_kind(error: ErrorDetails) -> str:
     """What stands where a key should tell the kind, and which key may be meant."""
-    data, kinds = error["input"], error["msg"].partition(_ONE_OF)[2].split(", ")
-    near = (
-        [close for key in data for close in get_close_matches(str(key), kinds, n=1)] if isinstance(data, dict) else []
-    )
+    data = error["input"]
+    kinds = error["msg"].partition(_ONE_OF)[2].split(", ")
+    near: list[str] = []
+    if isinstance(data, dict):
+        near = [close for key in data for close in get_close_matches(str(key), kinds, n=1)]
     return f"; found {describe(data)}" + (f"; did you mean '{near[0]}'?" if near else "")
 
 

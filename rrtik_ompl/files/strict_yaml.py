@@ -41,7 +41,8 @@ class YamlDocument:
 
     def place(self, location: Location) -> str:
         """``FILE:LINE: key.path`` of a location (of its nearest parent that is in the file, for the line)."""
-        known, lines = location, self.lines
+        known = location
+        lines = self.lines
         while known not in lines:
             known = known[:-1]
         where = f"{self.path}:{lines[known]}"
@@ -73,6 +74,7 @@ def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
     file = file_name(path)
     text = read_text(path)
     builder = Builder(file)
+
     try:
         builder.read(text)
     except yaml.MarkedYAMLError as error:
@@ -81,10 +83,12 @@ def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
         raise InputError(_syntax(file, text, error)) from error
     except yaml.YAMLError as error:  # a control character, most often
         raise InputError(f"{path}: not valid YAML: {str(error).splitlines()[0]}; is it a text file?") from error
+
     if not builder.documents or builder.top is None:
         raise InputError(f"{path}: the file is empty; it must hold 'key: value' lines")
     if builder.group is None or not isinstance(builder.top, dict):
         raise InputError(f"{path}:1: the top level must be 'key: value' lines, found {describe(builder.top)}")
+
     return YamlDocument(file, builder.top, builder.group)
 
 
@@ -117,12 +121,15 @@ def describe(value: object) -> str:
 def _syntax(path: Path, text: str, error: yaml.MarkedYAMLError) -> str:
     unclosed = "end of stream" in (error.problem or "") and error.context_mark is not None
     mark = error.context_mark if unclosed else error.problem_mark or error.context_mark
+
     if mark is None:
         return f"{path}: not valid YAML: {error.problem}"
+
     rows = text.splitlines()
     row = rows[mark.line] if mark.line < len(rows) else ""
     if "\t" in row[: len(row) - len(row.lstrip())]:
         return f"{path}:{mark.line + 1}: a tab stands at the start of the line; indent YAML with blanks only"
+
     what = ": ".join(part for part in (error.context, error.problem) if part)
     return f"{path}:{mark.line + 1}: not valid YAML ({what}); check indentation, colons, quotes and brackets"
 

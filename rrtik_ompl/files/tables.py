@@ -36,6 +36,11 @@ def loads(text: str, ending: str) -> dict[str, Any]:
     return _from_table(text, "," if ending == ".csv" else None)
 
 
+def _from_table(text: str, separator: str | None) -> dict[str, Any]:
+    names, rows = table_rows(text, separator)
+    return {"waypoints": rows} if names is None else {"waypoints": rows, "joint_names": names}
+
+
 def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
     """The JSON object of a file of version 1 and of this kind, that has this key; names and units are checked.
 
@@ -77,19 +82,16 @@ def _check_heads(document: dict[str, Any], kind: str) -> None:
         found = document.get(key, expected)
         if found is True or found != expected:  # true is equal to 1 in Python, but not what a file should say
             raise InputError(f"{key}: expected {expected!r}, got {found!r}")
+
     for key in ("units", "joint_names", "continuous"):
         words = document.get(key)
         if words is not None and not (isinstance(words, list) and all(isinstance(word, str) for word in words)):
             kind = "names of joints" if key == "continuous" else "text, one per joint"
             raise InputError(f"{key}: expected a list of {kind}")
+
     for unit in document.get("units") or ():
         if unit not in ("rad", "m"):
             raise InputError(f"units: expected 'rad' or 'm' for each joint, got {unit!r}; convert the waypoints")
-
-
-def _from_table(text: str, separator: str | None) -> dict[str, Any]:
-    names, rows = table_rows(text, separator)
-    return {"waypoints": rows} if names is None else {"waypoints": rows, "joint_names": names}
 
 
 def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list[list[float]]]:
@@ -101,6 +103,7 @@ def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
     if not lines:
         raise InputError("the file is empty; expected one configuration a line")
+
     names = None
     if separator is not None:
         try:
@@ -110,6 +113,7 @@ def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list
         if all(is_number(name) for name in names):
             raise InputError("line 1: expected the names of the joints, found numbers; add a line of names")
         lines = lines[1:]
+
     rows: list[list[float]] = []
     for number, line in lines:
         cells = line.split(separator)
@@ -119,6 +123,7 @@ def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list
             raise InputError(f"line {number}: expected numbers, got {line.strip()[:60]!r}") from None
         if len(rows[-1]) != len(names or rows[0]):
             raise InputError(f"line {number}: expected {len(names or rows[0])} numbers, got {len(cells)}")
+
     if not rows:
         raise InputError("the file holds joint names only; expected one configuration a line below them")
     return names, rows

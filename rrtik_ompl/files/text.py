@@ -45,12 +45,23 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
         raise InputError(f"{path}: this is a folder; give a file") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+
     length = max(length, len(data))
     if length > limit:
-        most, size = limit // 2**20, length // 2**20
+        most = limit // 2**20
+        size = length // 2**20
         shown = f"{size} MiB, more" if size > most else "larger"
         raise InputError(f"{path}: {shown} than {most} MiB, the most that is read")
     return data
+
+
+def _similar(path: Path) -> str:
+    """A hint at a file of nearly the same name in the same folder."""
+    try:
+        near = get_close_matches(path.name, os.listdir(path.parent), n=1, cutoff=0.8)
+    except (OSError, ValueError):
+        return f"; folder '{path.parent}' does not exist"
+    return f"; did you mean '{near[0]}'?" if near else "; check the name"
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
@@ -101,6 +112,7 @@ def _replace(target: Path, data: bytes) -> None:
         mode = None
     if mode is not None and (not mode & 0o222 or not os.access(target, os.W_OK)):
         raise PermissionError(None, "it is write-protected; choose another name")
+
     temporary = target.with_name(f".{os.urandom(8).hex()}.tmp")
     try:
         if not _appears_whole(temporary, data):
@@ -172,10 +184,12 @@ def check_target(path: Path | None, endings: tuple[str, ...]) -> None:
         return
     if path.suffix.lower() not in endings:
         raise InputError(f"{path}: unknown ending '{path.suffix}'; use {', '.join(endings)}")
+
     try:
         folder = path.is_dir()
     except OSError as error:  # the name is too long
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
     if folder:
         raise InputError(f"{path}: this is a folder; give a file name")
     if not path.parent.is_dir():
@@ -214,12 +228,3 @@ def is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _similar(path: Path) -> str:
-    """A hint at a file of nearly the same name in the same folder."""
-    try:
-        near = get_close_matches(path.name, os.listdir(path.parent), n=1, cutoff=0.8)
-    except (OSError, ValueError):
-        return f"; folder '{path.parent}' does not exist"
-    return f"; did you mean '{near[0]}'?" if near else "; check the name"

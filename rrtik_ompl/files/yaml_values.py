@@ -131,7 +131,9 @@ class Builder:
     def _scalar(self, event: yaml.ScalarEvent) -> None:
         if event.tag is not None:
             raise self._error(event, f"tag '{event.tag}' cannot be used; write the value alone")
-        parent, text = self._stack[-1] if self._stack else None, event.value
+
+        parent = self._stack[-1] if self._stack else None
+        text = event.value
         if parent is not None and parent.key is None and type(parent.value) is dict:
             if text in parent.lines:
                 first = f"first in line {parent.lines[text]}"
@@ -144,13 +146,16 @@ class Builder:
     def _open(self, event: yaml.CollectionStartEvent, value: object) -> None:
         if event.tag is not None:
             raise self._error(event, f"tag '{event.tag}' cannot be used; write the value alone")
-        parent, group = self._stack[-1] if self._stack else None, Group(value, _line(event), event.anchor)
+
+        parent = self._stack[-1] if self._stack else None
+        group = Group(value, _line(event), event.anchor)
         if parent is None:
             self.group = group
         else:
             place = self._place(parent, event)
             parent.lines.setdefault(place, group.line)
             parent.groups[place] = group
+
         self._stack.append(group)
         if len(self._stack) > MAX_DEPTH:
             raise self._too_deep(event)
@@ -172,9 +177,11 @@ class Builder:
         """Put a finished value where it belongs and keep count of what the file unfolds to."""
         if anchor is not None:
             self._anchors[anchor] = (value, size, height)
+
         if not self._stack:
             self.top = value
             return
+
         parent = self._stack[-1]
         if parent.key is None:
             parent.lines.setdefault(len(parent.value), _line(event))
@@ -182,9 +189,11 @@ class Builder:
         else:
             parent.value[parent.key] = value
             parent.key = None
+
         parent.size += size
         if height >= parent.height:
             parent.height = height + 1
+
         if len(self._stack) + height > MAX_DEPTH:
             raise self._too_deep(event)
         if parent.size > MAX_VALUES:
