@@ -38,6 +38,7 @@ def in_blocks(work: Callable[..., NDArray[Any]], *rows: NDArray[Any]) -> NDArray
         part = work(*(each[begin : begin + BLOCK_ROWS] for each in rows))
         answer = room((count, *part.shape[1:]), part.dtype) if answer is None else answer
         answer[begin : begin + BLOCK_ROWS] = part
+
     assert answer is not None
     return answer
 
@@ -83,11 +84,13 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
     """
     # Most are floats already, and to ask what else they may be takes longer than all other questions.
     array = values if type(values) is np.ndarray and values.dtype == np.float64 else _as_floats(values, what)
+
     if array.size > MOST_NUMBERS:
         raise too_many(array.size, what)
     if array.shape != shape and not _has_shape(array, shape):
         wanted = ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
         raise InputError(f"{what}: expected an array of shape ({wanted}), got shape {array.shape}")
+
     if not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         if not place:
@@ -138,6 +141,10 @@ def _has_truths(values: Iterable[Any]) -> bool:
         values = list(chain.from_iterable(each for each in values if type(each) in _LISTS))
 
 
+def _has_shape(array: NDArray[np.float64], shape: tuple[int | None, ...]) -> bool:
+    return array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
+
+
 def too_many(count: int, what: str) -> InputError:
     """The error for more numbers than a call takes."""
     return InputError(f"{what}: {count} are more numbers than the {MOST_NUMBERS} of one call; give them in parts")
@@ -177,10 +184,6 @@ def usable_waypoints(rows: Matrix) -> Matrix:
     if (most := np.abs(rows).max()) > LARGEST:
         raise InputError(f"path waypoints: found {most:g}, more than {LARGEST:g} rad or m; check units")
     return rows
-
-
-def _has_shape(array: NDArray[np.float64], shape: tuple[int | None, ...]) -> bool:
-    return array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
 
 
 def number_rows(values: ArrayLike, what: str) -> NDArray[np.float64]:

@@ -31,14 +31,6 @@ def itself(thing: Thing, memo: object) -> Thing:
     return thing
 
 
-class _ReadOnlyArray(NamedTuple):
-    values: NDArray[Any]
-
-
-class _ReadOnlyMapping(NamedTuple):
-    values: dict[Any, Any]
-
-
 class Once(Generic[Kind]):
     """What a function makes, once it is asked for; cheaper to set up than ``functools.cache``.
 
@@ -51,10 +43,11 @@ class Once(Generic[Kind]):
     __slots__ = ("_given", "_made", "_make")
 
     def __init__(self, make: Callable[..., Kind], *given: object) -> None:
-        self._make, self._given = make, given
+        self._make = make
+        self._given = given
 
     def __call__(self) -> Kind:
-        """It."""
+        """What the function has made; it is called if nobody has asked before."""
         if not hasattr(self, "_made"):
             self._made = self._make(*self._given)
         return self._made
@@ -73,7 +66,8 @@ class Items(Sequence[Kind]):
     """
 
     def __init__(self, whole: tuple[Kind, ...], changes: Mapping[int, Kind] = MappingProxyType({})) -> None:
-        self._whole, self._changes = whole, changes
+        self._whole = whole
+        self._changes = changes
 
     @property
     def whole(self) -> tuple[Kind, ...]:
@@ -82,7 +76,8 @@ class Items(Sequence[Kind]):
             every = list(self._whole)
             for number, item in self._changes.items():
                 every[number] = item
-            self._whole, self._changes = tuple(every), {}
+            self._whole = tuple(every)
+            self._changes = {}
         return self._whole
 
     def with_(self, number: int, item: Kind) -> Items[Kind]:
@@ -95,7 +90,6 @@ class Items(Sequence[Kind]):
     @overload
     def __getitem__(self, number: slice) -> tuple[Kind, ...]: ...
     def __getitem__(self, number: int | slice) -> Kind | tuple[Kind, ...]:
-        """One of them, or some."""
         if isinstance(number, slice):
             return self.whole[number]
         return self._changes[number] if number in self._changes else self._whole[number]
@@ -148,6 +142,14 @@ def changed(thing: Thing, **values: object) -> Thing:
     return restored(type(thing), same | values)
 
 
+class _ReadOnlyArray(NamedTuple):
+    values: NDArray[Any]
+
+
+class _ReadOnlyMapping(NamedTuple):
+    values: dict[Any, Any]
+
+
 def packed(value: object) -> object:
     """A value in which what pickle cannot take, or would make writable, is marked."""
     if isinstance(value, MappingProxyType):
@@ -183,11 +185,13 @@ def _short(value: object) -> str:
         if value.size > MOST_SHOWN:
             return f"<array of shape {value.shape}>"
         return np.array2string(value, precision=6, separator=", ", max_line_width=1000).replace("\n", "")
+
     if isinstance(value, (tuple, list)):
         if len(value) > MOST_SHOWN:
             return f"<{len(value)} of {type(value[0]).__name__}>"
         inside = ", ".join(map(_short, value))
         return f"({inside}{',' * (len(value) == 1)})" if isinstance(value, tuple) else f"[{inside}]"
+
     text = repr(value)
     short = "\n" not in text and len(text) <= LONGEST_TEXT
     if short or isinstance(value, (str, int, float)):

@@ -80,6 +80,7 @@ class UnknownNameError(InputError):
         self.name = str(name)
         self.alternatives = tuple(sorted(map(str, listed(alternatives, "alternatives of a name"))))
         require(where, str, "place of a name")
+
         near = get_close_matches(self.name, self.alternatives, n=1)
         hint = f"; did you mean '{near[0]}'?" if near else ""
         have = ", ".join(self.alternatives) or "none"
@@ -103,7 +104,8 @@ class ProblemError(RrtikError):
     """
 
     def __init__(self, message: str, contacts: Iterable[tuple[str, str]] = (), *, part: str = "start") -> None:
-        self.contacts, self.part = listed(contacts, "contacts of a problem"), part
+        self.contacts = listed(contacts, "contacts of a problem")
+        self.part = part
         super().__init__(message)
 
 
@@ -142,6 +144,7 @@ def called(value: object, what: str, *arguments: str) -> None:
     wanted = f"{what}: expected a function of {' and '.join(arguments) or 'no arguments'}"
     if not callable(value):
         raise InputError(f"{wanted}, got {type(value).__name__}")
+
     try:
         signature(value).bind(*arguments)
     except TypeError as error:
@@ -232,7 +235,8 @@ class Renamed:
     """
 
     def __init__(self, new: str) -> None:
-        self._new, self._old = new, ""
+        self._new = new
+        self._old = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._old = name

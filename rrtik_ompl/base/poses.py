@@ -43,11 +43,13 @@ def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike | None = None, w
     """
     if quat_xyzw is None:
         return rigid(xyz, what)
+
     position = bounded_array(xyz, (3,), f"{what}: xyz")
     quaternion = finite_array(quat_xyzw, (4,), f"{what}: quat_xyzw")
     length = float(np.linalg.norm(quaternion))
     if abs(length - 1.0) > 1e-3:
         raise InputError(f"{what}: quat_xyzw must have length 1, but has {length:.4g}; the order is x, y, z, w")
+
     x, y, z, w = quaternion / length
     return pin.SE3(pin.Quaternion(w, x, y, z).matrix(), position)
 
@@ -112,12 +114,16 @@ def rigid(T: PoseLike, what: str) -> pin.SE3:
         return _written_pose(T, what)
     matrix = finite_array(T.homogeneous if isinstance(T, pin.SE3) else T, (4, 4), what)
     x, y, z, last = matrix.tolist()  # numbers of Python's own: four rows are too few for numpy
+
     if max(abs(last[0]), abs(last[1]), abs(last[2]), abs(last[3] - 1.0)) > LAST_ROW_TOLERANCE:
         raise InputError(f"{what}: the last row must be 0 0 0 1, got {last}")
     if max(abs(x[3]), abs(y[3]), abs(z[3])) > LARGEST:
         raise InputError(f"{what}: its position {[x[3], y[3], z[3]]} is farther than {LARGEST:g} m away; check units")
-    lengths, corners = (_dot(x, x), _dot(y, y), _dot(z, z)), (_dot(x, y), _dot(y, z), _dot(z, x))
+
+    lengths = (_dot(x, x), _dot(y, y), _dot(z, z))
+    corners = (_dot(x, y), _dot(y, z), _dot(z, x))
     off = max(*(abs(square - 1.0) for square in lengths), *map(abs, corners))  # lengths first: they are never nan
+
     if off > NOT_RIGID:
         raise InputError(
             f"{what}: its upper left 3 x 3 part is no rotation: {off:.3g} away from orthonormal "
@@ -127,6 +133,7 @@ def rigid(T: PoseLike, what: str) -> pin.SE3:
         raise InputError(
             f"{what}: its upper left 3 x 3 part mirrors (determinant -1); make it orthonormal and right-handed"
         )
+
     if off > ROUNDING:
         outer, _, inner = np.linalg.svd(matrix[:3, :3])  # the nearest rotation
         return pin.SE3(outer @ inner, matrix[:3, 3])
@@ -185,7 +192,8 @@ def rotation_angles(rotations: NDArray[np.float64]) -> Vector:
 
 def rpy_matrices(angles: Matrix) -> NDArray[np.float64]:
     """Rotations Rz(yaw) Ry(pitch) Rx(roll) for rows of roll, pitch, yaw [rad], shape (m, 3): (m, 3, 3)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(angles).T, np.sin(angles).T
+    cr, cp, cy = np.cos(angles).T
+    sr, sp, sy = np.sin(angles).T
     rows = [
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
@@ -199,10 +207,14 @@ def joint_motions(axes: Matrix, prismatic: Mask, values: Matrix) -> NDArray[np.f
     """Transforms of n joints for values of shape (m, n): translations, or Rodrigues' rotation formula. (m, n, 4, 4)."""
     motions = np.zeros((*values.shape, 4, 4))
     motions[..., [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
+
     cross = np.zeros((len(axes), 3, 3))
-    cross[:, [2, 0, 1], [1, 2, 0]], cross[:, [1, 2, 0], [2, 0, 1]] = axes, -axes
+    cross[:, [2, 0, 1], [1, 2, 0]] = axes
+    cross[:, [1, 2, 0], [2, 0, 1]] = -axes
     cross[prismatic] = 0.0  # they do not turn
-    sine, cosine = np.sin(values)[..., None, None], np.cos(values)[..., None, None]
+
+    sine = np.sin(values)[..., None, None]
+    cosine = np.cos(values)[..., None, None]
     motions[..., :3, :3] += sine * cross + (1.0 - cosine) * (cross @ cross)
     motions[..., :3, 3][:, prismatic] = values[:, prismatic, None] * axes[prismatic]
     return motions

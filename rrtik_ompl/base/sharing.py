@@ -50,6 +50,7 @@ class Shared(Generic[Part]):
             return self.keep(self._make(*values), *values)
         if not hasattr(found, "for_thread"):
             return found  # type: ignore[no-any-return]
+
         own: Part = found.for_thread()
         self._values[own] = values
         self._parts[thread, key] = own
