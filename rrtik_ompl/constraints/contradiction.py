@@ -20,14 +20,17 @@ def contradiction(robot: Robot, constraints: HeldRegions) -> str:
     """
     rows = np.random.default_rng(0).uniform(*robot.finite_range(), (DRAWN, robot.dof))
     kept = [HeldRegions((region,)) for region in constraints.regions]
+
     for one in kept:
         if not projected_rows(robot, one, rows)[1].any():
             return f"no configuration was found that keeps {one.regions[0].label}: is its region in reach?"
+
     for one, other in combinations(kept, 2):
         both = HeldRegions((*one.regions, *other.regions))
         moved, there = projected_rows(robot, both, rows)
         if there.any():
             continue
+
         near, _ = projected_rows(robot, one, moved)
         left = [other.regions[0].outside(q) for q in near[one.held(near)]]
         if left:
@@ -39,4 +42,5 @@ def contradiction(robot: Robot, constraints: HeldRegions) -> str:
                 f"no configuration was found that keeps both {first} and {second}: where the first is kept, the other "
                 f"is missed by {away} at least; do they contradict each other?"
             )
+
     return ""

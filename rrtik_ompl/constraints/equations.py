@@ -17,13 +17,12 @@ from rrtik_ompl.constraints.residuals import SMALL, rates, twists
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.task_region import into_range, roll_pitch_yaw
 
+TURN_EQUATIONS = {Turning.FREE: 0, Turning.AXIS: 2, Turning.BALL: 3, Turning.RANGES: 3}
+
 
 def equation_count(constraints: HeldRegions) -> int:
     """How many equations there are."""
     return sum(len(_coordinates(region)) + TURN_EQUATIONS[region.turning] for region in constraints.regions)
-
-
-TURN_EQUATIONS = {Turning.FREE: 0, Turning.AXIS: 2, Turning.BALL: 3, Turning.RANGES: 3}
 
 
 def equations(robot: Robot, constraints: HeldRegions, q: Vector) -> tuple[Vector, Matrix]:
@@ -47,12 +46,18 @@ def _coordinates(region: HeldRegion) -> NDArray[np.int64]:
 
 
 def _of_region(robot: Robot, region: HeldRegion, q: Matrix) -> tuple[Vector, Matrix]:
-    D, J, task = region.displacements(q)[0], twists(robot, region, q)[0], region.region
+    D = region.displacements(q)[0]
+    J = twists(robot, region, q)[0]
+    task = region.region
+
     some = _coordinates(region)
     away = D[some, 3] - np.clip(D[some, 3], *task.bounds[some].T)
     values = [away / task.position_tolerance]
     derivatives = [J[some] * (away != 0.0)[:, None] / task.position_tolerance]
-    R, tolerance = D[:3, :3], np.sin(min(task.orientation_tolerance, 0.5 * np.pi))
+
+    R = D[:3, :3]
+    tolerance = np.sin(min(task.orientation_tolerance, 0.5 * np.pi))
+
     if region.turning == Turning.AXIS:
         sides = np.linalg.svd(region.direction[None])[2][1:]
         lean = sides @ R[:, 2]
@@ -73,4 +78,5 @@ def _of_region(robot: Robot, region: HeldRegion, q: Matrix) -> tuple[Vector, Mat
         scale = np.sqrt(3.0) / task.orientation_tolerance  # the sum of three counts, which is no more than the length
         values.append(scale * over)
         derivatives.append(scale * (rates(R[None])[0] @ J[3:]) * (over != 0.0)[:, None])
+
     return np.concatenate(values), np.concatenate(derivatives)

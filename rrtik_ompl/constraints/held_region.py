@@ -172,11 +172,13 @@ class HeldRegion:
     def outside(self, q: Vector) -> tuple[float, float]:
         """By how much a configuration, shape (dof,), is outside the tolerances [m; rad]."""
         metres, angle = self.measures(q[None])[0]
+
         if self.turning == Turning.AXIS:
             z = self.displacements(q[None])[0, :3, 2]
             angle = np.arctan2(np.linalg.norm(np.cross(z, self.direction)), z @ self.direction)
         elif self.turning == Turning.BALL:
             angle = 2.0 * np.arcsin(min(angle, 1.0))
+
         region = self.region
         return max(metres - region.position_tolerance, 0.0), max(float(angle) - region.orientation_tolerance, 0.0)
 
@@ -186,15 +188,24 @@ class HeldRegion:
             sine = np.linalg.norm(np.cross(z, self.direction), axis=1)
             away: Vector = np.where(z @ self.direction > 0.0, sine, BEHIND)
             return away
+
         if self.turning == Turning.BALL:
             half: Vector = np.linalg.norm(R - np.eye(3), axis=(1, 2)) / np.sqrt(8.0)  # sine of half the angle
             return half
+
         if self.turning == Turning.RANGES:
             angles = roll_pitch_yaw(R)
             excess = np.abs(angles - into_range(angles, *self.region.bounds[3:].T))
             total: Vector = np.minimum(excess, TAU - excess).sum(axis=1)
             return total
+
         return np.zeros(len(R))
+
+
+def _curvature(pitch: float) -> float:
+    """Second derivative of the sum of roll, pitch and yaw up to a pitch [rad], for joint speeds whose sum is 1 rad."""
+    steep = 1.0 / np.cos(min(pitch, STEEPEST_PITCH))
+    return float(3.0 * (0.5 * steep + 2.0 * steep * steep))
 
 
 def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> HeldRegion:
@@ -208,20 +219,18 @@ def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> H
     turning, before, after = _turning(region, label)
     T_joint_d = (T_joint_frame * region.T_w_tip.inverse()).homogeneous.copy()
     T_joint_d[:3, :3] = T_joint_d[:3, :3] @ after
+
     carried = [(joint, T_joint_d[:3, 3], 0.0)]
     somewhere = bool((np.abs(region.bounds[:3]) < ANYWHERE).any())
     levers = joint_weights(robot, carried) if joint and somewhere else np.zeros(len(robot.chain.parent))
-    turns, rows = np.zeros(len(robot.chain.parent)), _rows_to(robot, joint)
+
+    turns = np.zeros(len(robot.chain.parent))
+    rows = _rows_to(robot, joint)
     turns[rows] = ~robot.chain.prismatic[rows]
+
     T_w_world = region.T_world_w.inverse().homogeneous
     none = np.zeros(2)
     return HeldRegion(robot, region, label, link, joint, T_joint_d, T_w_world, turning, before, levers, turns, none)
-
-
-def _curvature(pitch: float) -> float:
-    """Second derivative of the sum of roll, pitch and yaw up to a pitch [rad], for joint speeds whose sum is 1 rad."""
-    steep = 1.0 / np.cos(min(pitch, STEEPEST_PITCH))
-    return float(3.0 * (0.5 * steep + 2.0 * steep * steep))
 
 
 def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tuple[str, int, Any]:
@@ -235,29 +244,25 @@ def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tu
     return name, int(target.parentJoint), target.placement * (pin.SE3.Identity() if held is None else held.pose)
 
 
-def _rows_to(robot: Robot, joint: int) -> list[int]:
-    """Rows of the chain from the base to a joint, given by its number; none to the world, 0."""
-    rows, row = list[int](), joint - 1
-    while row >= 0:
-        rows.insert(0, row)
-        row = int(robot.chain.parent[row])
-    return rows
-
-
 def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[np.float64]]:
     """What a region says of the orientation, where z has to point, and by what the frame is turned to say it so."""
     low, high = region.bounds[3:].T
-    full, single = high - low >= TAU - 1e-9, low == high
+    full = high - low >= TAU - 1e-9
+    single = low == high
     nowhere = np.zeros(3)
+
     if full.all():
         return Turning.FREE, nowhere, np.eye(3)
     if single.all():
         return Turning.BALL, nowhere, rpy_matrices(low[None])[0].T
+
     if full.sum() == 1 and single.sum() == 2:
         k = int(np.flatnonzero(full)[0])
+        # R = Rz Ry Rx, and one of the three turns freely: what stands before it, and behind it.
         x, y, z = (rpy_matrices((np.where(full, 0.0, low) * unit)[None])[0] for unit in np.eye(3))
         before, after = ((z @ y, np.eye(3)), (z, x), (np.eye(3), y @ x))[k]
         return Turning.AXIS, before[:, k], after.T @ turned_z(np.eye(3)[k])
+
     pitch = np.abs(region.bounds[4]).max()
     reached = pitch + region.orientation_tolerance + region.orientation_allowance
     if pitch > LARGEST_PITCH:
@@ -270,4 +275,15 @@ def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[n
             f"{label}: with its tolerance pitch may reach {np.degrees(reached):.1f} degrees beside ranges of roll or "
             f"yaw, more than {np.degrees(STEEPEST_PITCH):g}; take a smaller orientation_tolerance"
         )
+
     return Turning.RANGES, nowhere, np.eye(3)
+
+
+def _rows_to(robot: Robot, joint: int) -> list[int]:
+    """Rows of the chain from the base to a joint, given by its number; none to the world, 0."""
+    rows = list[int]()
+    row = joint - 1
+    while row >= 0:
+        rows.insert(0, row)
+        row = int(robot.chain.parent[row])
+    return rows

@@ -112,12 +112,15 @@ def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: V
     if region.from_start and start is not None:
         _, joint, T_joint_frame = frame_place(robot, scene, region.frame, label)
         region = region.started_at(pin.SE3(robot.joint_frames(start)[0, joint]) * T_joint_frame)
-    held, tolerance = held_region(robot, scene, region, label), region.orientation_tolerance
+
+    held = held_region(robot, scene, region, label)
+    tolerance = region.orientation_tolerance
     if held.turning != Turning.FREE and tolerance > 0.5 * np.pi:  # whose sine would shrink again
         raise InputError(
             f"{label}: orientation_tolerance is {np.degrees(tolerance):g} degrees, and more than 90 cannot be held; "
             "take less, or leave the angles free"
         )
+
     inset = np.minimum(INSET, INSET_SHARE * held.tolerances)
     held = replace(held, inset=np.maximum(inset - held.allowances, 0.0))
     _refuse_too_narrow(held)
@@ -132,6 +135,7 @@ def _refuse_too_narrow(region: HeldRegion) -> None:
     narrow = needed > region.limits(between=True)
     least = [f"{needed[0]:.1e} m"] * bool(narrow[0])
     least += [f"{np.degrees(region.angle_of(needed[1])):.1e} degrees"] * bool(narrow[1])
+
     if least:
         raise InputError(
             f"{region.label}: a tolerance so small cannot be kept along whole motions of robot "
@@ -145,14 +149,17 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
 
     ``ends``: the measures of both ends, shape (2, m, 2).
     """
-    deviations, most = region.deviations(A, B), region.limits(between=True) + ROUNDING
+    deviations = region.deviations(A, B)
+    most = region.limits(between=True) + ROUNDING
     stored: Mask = np.logical_and.reduce(ends <= region.limits() + ROUNDING, axis=(0, 2))
     near: Mask = np.logical_and.reduce(_highest(ends[0], ends[1], deviations) <= most, axis=1)
     kept = stored & near
     open_ = np.flatnonzero(stored & ~kept)
+
     for level in range(1, HALVINGS + 1):
         if len(open_) == 0:
             break
+
         parts = 2**level
         rows = _nodes(A[open_], B[open_], parts)
         measures = region.measures(rows.reshape(-1, A.shape[1])).reshape(len(open_), parts + 1, 2)
@@ -160,6 +167,7 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
         done = (highest <= most).all(axis=(1, 2))
         kept[open_[done]] = True
         open_ = open_[~done & (measures <= most).all(axis=(1, 2))]
+
     return kept
 
 

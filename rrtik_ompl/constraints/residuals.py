@@ -18,7 +18,9 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.task_region import into_range, roll_pitch_yaw
 from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
 
-DAMPING, SHARE = 1e-9, 0.5  # added to the squares of the derivatives: a constant, and so much of the squared residual
+# Added to the squares of the derivatives: a constant, and so much of the squared residual.
+DAMPING = 1e-9
+SHARE = 0.5
 LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one step
 STEPS = 60  # of a projection from anywhere
 SMALL = 1e-12  # [rad]; of a smaller angle the axis is not known, or it is none
@@ -37,7 +39,9 @@ def projected_rows(robot: Robot, constraints: HeldRegions, rows: Matrix, steps: 
     Returns:
         Where each has come to, shape (m, dof), and which are in all regions, shape (m,).
     """
-    Q, there = np.array(rows, dtype=np.float64), np.zeros(len(rows), dtype=bool)
+    Q = np.array(rows, dtype=np.float64)
+    there = np.zeros(len(rows), dtype=bool)
+
     for number in range(steps + 1):
         parts = [residual(robot, region, Q) for region in constraints.regions]
         error = np.concatenate([part[0] for part in parts], axis=1)
@@ -46,11 +50,13 @@ def projected_rows(robot: Robot, constraints: HeldRegions, rows: Matrix, steps: 
         there = square == 0.0
         if there.all() or number == steps:
             break
+
         pull = np.einsum("mkn,mk->mn", J, error)
         damped = np.swapaxes(J, 1, 2) @ J + (DAMPING + SHARE * square)[:, None, None] * np.eye(robot.dof)
         change = np.linalg.solve(damped, pull[..., None])[..., 0]
         change *= LARGEST_STEP / np.maximum(np.abs(change).max(axis=1, keepdims=True), LARGEST_STEP)
         Q = np.where(there[:, None], Q, robot.clamp(Q + change))
+
     return Q, there
 
 
@@ -65,13 +71,16 @@ def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArr
     Returns:
         Without unit, shape (m, 6), 0 where the region is kept; and shape (m, 6, dof).
     """
-    D, measures = region.displacements(Q), region.measures(Q)
+    D = region.displacements(Q)
+    measures = region.measures(Q)
     moves = measures > region.kept
     J = twists(robot, region, Q)
+
     away = D[:, :3, 3] - np.clip(D[:, :3, 3], *region.region.bounds[:3].T)
     share = 1.0 - region.aimed[0] / np.where(moves[:, 0], measures[:, 0], 1.0)
     held = (moves[:, :1] & (away != 0.0)) / reach_of(robot)
     turn, felt, kept = _turn(region, D[:, :3, :3], measures[:, 1], J[:, 3:])
+
     weights = np.hstack([held, kept * moves[:, 1:] * PER_RADIAN])
     error = np.hstack([-away * share[:, None], turn]) * weights
     return error, np.concatenate([J[:, :3], felt], axis=1) * weights[:, :, None]
@@ -92,9 +101,11 @@ def _turn(
     region: HeldRegion, R: NDArray[np.float64], measure: Vector, J: NDArray[np.float64]
 ) -> tuple[Matrix, NDArray[np.float64], Matrix]:
     """The turn into the region [rad], what turns change of it, and which of its numbers count."""
-    aimed, ones = region.aimed[1], np.ones((len(R), 3))
+    aimed = region.aimed[1]
+    ones = np.ones((len(R), 3))
     if region.turning == Turning.FREE:
         return 0.0 * ones, J, 0.0 * ones
+
     if region.turning == Turning.RANGES:
         angles = roll_pitch_yaw(R)
         away = angles - into_range(angles, *region.region.bounds[3:].T)
@@ -102,13 +113,16 @@ def _turn(
         away[np.abs(away) < SMALL] = 0.0
         share = 1.0 - aimed / np.where(measure > 0.0, measure, 1.0)
         return -away * share[:, None], rates(R) @ J, (away != 0.0).astype(np.float64)
+
     if region.turning == Turning.AXIS:
         z = R[:, :, 2]
-        axis, cosine = cross_products(z, np.tile(region.direction, (len(z), 1))), z @ region.direction
+        axis = cross_products(z, np.tile(region.direction, (len(z), 1)))
+        cosine = z @ region.direction
         J = J - z[:, :, None] * np.einsum("mi,mik->mk", z, J)[:, None]
     else:
         axis = 0.5 * np.column_stack([R[:, 1, 2] - R[:, 2, 1], R[:, 2, 0] - R[:, 0, 2], R[:, 0, 1] - R[:, 1, 0]])
         cosine = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
+
     sine = np.linalg.norm(axis, axis=1)
     known = sine >= SMALL
     axis = np.where(known[:, None], axis / np.where(known, sine, 1.0)[:, None], R[:, :, 0])
@@ -117,9 +131,14 @@ def _turn(
 
 def rates(R: NDArray[np.float64]) -> NDArray[np.float64]:
     """What angular velocities make of roll, pitch and yaw, shape (m, 3, 3)."""
-    a, b = R[:, 0, 0], R[:, 1, 0]
+    a = R[:, 0, 0]
+    b = R[:, 1, 0]
     level = np.maximum(np.hypot(a, b), STEEPEST)
-    a, b, sine, zero = a / level, b / level, -R[:, 2, 0], np.zeros(len(R))
+    a = a / level
+    b = b / level
+    sine = -R[:, 2, 0]
+    zero = np.zeros(len(R))
+
     roll = np.stack([a / level, b / level, zero])
     yaw = np.stack([sine * roll[0], sine * roll[1], zero + 1.0])
     return np.moveaxis(np.stack([roll, np.stack([-b, a, zero]), yaw]), 2, 0)

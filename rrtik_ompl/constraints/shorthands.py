@@ -15,7 +15,8 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.task_region import TaskRegion
 
 LARGEST_TILT_DEG = 80.0
-TURN_TOLERANCE, RIM_SHARE = 1e-2, 0.5  # of ranges of angles: [rad] at most, and a share of the smallest range
+TURN_TOLERANCE = 1e-2  # [rad] of ranges of angles, at most
+RIM_SHARE = 0.5  # the same of the smallest range
 
 
 def upright(
@@ -53,10 +54,12 @@ def upright(
     require(axis, str, "upright: axis")
     if axis not in ("x", "y", "z"):
         raise InputError(f"upright: axis must be x, y or z, got {axis!r}")
+
     tolerance = _tilt(tolerance_deg, "upright: tolerance_deg")
     T_frame_w = pin.SE3(turned_z(np.eye(3)["xyz".index(axis)]), np.zeros(3))
     bounds = _anywhere()
     bounds[3:5] = 0.0
+
     return TaskRegion(
         T_frame_w,
         bounds,
@@ -153,12 +156,15 @@ def orientation_of(
     bounds[3:] = 0.0
     placed = rigid(pose, "orientation_of: pose")
     allowance = np.radians(not_negative(allowance_deg, "orientation_of: allowance_deg"))
+
     if dimensions(tolerances_deg) == 0:
         tolerance = _tilt(tolerances_deg, "orientation_of: tolerances_deg")
         return TaskRegion(placed, bounds, orientation_tolerance=tolerance, frame=frame, orientation_allowance=allowance)
+
     angles = finite_array(tolerances_deg, (3,), "orientation_of: tolerances_deg")
     if (angles < 0.0).any():
         raise InputError(f"orientation_of: tolerances_deg must not be negative, got {angles.tolist()}")
+
     turns = np.radians(np.minimum(angles, 180.0))
     bounded = turns[(turns > 0.0) & (turns < np.pi)]
     rim = min(TURN_TOLERANCE, RIM_SHARE * bounded.min(initial=np.pi))  # the tolerance of the region, within the angles
@@ -189,6 +195,7 @@ def inside(
     lengths = finite_array(sides, (3,), "inside: sides")
     if (lengths < 0.0).any():
         raise InputError(f"inside: sides must not be negative, got {lengths.tolist()}")
+
     bounds = _anywhere()
     bounds[:3] = 0.5 * lengths[:, None] * [-1.0, 1.0]
     return TaskRegion(

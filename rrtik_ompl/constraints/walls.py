@@ -53,6 +53,7 @@ def _between(region: HeldRegion, start: Vector, goal: Vector) -> str:
     """The line about a wall of one region between two configurations."""
     if region.turning not in (Turning.AXIS, Turning.BALL) or region.joint == 0:
         return ""
+
     turns, end = _turns(region)
     for place, turn in enumerate(turns):
         first, last = (_angle_of(region, turn, q) for q in (start, goal))
@@ -61,6 +62,7 @@ def _between(region: HeldRegion, start: Vector, goal: Vector) -> str:
             ways = [(first, there), (there, first + TAU)]
         else:
             ways = [(min(first, last), max(first, last))]
+
         walls = [_walls(region, turns, end, place, *way) for way in ways]
         if all(map(len, walls)):
             passed = " or ".join(f"{np.degrees(each[0]):.1f}" for each in walls)
@@ -104,18 +106,22 @@ def _named(region: HeldRegion, turn: Turn) -> str:
 
 def _turns(region: HeldRegion) -> tuple[list[Turn], Rotations]:
     """The turns from the base to the frame that matter for the orientation, and the fixed rotation after the last."""
-    chain, turns, after = region.robot.chain, list[Turn](), np.eye(3)
+    chain = region.robot.chain
+    turns = list[Turn]()
+    after = np.eye(3)
     for row in region.rows:
         after = after @ chain.placement[row][:3, :3]
         if chain.prismatic[row]:
             continue
         axis = after @ chain.axis[row]
         if turns and np.linalg.norm(np.cross(turns[-1].axis, axis)) < PARALLEL:
-            last, sign = turns[-1], 1.0 if turns[-1].axis @ axis > 0.0 else -1.0
+            last = turns[-1]
+            sign = 1.0 if turns[-1].axis @ axis > 0.0 else -1.0
             turns[-1] = Turn(last.before, last.axis, (*last.joints, row), (*last.signs, sign))
         else:
             turns.append(Turn(after, chain.axis[row], (row,), (1.0,)))
             after = np.eye(3)
+
     end = after @ region.T_joint_d[:3, :3]
     if region.turning == Turning.AXIS:
         turns, end = _without_idle_turns(region, turns, end)
@@ -127,6 +133,7 @@ def _without_idle_turns(region: HeldRegion, turns: list[Turn], end: Rotations) -
     if turns and np.linalg.norm(np.cross(turns[-1].axis, end[:, 2])) < PARALLEL:
         end = turns[-1].before @ end
         turns = turns[:-1]
+
     direction = region.T_world_w[:3, :3] @ region.direction
     if turns and np.linalg.norm(np.cross(turns[0].before @ turns[0].axis, direction)) < PARALLEL:
         first = turns[0].before
@@ -144,22 +151,30 @@ def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, 
     blocked = np.zeros(len(values), dtype=bool)
     if len(others) > MOST_ANGLES or len(values) == 0:
         return blocked
+
     limit = region.tolerances[1] + region.allowances[1] + ROUNDING
     if not others:  # one turn alone, as of an arm in a plane: there is nothing to divide
         blocked |= _angles(region, turns, end, values[:, None]) > limit
         return blocked
+
     spans = np.array([_span(region, turns[number]) for number in others])
-    middles, halves = np.tile(spans.mean(axis=1), (len(values), 1)), 0.5 * (spans[:, 1] - spans[:, 0])
-    owners, passed = np.arange(len(values)), np.zeros(len(values), dtype=bool)
+    middles = np.tile(spans.mean(axis=1), (len(values), 1))
+    halves = 0.5 * (spans[:, 1] - spans[:, 0])
+    owners = np.arange(len(values))
+    passed = np.zeros(len(values), dtype=bool)
     corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * len(others))).reshape(len(others), -1).T
+
     while len(owners) and len(owners) < MOST_BOXES:
         angles = np.insert(middles, place, values[owners], axis=1)
         away = _angles(region, turns, end, angles)
         passed[owners[away <= limit]] = True
         left = (away - halves.sum() <= limit) & ~passed[owners]
-        owners, middles = owners[left], middles[left]
+        owners = owners[left]
+        middles = middles[left]
         middles = (middles[:, None] + corners * halves).reshape(-1, len(others))
-        owners, halves = np.repeat(owners, len(corners)), 0.5 * halves
+        owners = np.repeat(owners, len(corners))
+        halves = 0.5 * halves
+
     if len(owners) == 0:
         blocked = ~passed
     return blocked
@@ -167,8 +182,11 @@ def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, 
 
 def _span(region: HeldRegion, turn: Turn) -> tuple[float, float]:
     """All angles that a turn may have: a whole turn, or less if the limits of a single joint say so."""
-    chain, robot, row = region.robot.chain, region.robot, turn.joints[0]
+    chain = region.robot.chain
+    robot = region.robot
+    row = turn.joints[0]
     moving = np.flatnonzero(chain.gain[row])
+
     if (
         len(turn.joints) == 1
         and len(moving) == 1
@@ -187,6 +205,7 @@ def _angles(region: HeldRegion, turns: list[Turn], end: Rotations, angles: Matri
     for turn, values in zip(turns, angles.T, strict=True):
         R = R @ turn.before @ _rotations(turn.axis, values)
     R = R @ end
+
     if region.turning == Turning.AXIS:
         cosines = R[:, :, 2] @ region.direction
     else:
@@ -199,6 +218,7 @@ def _rotations(axis: Vector, values: Vector) -> Rotations:
     """Rotations about a unit axis, shape (m, 3, 3)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = np.sin(values)[:, None, None], np.cos(values)[:, None, None]
+    sine = np.sin(values)[:, None, None]
+    cosine = np.cos(values)[:, None, None]
     made: Rotations = np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
     return made
