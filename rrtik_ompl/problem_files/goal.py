@@ -112,6 +112,7 @@ class TaskRegionEntry(Section):
         for angle in COORDINATES[3:]:
             degrees = getattr(self, f"{angle}_deg") or [0.0, 0.0]
             bounds.append(getattr(self, angle) or np.radians(degrees).tolist())
+
         tip = pose() if self.tip is None else self.tip.build()
         return TaskRegion(
             self.frame.build(), np.array(bounds), tip, self.position_tolerance, self.orientation_tolerance

@@ -66,39 +66,48 @@ def load_motion_bench_maker(
             links may not touch by the scene but are never compared by the robot's own list.
     """
     scene_file, request_file = _pair(Path(scene_path), None if request_path is None else Path(request_path))
-    scene_document, request_document = read_yaml(scene_file), read_yaml(request_file)
+    scene_document = read_yaml(scene_file)
+    request_document = read_yaml(request_file)
     message = parse(scene_document, SceneMessage)
     request = parse(request_document, RequestMessage)
+
     with scene_document.at(("robot_state", "joint_state")):
         own_states = message.robot_state.values()
     with request_document.at(("start_state", "joint_state")):
         states = own_states | request.start_state.values()
+
     arm = _arm(scene_document, message, request_document, request, robot, states)
     if robot is not None and message.robot_model_name not in _names_of(arm):
         line = f"the scene is of robot '{message.robot_model_name}', and is read with robot '{arm.name}'"
         tell(scene_document, ("robot_model_name",), line)
+
     arm = _as_the_scene_says(scene_document, message, request_document, request, arm)
     _tell_misspelt_joints(request_document, request, arm)
+
     with request_document.at(("start_state", "joint_state")):
         start = _configuration(arm, states, "start")
     with scene_document.at(("robot_state", "joint_state")):
         shown = _configuration(arm, states | own_states, "robot_state")
     with scene_document.at(("fixed_frame_transforms",)):
         frames = Frames(arm, shown, message.fixed_frame_transforms)
+
     reader = SceneReader(arm, frames, message)
     reader.read_world(scene_document)
     reader.hold(scene_document, ("robot_state",), message.robot_state)
     frames = reader.start_at(start)
     reader.hold(request_document, ("start_state",), request.start_state)
     scene = reader.scene(scene_document)
+
     if over := passed_over(message.allowed_collision_matrix, arm):
         tell(scene_document, ("allowed_collision_matrix",), over)
+
     with scene_document.at(("world",)):
         world = World(arm, scene)
     with request_document.at(("goal_constraints", 0)):
         goal = _goal(arm, request, states, frames)
     with request_document.at(("path_constraints",)):
         regions = held_regions_of(request.path_constraints, frames)
+
     name = f"{scene_file.resolve().parent.name}/{scene_file.stem}"
     with request_document.at(("path_constraints",) if regions else ("goal_constraints", 0)):
         return Problem(world, start, goal, name=name, constraints=regions)
@@ -127,10 +136,12 @@ def _arm(
     document, key = (request_document, "start_state") if moved else (scene_document, "robot_state")
     with document.at((key, "multi_dof_joint_state")):
         base = _base_pose(request.start_state if moved else scene.robot_state)
+
     if not isinstance(robot, Robot):
         with _said_where(scene_document, request_document, scene, request):
             name = scene.robot_model_name if robot is None else robot
             return _robot(name, request_document, request, states, base)
+
     with document.at((key, "multi_dof_joint_state")):
         _refuse_another_base(robot, base)
     if fault := _another_group(robot, request.group_name):
@@ -138,6 +149,20 @@ def _arm(
     if fault := _held_elsewhere(robot, states):
         tell(request_document, ("start_state", "joint_state"), fault)
     return robot
+
+
+def _base_pose(state: RobotState) -> pin.SE3:
+    """``T_world_base`` of a state.
+
+    Raises:
+        InputError: If it is given in another frame than the world.
+    """
+    moved = state.multi_dof_joint_state
+    frame = moved.header.frame_id.removeprefix("/")
+    placed = moved.transforms[0].build() if moved.transforms else pin.SE3.Identity()
+    if frame not in ("", WORLD) and not np.array_equal(placed.homogeneous, np.eye(4)):
+        raise InputError(f"the base is given in frame '{frame}'; give it in the frame '{WORLD}'")
+    return placed
 
 
 @contextmanager
@@ -153,6 +178,7 @@ def _said_where(
         for k, each in enumerate(goal.joint_constraints):
             asked[each.joint_name] = ("goal_constraints", 0, "joint_constraints", k)
         asked[request.group_name] = ("group_name",)
+
         if error.name == scene.robot_model_name:
             with scene_document.at(("robot_model_name",)):
                 raise
@@ -179,6 +205,7 @@ def _robot(
     options: dict[str, Any] = {}
     joints = [c.joint_name for c in request.goal_constraints[0].joint_constraints]
     guessed = False
+
     if os.path.isdir(name):
         options = {"group": request.group_name}
     elif Path(name).suffix.lower() == ".urdf":
@@ -187,14 +214,17 @@ def _robot(
         options = {"joints": joints} if guessed else {}
         if os.path.isfile(semantics):
             options = {"srdf": str(semantics), "group": request.group_name}
+
     links = request.goal_constraints[0].links
     if links:
         options["tip"] = links[0]
     if not np.array_equal(base.homogeneous, np.eye(4)):
         options["base_pose"] = base
+
     free = load_robot(name, **options)
     if guessed:
         _tell_held_joints(free, document, request.group_name)
+
     held = free.movable.difference(free.joint_names)  # the start state may name joints that this robot has fixed
     locked = {joint: value for joint, value in states.items() if joint in held}
     return load_robot(name, locked=locked, **options)
@@ -220,6 +250,7 @@ def _tell_held_joints(robot: Robot, document: YamlDocument, group: str) -> None:
                 break
             if name in robot.movable:
                 held.append(name)
+
         if below_another and held:
             with document.at(("goal_constraints", 0, "joint_constraints")):
                 raise InputError(
@@ -227,15 +258,20 @@ def _tell_held_joints(robot: Robot, document: YamlDocument, group: str) -> None:
                     f"'{group}' are not known; put the SRDF beside the URDF, or name the joint in the goal"
                 )
         above += [name for name in held if name not in above]
+
     if above:
         line = f"without an SRDF its joints are taken to be those of the goal; held still: {few(above)}"
         tell(document, ("group_name",), line)
 
 
-def _names_of(robot: Robot) -> set[str]:
-    """What a scene may call a robot: by its own name, or that of its file."""
-    files = {Path(str(robot.source[kind])).stem for kind in ("urdf", "mjcf", "dh") if kind in robot.source}
-    return {robot.name, str(robot.source.get("name", robot.name)), *files}
+def _refuse_another_base(robot: Robot, base: pin.SE3) -> None:
+    """Refuse a robot of the caller that stands elsewhere than the state says."""
+    wanted = base.homogeneous
+    if np.array_equal(wanted, np.eye(4)):
+        return
+    stands = robot.fk(np.clip(np.zeros(robot.dof), robot.lower, robot.upper), robot.link_names[0]).homogeneous
+    if np.abs(wanted - stands).max() > SAME_BASE:
+        raise InputError("it moves the base, and the robot that was given stands elsewhere; give its name or its URDF")
 
 
 def _another_group(robot: Robot, group: str) -> str:
@@ -244,11 +280,13 @@ def _another_group(robot: Robot, group: str) -> str:
     kind = next((key for key in ("moveit", "urdf") if key in source), "")
     if not kind or source.get("group") == group or not {"moveit", "srdf"} & source.keys():
         return ""
+
     of_files = {key: source[key] for key in DESCRIBING if key in source and key != kind}
     try:
         moving = load_robot(source[kind], group=group, **of_files).joint_names
     except InputError as error:  # its group; all else can be loaded otherwise, or the robot would not be there
         return str(error) if getattr(error, "name", "") == group else ""
+
     if set(moving) == set(robot.joint_names):
         return ""
     return f"group '{group}' moves {few(moving)}, and the robot that was given {few(robot.joint_names)}"
@@ -265,38 +303,10 @@ def _held_elsewhere(robot: Robot, states: Mapping[str, float]) -> str:
     return ""
 
 
-def _base_pose(state: RobotState) -> pin.SE3:
-    """``T_world_base`` of a state.
-
-    Raises:
-        InputError: If it is given in another frame than the world.
-    """
-    moved = state.multi_dof_joint_state
-    frame = moved.header.frame_id.removeprefix("/")
-    placed = moved.transforms[0].build() if moved.transforms else pin.SE3.Identity()
-    if frame not in ("", WORLD) and not np.array_equal(placed.homogeneous, np.eye(4)):
-        raise InputError(f"the base is given in frame '{frame}'; give it in the frame '{WORLD}'")
-    return placed
-
-
-def _refuse_another_base(robot: Robot, base: pin.SE3) -> None:
-    """Refuse a robot of the caller that stands elsewhere than the state says."""
-    wanted = base.homogeneous
-    if np.array_equal(wanted, np.eye(4)):
-        return
-    stands = robot.fk(np.clip(np.zeros(robot.dof), robot.lower, robot.upper), robot.link_names[0]).homogeneous
-    if np.abs(wanted - stands).max() > SAME_BASE:
-        raise InputError("it moves the base, and the robot that was given stands elsewhere; give its name or its URDF")
-
-
-def _tell_misspelt_joints(document: YamlDocument, request: RequestMessage, robot: Robot) -> None:
-    """Tell of names of the start state that are like those of joints which it does not name."""
-    names = request.start_state.joint_state.name
-    unnamed = robot.movable.difference(names)
-    for k, name in enumerate(names):
-        if name not in robot.movable and (near := nearest_name(name, unnamed)):
-            line = f"no joint '{name}' of robot '{robot.name}'; it is left out{near}"
-            tell(document, ("start_state", "joint_state", "name", k), line)
+def _names_of(robot: Robot) -> set[str]:
+    """What a scene may call a robot: by its own name, or that of its file."""
+    files = {Path(str(robot.source[kind])).stem for kind in ("urdf", "mjcf", "dh") if kind in robot.source}
+    return {robot.name, str(robot.source.get("name", robot.name)), *files}
 
 
 def _as_the_scene_says(
@@ -323,10 +333,21 @@ def _ranges(wanted: Iterable[JointConstraint]) -> dict[str, list[float]]:
     """What joints keep to, by name; of several constraints of one joint what all of them allow."""
     ranges: dict[str, list[float]] = {}
     for each in wanted:
-        low, high = each.position - each.tolerance_below, each.position + each.tolerance_above
+        low = each.position - each.tolerance_below
+        high = each.position + each.tolerance_above
         first, last = ranges.get(each.joint_name, (low, high))
         ranges[each.joint_name] = [max(low, first), min(high, last)]
     return ranges
+
+
+def _tell_misspelt_joints(document: YamlDocument, request: RequestMessage, robot: Robot) -> None:
+    """Tell of names of the start state that are like those of joints which it does not name."""
+    names = request.start_state.joint_state.name
+    unnamed = robot.movable.difference(names)
+    for k, name in enumerate(names):
+        if name not in robot.movable and (near := nearest_name(name, unnamed)):
+            line = f"no joint '{name}' of robot '{robot.name}'; it is left out{near}"
+            tell(document, ("start_state", "joint_state", "name", k), line)
 
 
 def _configuration(robot: Robot, values: Mapping[str, float], what: str) -> Vector:
@@ -340,6 +361,7 @@ def _goal(robot: Robot, request: RequestMessage, states: Mapping[str, float], fr
     wanted = request.goal_constraints[0]
     if not wanted.joint_constraints or wanted.links:
         return tip_goal(wanted, frames)
+
     values: dict[str, float] = {}
     for each in wanted.joint_constraints:
         name = each.joint_name
@@ -347,12 +369,14 @@ def _goal(robot: Robot, request: RequestMessage, states: Mapping[str, float], fr
             raise InputError(f"joint '{name}' has two positions; leave one of them out")
         if name not in robot.joint_names:
             _refuse_unmoved(robot, each, states.get(name), request.group_name)
+
     missing = [joint for joint in robot.joint_names if joint not in values]
     if missing:
         raise InputError(
             f"no value for joint '{missing[0]}' of group '{request.group_name}'; a goal that leaves joints free "
             f"is not read: give one for each of {', '.join(robot.joint_names)}"
         )
+
     return JointGoal(_configuration(robot, values, "goal"))
 
 
@@ -361,6 +385,7 @@ def _refuse_unmoved(robot: Robot, wanted: JointConstraint, value: float | None, 
     name = wanted.joint_name
     if name not in robot.movable:
         raise UnknownNameError(f"joint of robot '{robot.name}'", name, robot.movable)
+
     low = wanted.position - wanted.tolerance_below
     high = wanted.position + wanted.tolerance_above
     if value is None or not low - LIMIT_TOLERANCE <= value <= high + LIMIT_TOLERANCE:

@@ -43,11 +43,13 @@ class Frames:
         self._robot = robot
         self._q = q
         self._known: dict[str, _Carried] = {"": _STANDING, WORLD: _STANDING}
+
         for each in self._parents_first(fixed):
             parent = _bare(each.header.frame_id)
             if not self._has(parent):  # the frame in which all others are given is the world by another name
                 self._known[parent] = _STANDING
             self.add(_bare(each.child_frame_id), self.pose(parent) * each.transform.build(), link=self.link(parent))
+
         if not self._has(robot.name):  # some files give coordinates in a frame of the robot's name
             self._known[robot.name] = _STANDING
 
@@ -67,6 +69,7 @@ class Frames:
         if name in self._known:
             known = self._known[name]
             return self._link_pose(known.link) * known.pose
+
         if not self._robot.model.existFrame(name):
             raise UnknownNameError("frame", name, filter(None, (*self._known, *self._robot.link_names)))
         return self._link_pose(name)

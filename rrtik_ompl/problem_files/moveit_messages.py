@@ -148,7 +148,8 @@ class Primitive(Message):
         self.check()
         kind = KNOWN[self.type]
         sizes = self._counts()
-        rest, values = iter([factor * size for size in self.dimensions]), {}
+        rest = iter([factor * size for size in self.dimensions])
+        values = {}
         for name in kind.moveit:
             values[name] = next(rest) if sizes[name] == 1 else [next(rest) for _ in range(sizes[name])]
         return kind(**values)
@@ -185,6 +186,7 @@ class CollisionObject(Message):
         """
         for solid in self.primitives:
             solid.check()
+
         if self.meshes or self.planes:
             raise InputError(f"'{self.id}': meshes and planes are not read; write them as box, cylinder or sphere")
         if len(self.primitive_poses) != len(self.primitives) and (self.primitive_poses or not self.pose.given):
@@ -213,9 +215,11 @@ class AllowedMatrix(Message):
         Raises:
             InputError: If it is not square.
         """
-        rows, count = self.entry_values, len(self.entry_names)
+        rows = self.entry_values
+        count = len(self.entry_names)
         if len(rows) != count or any(len(row) != count for row in rows):
             raise InputError(f"entry_values must be a table of {count} x {count}, one row and column per entry name")
+
         found = {}
         for i, first in enumerate(self.entry_names):
             for j, second in enumerate(self.entry_names[:i]):
@@ -228,7 +232,8 @@ class AllowedMatrix(Message):
         Raises:
             InputError: If there is not a value for each name.
         """
-        names, values = self.default_entry_names, self.default_entry_values
+        names = self.default_entry_names
+        values = self.default_entry_values
         if len(names) != len(values):
             raise InputError(f"{len(names)} default_entry_names, but {len(values)} default_entry_values")
         return dict(zip(names, values, strict=True))
@@ -314,7 +319,8 @@ class RobotState(Message):
         Raises:
             InputError: If there is not a position for each name.
         """
-        names, positions = self.joint_state.name, self.joint_state.position
+        names = self.joint_state.name
+        positions = self.joint_state.position
         if len(names) != len(positions):
             raise InputError(f"{len(names)} joint names, but {len(positions)} positions; give one position for each")
         return dict(zip(names, positions, strict=True))
@@ -395,7 +401,8 @@ class PositionConstraint(Message):
         Raises:
             InputError: If there is not exactly one, or it is neither a sphere nor a box.
         """
-        solids, places = self.constraint_region.primitives, self.constraint_region.primitive_poses
+        solids = self.constraint_region.primitives
+        places = self.constraint_region.primitive_poses
         if len(solids) != 1 or len(places) != 1 or solids[0].type not in ("sphere", "box"):
             raise InputError("position_constraints: only a region of one sphere or one box can be read")
         solids[0].check()

@@ -26,18 +26,23 @@ def tip_goal(wanted: Constraints, frames: Frames) -> Goal:
     """
     if len(wanted.position_constraints) != 1 or len(wanted.orientation_constraints) > 1 or wanted.joint_constraints:
         raise InputError("goal: give joint_constraints, or one position and at most one orientation constraint")
+
     place = wanted.position_constraints[0]
     turn = next(iter(wanted.orientation_constraints), None)
     if turn is not None and turn.link_name != place.link_name:
         raise InputError(f"goal: constraints on two links, '{place.link_name}' and '{turn.link_name}'; give one link")
+
     solid, _ = place.volume()
     ranges, angle = (None, 0.0) if turn is None else _angles(turn)
+
     if solid.type == "sphere" and not any(place.offset):
-        centre, radius = _placed(place, frames).translation, solid.dimensions[0]
+        centre = _placed(place, frames).translation
+        radius = solid.dimensions[0]
         if turn is None or ranges is None:
             return PositionGoal(centre, radius)
         if not ranges.any():
             return PoseGoal(pin.SE3(_oriented(turn, frames), centre), radius, angle)
+
     return _goal_region(place, turn, frames)
 
 
@@ -53,12 +58,14 @@ def held_regions_of(wanted: Constraints, frames: Frames) -> list[TaskRegion]:
             raise InputError(
                 f"path_constraints: frame '{header.frame_id}' moves with the arm; give them in a frame that stands"
             )
+
     regions = []
     for place in wanted.position_constraints:
         bounds, tolerance = _sides(place)
         offset = pin.SE3(np.eye(3), -np.array(place.offset))
         region = TaskRegion(_placed(place, frames), _bounds(bounds, None), offset, tolerance, frame=place.link_name)
         regions.append(region)
+
     for turn in wanted.orientation_constraints:
         ranges, angle = _angles(turn, ranged=True)
         if ranges is None:
@@ -67,24 +74,31 @@ def held_regions_of(wanted: Constraints, frames: Frames) -> list[TaskRegion]:
         T_world_w = pin.SE3(_oriented(turn, frames), np.zeros(3))
         bounds = _bounds(anywhere, ranges)
         regions.append(TaskRegion(T_world_w, bounds, orientation_tolerance=angle, frame=turn.link_name))
+
     return regions
 
 
 def _goal_region(place: PositionConstraint, turn: OrientationConstraint | None, frames: Frames) -> TaskRegion:
     """A goal that needs a region: a box, a point beside the link's origin, or an axis that is free."""
-    box, (bounds, tolerance) = _placed(place, frames), _sides(place)
+    box = _placed(place, frames)
+    bounds, tolerance = _sides(place)
     offset = -np.array(place.offset)
     ranges, angle = (None, 1e-2) if turn is None else _angles(turn)
+
     if turn is None or ranges is None:
         return TaskRegion(box, _bounds(bounds, None), pin.SE3(np.eye(3), offset), tolerance, angle or 1e-2)
+
     if offset.any():
         raise InputError("goal: a target_point_offset together with an orientation is not read; give the link's origin")
     R = _oriented(turn, frames)
+
     if not bounds.any():  # a ball has no axes: those of the orientation will do
         T_world_w = pin.SE3(R, box.translation)
         return TaskRegion(T_world_w, _bounds(bounds, ranges), pin.SE3.Identity(), tolerance, angle)
+
     if ranges.any():
         raise InputError("goal: a box together with an axis that is free is not read; give a sphere, or no free axis")
+
     T_w_tip = pin.SE3(box.rotation.T @ R, np.zeros(3))
     return TaskRegion(box, _bounds(bounds, ranges), T_w_tip, tolerance, angle)
 
@@ -128,15 +142,20 @@ def _angles(turn: OrientationConstraint, *, ranged: bool = False) -> tuple[Matri
         return None, 0.0
     if free.sum() == 2:
         raise InputError("orientation_constraints: two axes that are free are not read; leave one free, or all")
-    ranges, widest = np.zeros((3, 2)), int(np.argmax(tolerances))
+
+    ranges = np.zeros((3, 2))
+    widest = int(np.argmax(tolerances))
     others = float(np.delete(tolerances, widest).min())
+
     # an angle about an axis, as a vector, is longer than the tilt of the frame by up to pi / 2
     least = others if turn.parameterization == 0 else others / (0.5 * np.pi)
     least = min(least, LARGEST)
+
     if free.any():
         ranges[widest] = -np.pi, np.pi
     elif ranged and widest != 1 and turn.parameterization == 0 and tolerances[widest] > 2.0 * least:
         ranges[widest] = (tolerances[widest] - least) * np.array([-1.0, 1.0])
     else:
         least = min(others, LARGEST)  # the angle itself bounds all three, in either form
+
     return ranges, least

@@ -53,7 +53,9 @@ class SceneReader:
     """
 
     def __init__(self, robot: Robot, frames: Frames, message: SceneMessage) -> None:
-        self._robot, self._frames, self._message = robot, frames, message
+        self._robot = robot
+        self._frames = frames
+        self._message = message
         self._factors = {each.link_name: each.scale for each in message.link_scale}
         self._objects: dict[str, _Object] = {}
         self._held: dict[str, list[AttachedObject]] = {}
@@ -99,30 +101,38 @@ class SceneReader:
             InputError: If names are used twice, or the table of allowed collisions is none.
         """
         names: dict[str, list[str]] = {}
+
         obstacles = []
         for name, item in self._objects.items():
             names[name] = _numbered(name, len(item.shapes))
             for part, (solid, place) in zip(names[name], item.shapes, strict=True):
                 obstacles.append(Obstacle(part, solid.build(), item.pose * place))
+
         if self._map is not None:
             obstacles.append(self._map)
             names[OCTOMAP] = [OCTOMAP]
+
         attached = []
         for name, parts in self._held.items():
             names[name] = [part.name for part in parts]
             attached += parts
+
         with document.at(("world",)):
             scene = Scene(tuple(obstacles), tuple(attached))
+
         with document.at(("allowed_collision_matrix",)):
             matrix = self._message.allowed_collision_matrix
             allowed = _allowed(matrix, self._robot, names)
+
             once = {item.id for item in self._message.world.collision_objects}
             known = {*self._robot.link_names, *names, *once, OCTOMAP}
             unknown = dict(_unknown_entries(matrix, known))
-            for name, key in list(unknown.items())[:1]:
+            if unknown:
+                name, key = next(iter(unknown.items()))
                 others = f" (so are {few(list(unknown)[1:], SHOWN)})" if len(unknown) > 1 else ""
                 line = f"no link or object '{name}'; what is said of it is left out{others}{nearest_name(name, known)}"
                 tell(document, ("allowed_collision_matrix", *key), line)
+
             return Scene(scene.obstacles, scene.attached, allowed)
 
     def _do(self, item: CollisionObject) -> None:
@@ -132,9 +142,11 @@ class SceneReader:
                 self._objects.pop(name, None)
                 self._frames.forget(name)
             return
+
         _named(item)
         item.check()
         known = self._objects.get(item.id)
+
         if item.operation == "move":
             if known is None:
                 raise UnknownNameError("object to move", item.id, self._objects)
@@ -148,6 +160,7 @@ class SceneReader:
             raise InputError(f"scene: the name '{item.id}' is used 2 times; names must differ")
         else:
             self._objects[item.id] = self._built(item)
+
         placed = self._objects[item.id]
         self._frames.add(item.id, _frame_of(item, placed), placed.parts)
 
@@ -177,6 +190,7 @@ class SceneReader:
             raise InputError(f"'{item.object.id}': an attached object is added; leave out those that are not held")
         if not self._robot.model.existFrame(item.link_name) or item.link_name not in self._robot.link_names:
             raise UnknownNameError(f"link of robot '{self._robot.name}'", item.link_name, self._robot.link_names)
+
         name = item.object.id
         if item.object.primitives:
             taken = self._built(item.object)
@@ -184,9 +198,11 @@ class SceneReader:
             taken = self._objects[name]
         else:
             raise InputError(f"'{name}' has no primitives, and the world has no object of that name")
+
         self._objects.pop(name, None)
         self._frames.forget(name)
         T_link_object = self._frames.pose(item.link_name).actInv(taken.pose)
+
         allow = tuple(link for link in item.touch_links if link in self._robot.link_names and link != item.link_name)
         thick = self._robot.padding.get(item.link_name, 0.0)
         factor = self._factors.get(item.link_name, 1.0)
@@ -194,6 +210,7 @@ class SceneReader:
             AttachedObject(part, item.link_name, solid.build(factor), T_link_object * place, allow, thick)
             for part, (solid, place) in zip(_numbered(name, len(taken.shapes)), taken.shapes, strict=True)
         ]
+
         frame = _frame_of(item.object, taken)
         self._frames.add(name, frame, taken.parts, link=item.link_name)
 
@@ -245,6 +262,7 @@ def _mapped(placed: PlacedOctomap, frames: Frames) -> Obstacle | None:
         raise InputError("data: only binary maps are read; write it with binary: true, or as a .bt file")
     if not all(-128 <= value <= 255 for value in tree.data):
         raise InputError("data: must be bytes")
+
     body = np.array(tree.data, dtype=np.int64).astype(np.uint8).tobytes()
     centres, sides = cells_of_tree(body, tree.resolution, tree.id, "data")
     pose = frames.pose(placed.header.frame_id) * placed.origin.build()
@@ -253,15 +271,29 @@ def _mapped(placed: PlacedOctomap, frames: Frames) -> Obstacle | None:
 
 def _allowed(matrix: AllowedMatrix, robot: Robot, names: dict[str, list[str]]) -> tuple[tuple[str, str], ...]:
     """Pairs of links and solids that may touch: by the table, or else by what is said of one name and all others."""
-    links, stated = robot.link_names, matrix.stated()
+    links = robot.link_names
+    stated = matrix.stated()
     allowed = [pair for pair, free in stated.items() if free and {*pair} <= {*links, *names}]
     allowed += _by_default(matrix, [*links, *names])
+
     found = []
     for first, second in allowed:
         between_links = first in links and second in links
         if not (between_links and robot.allowed_collisions):
             found += [(a, b) for a in names.get(first, [first]) for b in names.get(second, [second])]
     return tuple(found)
+
+
+def _by_default(matrix: AllowedMatrix, every: list[str]) -> list[tuple[str, str]]:
+    """Pairs that may touch by what is said of one of them, or of both, and of which the table says nothing."""
+    defaults = matrix.defaults()
+    stated = {frozenset(pair) for pair in matrix.stated()}
+    found = []
+    for first, second in combinations(every, 2):
+        said = [defaults[name] for name in (first, second) if name in defaults]
+        if said and all(said) and frozenset((first, second)) not in stated:
+            found.append((first, second))
+    return found
 
 
 def _unknown_entries(matrix: AllowedMatrix, known: Collection[str]) -> Iterator[tuple[str, Location]]:
@@ -278,20 +310,10 @@ def _unknown_entries(matrix: AllowedMatrix, known: Collection[str]) -> Iterator[
         "entry_names": (matrix.entry_names, matrix.entry_names if overrides else free),
         "default_entry_names": (matrix.default_entry_names, [name for name, allowed in defaults.items() if allowed]),
     }
+
     for key, (names, deciding) in lists.items():
         for k, name in enumerate(names):
             if name in known or name not in deciding:
                 continue
             if not set(get_close_matches(name, known, n=1)) & set(names):
                 yield name, (key, k)
-
-
-def _by_default(matrix: AllowedMatrix, every: list[str]) -> list[tuple[str, str]]:
-    """Pairs that may touch by what is said of one of them, or of both, and of which the table says nothing."""
-    defaults, stated = matrix.defaults(), {frozenset(pair) for pair in matrix.stated()}
-    found = []
-    for first, second in combinations(every, 2):
-        said = [defaults[name] for name in (first, second) if name in defaults]
-        if said and all(said) and frozenset((first, second)) not in stated:
-            found.append((first, second))
-    return found

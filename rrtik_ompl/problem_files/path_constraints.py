@@ -215,7 +215,8 @@ def _region_data(region: TaskRegion) -> dict[str, Any]:
 
 
 def _upright_data(region: TaskRegion) -> dict[str, Any]:
-    seen, free = region.T_world_w.rotation[:, 2], region.bounds
+    seen = region.T_world_w.rotation[:, 2]
+    free = region.bounds
     axis = int(np.argmax(seen))
     usual = (
         np.array_equal(free[3:5], np.zeros((2, 2)))
@@ -223,6 +224,7 @@ def _upright_data(region: TaskRegion) -> dict[str, Any]:
     )
     if seen[axis] < 1.0 - 1e-9 or not usual:
         raise InputError("path constraint: a file cannot say a region from_start other than upright")
+
     tolerance = float(np.degrees(region.orientation_tolerance))
     data: dict[str, Any] = {"axis": "xyz"[axis], "tolerance_deg": tolerance}
     if region.orientation_allowance:

@@ -48,10 +48,12 @@ def load_poses(path: str | os.PathLike[str]) -> NDArray[np.float64]:
         raise InputError(f"{path}: unknown ending '{ending}' for poses; use {', '.join(FORMATS)}")
     if ending == ".csv":
         return _from_csv(path)
+
     document = read_yaml(path)
     entry = parse(document, PosesFile)
     if entry.points is not None:
         return np.array(entry.points)
+
     rows = []
     for number, each in enumerate(entry.poses or ()):
         with document.at(("poses", number)):
@@ -64,12 +66,14 @@ def _from_csv(path: str | os.PathLike[str]) -> NDArray[np.float64]:
         lines = [row for row in csv.reader(io.StringIO(read_text(path))) if any(cell.strip() for cell in row)]
     except csv.Error as error:
         raise InputError(f"{path}: not a table of poses: {error}") from None
+
     names = [name.strip().lower() for name in lines[0]] if lines else []
     extra = tuple(name for name in names if name not in POSITION)
     if sorted(names) not in [sorted(POSITION + more) for more in ((), QUATERNION, ANGLES)]:
         raise InputError(f"{path}:1: expected a line of column names {COLUMNS}; got {', '.join(names) or 'nothing'}")
     if len(lines) < 2:
         raise InputError(f"{path}: holds column names only; expected one pose a line below them")
+
     rows = [_numbers(path, number, row, names) for number, row in enumerate(lines[1:], start=2)]
     if not extra:
         return np.array([[row[name] for name in POSITION] for row in rows])

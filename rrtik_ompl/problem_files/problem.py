@@ -64,6 +64,7 @@ def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
         from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker  # takes long, and few need it
 
         return load_motion_bench_maker(path, robot=robot)
+
     entry = parse(document, ProblemFile)
     settings = settings_of(document, entry, robot)
     with document.at(("scene",)):
@@ -71,6 +72,7 @@ def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
     start, goal = ends_of(document, entry, settings.robot)
     planner = planner_of(document, entry.planner)
     constraints = build_constraints(document, entry.path_constraints, settings.robot)
+
     with document.at(("path_constraints",)) if constraints else nullcontext():
         try:
             return Problem(world, start, goal, name=path.stem, planner=planner, constraints=constraints)
@@ -78,6 +80,11 @@ def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
             line = document.lines[(error.part,)]
             error.args = (f"{path}:{line}: {error}",)
             raise
+
+
+def _is_motion_bench_maker(data: Mapping[str, Any]) -> bool:
+    """Whether the top level of a YAML file has the keys of a PlanningScene or of a MotionPlanRequest."""
+    return "version" not in data and any(key in data for key in ("robot_model_name", "goal_constraints"))
 
 
 def save_problem(problem: Problem, path: FilePath) -> None:
@@ -112,8 +119,3 @@ def problem_data(problem: Problem, folder: Path) -> dict[str, Any]:
     held = [constraint_data(region) for region in problem.constraints]
     data |= {"path_constraints": held} if held else {}
     return data if problem.planner is None else data | {"planner": problem.planner}
-
-
-def _is_motion_bench_maker(data: Mapping[str, Any]) -> bool:
-    """Whether the top level of a YAML file has the keys of a PlanningScene or of a MotionPlanRequest."""
-    return "version" not in data and any(key in data for key in ("robot_model_name", "goal_constraints"))

@@ -58,6 +58,40 @@ def load_unchecked(name_or_file: FilePath) -> tuple[WorldSettings, Vector, Goal]
     return settings, *ends_of(document, entry, settings.robot)
 
 
+def problem_document(path: Path) -> YamlDocument:
+    """The content of a problem file; whoever names a path alone is told what is missing."""
+    document = None if path.suffix.lower() in ONLY_PATHS and os.path.isfile(path) else read_yaml(path)
+    if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
+        name = path.name
+        raise InputError(f"{path}: a path, not a problem; name its problem before it: rrtik check PROBLEM {name}")
+
+    if isinstance(document.data, dict) and "goal" not in document.data:
+        for key, what in OF_TASKS.items():
+            if key in document.data:
+                raise InputError(f"{path}: a task, not a problem: {what}; use rrtik task {path.name}")
+    return document
+
+
+def problem_path(name_or_file: FilePath) -> Path:
+    """The file of a problem: a bare word is the name of a shipped one, or a file if there is no such name.
+
+    Raises:
+        UnknownNameError: If it is a bare word, and neither.
+    """
+    path = file_name(name_or_file)
+    if not isinstance(name_or_file, str) or path.suffix or len(path.parts) > 1:
+        return path
+
+    try:
+        return Path(find_problem(name_or_file))
+    except UnknownNameError:
+        if os.path.isfile(path):
+            return path
+        if name_or_file in task_files():
+            raise InputError(f"'{name_or_file}' is a task, not a problem: {NO_GOAL}; use rrtik task {path}") from None
+        raise
+
+
 def ends_of(document: YamlDocument, entry: ProblemFile, robot: Robot) -> tuple[Vector, Goal]:
     """Start, shape (dof,), and goal."""
     with document.at(("start",)):
@@ -89,38 +123,6 @@ def planner_of(document: YamlDocument, name: str | None) -> str | None:
                 raise InputError(f"'{name}': a problem file runs no code; give it with --planner")
             options_of(name)
     return name
-
-
-def problem_document(path: Path) -> YamlDocument:
-    """The content of a problem file; whoever names a path alone is told what is missing."""
-    document = None if path.suffix.lower() in ONLY_PATHS and os.path.isfile(path) else read_yaml(path)
-    if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
-        name = path.name
-        raise InputError(f"{path}: a path, not a problem; name its problem before it: rrtik check PROBLEM {name}")
-    if isinstance(document.data, dict) and "goal" not in document.data:
-        for key, what in OF_TASKS.items():
-            if key in document.data:
-                raise InputError(f"{path}: a task, not a problem: {what}; use rrtik task {path.name}")
-    return document
-
-
-def problem_path(name_or_file: FilePath) -> Path:
-    """The file of a problem: a bare word is the name of a shipped one, or a file if there is no such name.
-
-    Raises:
-        UnknownNameError: If it is a bare word, and neither.
-    """
-    path = file_name(name_or_file)
-    if not isinstance(name_or_file, str) or path.suffix or len(path.parts) > 1:
-        return path
-    try:
-        return Path(find_problem(name_or_file))
-    except UnknownNameError:
-        if os.path.isfile(path):
-            return path
-        if name_or_file in task_files():
-            raise InputError(f"'{name_or_file}' is a task, not a problem: {NO_GOAL}; use rrtik task {path}") from None
-        raise
 
 
 def problem_schema() -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
@@ -22,6 +21,7 @@ from rrtik_ompl.files.sections import (
     told_apart_by,
 )
 from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
+from rrtik_ompl.problem_files.shapes import relative_name
 
 PATH_KEYS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf", "packages")
 
@@ -151,12 +151,10 @@ def robot_data(source: Mapping[str, Any], folder: Path) -> dict[str, Any] | str:
     for key, value in source.items():
         if isinstance(value, pin.SE3):
             data[key] = pose_data(value)
+        elif key in PATH_KEYS and isinstance(value, list):
+            data[key] = [relative_name(each, folder) for each in value]
         elif key in PATH_KEYS:
-            data[key] = [_relative(v, folder) for v in value] if isinstance(value, list) else _relative(value, folder)
+            data[key] = relative_name(value, folder)
         else:
             data[key] = value
     return str(data["name"]) if set(data) == {"name"} else data
-
-
-def _relative(path: str, folder: Path) -> str:
-    return Path(os.path.relpath(os.path.realpath(path), os.path.realpath(folder))).as_posix()

@@ -89,7 +89,8 @@ class GoalMotion:
     def __init__(self, times: Vector, rows: Matrix) -> None:
         if (np.diff(times) <= 0.0).any():
             raise InputError(f"run: goal: times must increase, got {times.tolist()}")
-        self._times, self._rows = frozen(times), frozen(rows)
+        self._times = frozen(times)
+        self._rows = frozen(rows)
 
     def __call__(self, time: float) -> Vector:
         """The configuration at ``time`` [s], shape (n,)."""

@@ -121,7 +121,8 @@ class AttachedEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
 
     def build(self, folder: Path) -> AttachedObject:
         """The attached object."""
-        shape, pose = self.build_shape(folder), self.build_pose()
+        shape = self.build_shape(folder)
+        pose = self.build_pose()
         return AttachedObject(self.name, self.link, shape, pose, tuple(self.allow), self.padding, self.margin)
 
 
@@ -159,13 +160,17 @@ class SceneEntry(Section):
             InputError: If a shape or pose makes no sense, a mesh cannot be read, or a name stands twice.
         """
         folder = document.path.parent
-        obstacles, attached = [], []
+
+        obstacles = []
         for k, entry in enumerate(self.obstacles):
             with document.at((*location, "obstacles", k)):
                 obstacles.append(entry.build(folder, self.margin))
+
+        attached = []
         for k, held in enumerate(self.attached):
             with document.at((*location, "attached", k)):
                 attached.append(held.build(folder))
+
         with document.at(location):
             allowed = tuple((a, b) for a, b in self.allowed_collisions)
             contacts = tuple(contact.build() for contact in self.contacts)

@@ -203,6 +203,7 @@ class ShapeEntry(_ShapeKeys):
             return row.read(folder / value.file, value)
         if row is not None:
             return row.read(folder / str(value), self)
+
         return kind(**dict(self._values(kind, value)))
 
     def _values(self, kind: type[Shape], value: object) -> Iterator[tuple[str, Any]]:
@@ -233,12 +234,13 @@ def _file_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
     of_file: Any = shape  # all kinds of the table have a source and a scale
     if not of_file.source:
         raise InputError(f"'{name}': a {row.noun} made in memory cannot be written; {row.remedy}")
-    file = _relative(of_file.source, folder)
+    file = relative_name(of_file.source, folder)
     beside = ({} if of_file.scale == 1.0 else {"scale": of_file.scale}) | row.details(shape)
     if row.entry is None:
         return {shape.key: file, **beside}
     return {shape.key: {"file": file, **beside}}
 
 
-def _relative(source: str, folder: Path) -> str:
-    return Path(os.path.relpath(os.path.realpath(source), os.path.realpath(folder))).as_posix()
+def relative_name(path: str, folder: Path) -> str:
+    """A file as another one in ``folder`` names it; links on the way to either are followed."""
+    return Path(os.path.relpath(os.path.realpath(path), os.path.realpath(folder))).as_posix()
