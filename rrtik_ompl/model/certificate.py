@@ -52,7 +52,8 @@ class MotionEntries:
     intervals: NDArray[np.int64]
     normals: Matrix
 
-    __reduce__, __repr__ = as_value, in_one_line
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +88,8 @@ class Certificate:
     motions: tuple[MotionEntries, ...]
     version: int = VERSION
 
-    __reduce__, __repr__ = as_value, in_one_line
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
     @property
     def entries(self) -> int:
@@ -102,6 +104,7 @@ class Certificate:
             rows = [row if row[1] >= 0 else [*row[0:3:2], *row[4:]] for row in rows]
             ways = [way if any(way) else [] for way in motion.normals.tolist()]
             motions.append([row + way for row, way in zip(rows, ways, strict=True)])
+
         return {
             "version": self.version,
             "kind": KIND,
@@ -143,6 +146,18 @@ def load_certificate(path: str | os.PathLike[str]) -> Certificate:
         raise in_file(path, error) from None
 
 
+def _inside(text: str) -> dict[str, Any]:
+    """The object of a certificate's file, or of the certificate in a path's."""
+    try:
+        return json_object(text, KIND, "motions")
+    except InputError as error:
+        try:
+            found = json_object(text, "joint_path", IN_PATHS)[IN_PATHS]
+        except InputError:
+            raise error from None
+        return checked_object(found, KIND, "motions")
+
+
 def certificate_beside(path: str | os.PathLike[str]) -> Certificate | None:
     """The certificate that a path's file has beside its waypoints; None if it has none.
 
@@ -156,18 +171,6 @@ def certificate_beside(path: str | os.PathLike[str]) -> Certificate | None:
         return None if found is None else from_document(checked_object(found, KIND, "motions"))
     except InputError as error:
         raise in_file(path, error) from None
-
-
-def _inside(text: str) -> dict[str, Any]:
-    """The object of a certificate's file, or of the certificate in a path's."""
-    try:
-        return json_object(text, KIND, "motions")
-    except InputError as error:
-        try:
-            found = json_object(text, "joint_path", IN_PATHS)[IN_PATHS]
-        except InputError:
-            raise error from None
-        return checked_object(found, KIND, "motions")
 
 
 def from_document(document: dict[str, Any]) -> Certificate:
@@ -184,11 +187,15 @@ def from_document(document: dict[str, Any]) -> Certificate:
     for name in ("robot", "robot_digest", "scene_digest"):
         if not isinstance(document[name], str):
             raise InputError(f"{name}: expected text")
+
     clearance, self_margin = (_distance(document[name], name) for name in ("clearance", "self_margin"))
     waypoints = _waypoints(document["waypoints"])
-    motions, count = document["motions"], max(1, len(waypoints) - 1)
+
+    motions = document["motions"]
+    count = max(1, len(waypoints) - 1)
     if not isinstance(motions, list) or len(motions) != count:
         raise InputError(f"motions: expected a list of {count}, one for each motion between waypoints")
+
     entries = tuple(_entries(motion, f"motions[{k}]") for k, motion in enumerate(motions))
     names = (document["robot"], document["robot_digest"], document["scene_digest"])
     return Certificate(*names, clearance, self_margin, waypoints, entries)
@@ -213,6 +220,7 @@ def _entries(rows: object, where: str) -> MotionEntries:
     for k, row in enumerate(rows):
         if fault := _entry_fault(row):
             raise InputError(f"{where}[{k}]: {fault}")
+
     whole = np.array([_six(row) for row in rows], dtype=np.int64).reshape(-1, WHOLE)
     normals = np.array([row[WHOLE:] or [0.0] * 3 for row in rows], dtype=np.float64).reshape(-1, 3)
     return MotionEntries(frozen(whole[:, :4], np.int64), frozen(whole[:, 4:], np.int64), frozen(normals))

@@ -26,7 +26,8 @@ from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.model.tip_distance import metres_per_radian
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
-NO_BOX, MOST = frozen([0.0, 0.0, 0.0]), 100_000  # goals of a set
+NO_BOX = frozen([0.0, 0.0, 0.0])
+MOST_GOALS = 100_000  # of a set
 
 
 def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
@@ -37,11 +38,6 @@ def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.flo
     turned = wrapped(difference)
     shortest: NDArray[np.float64] = np.where(robot.continuous, turned, difference)
     return shortest
-
-
-def _with_poses(part: AnyPart) -> GoalPart:
-    matrix = isinstance(part, np.ndarray) and part.ndim > 1  # a row may be a configuration
-    return PoseGoal(part) if matrix or isinstance(part, pin.SE3) else part  # type: ignore[return-value]
 
 
 @lru_cache(maxsize=64)
@@ -209,17 +205,22 @@ class GoalSet(TipGoal):
     def __init__(
         self, members: Iterable[AnyPart], free_rotation_axis: FrameAxis | None = None, box: ArrayLike = NO_BOX
     ) -> None:
-        goals = tuple(map(_with_poses, listed(members, "goal set", MOST))) if isinstance(members, Iterable) else ()
+        goals: tuple[GoalPart, ...] = ()
+        if isinstance(members, Iterable):
+            goals = tuple(map(_with_poses, listed(members, "goal set", MOST_GOALS)))
         if not goals or not all(isinstance(goal, GoalPart) for goal in goals):
             kinds = "a list of at least one pose or position or region of the tip"
             raise InputError(f"goal: a set is {kinds}; of configurations plan to each, or take PoseGoal(robot.fk(q))")
         if free_rotation_axis is not None and str(free_rotation_axis) not in ("x", "y", "z"):
             raise InputError(f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}; or a TaskRegion")
+
         sides = finite_array(box, (3,), "goal box")
         if (sides < 0.0).any():
             raise InputError(f"goal box must not have negative sides, got {sides.tolist()}")
+
         freed = free_rotation_axis is not None or bool(sides.any())
         parts = (goal.freed(free_rotation_axis, sides) for goal in goals) if freed else goals
+
         object.__setattr__(self, "members", goals)
         object.__setattr__(self, "free_rotation_axis", free_rotation_axis)
         object.__setattr__(self, "box", frozen(sides))
@@ -237,7 +238,8 @@ class GoalSet(TipGoal):
 
     def alone(self, number: int) -> TipGoal:
         """One of its parts as a goal of its own: of a pose that may be turned, but not shifted, a set of one."""
-        member, part = self.members[number], self.parts[number]
+        member = self.members[number]
+        part = self.parts[number]
         if part is member or self.box.any():
             return part
         return GoalSet([member], self.free_rotation_axis)
@@ -301,11 +303,13 @@ class MultiGoal(Goal):
     def __init__(self, goals: Mapping[str, AnyPart]) -> None:
         if not isinstance(goals, Mapping) or not goals:
             raise InputError("goal: MultiGoal needs a goal for each tip: MultiGoal({link: PoseGoal(...), ...})")
+
         parts = {name: _with_poses(part) for name, part in goals.items()}
         for name, part in parts.items():
             require(name, str, "tip of a MultiGoal", "name a link")
             if not isinstance(part, GoalPart):
                 require(part, PARTS, f"goal of '{name}'", "use a PoseGoal, a PositionGoal or a TaskRegion")
+
         object.__setattr__(self, "frames", tuple(parts))
         object.__setattr__(self, "parts", tuple(parts.values()))
 
@@ -334,6 +338,11 @@ class MultiGoal(Goal):
         """The goal of each tip, with the robot that has this tip."""
         require(robot, Robot, "robot of a goal")
         return [(_with_tip(robot, frame), part) for frame, part in zip(self.frames, self.parts, strict=True)]
+
+
+def _with_poses(part: AnyPart) -> GoalPart:
+    matrix = isinstance(part, np.ndarray) and part.ndim > 1  # a row may be a configuration
+    return PoseGoal(part) if matrix or isinstance(part, pin.SE3) else part  # type: ignore[return-value]
 
 
 PARTS = PoseGoal | PositionGoal | TaskRegion  # the kinds that messages name

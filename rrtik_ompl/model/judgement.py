@@ -53,7 +53,8 @@ class Contact:
     point_second: Vector
     margin: float = 0.0
 
-    __reduce__, __repr__ = as_value, in_one_line
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
     @property
     def clearance(self) -> float:
@@ -68,6 +69,7 @@ class Contact:
             return f"{pair} are {1e3 * self.distance:.4g} mm apart"
         if self.distance > 0.0:
             return f"{pair} are {1e3 * self.distance:.4g} mm apart, within the margin of {1e3 * self.margin:.4g} mm"
+
         known = np.isfinite(self.point_first).all()
         if known and abs(self.distance) < TOUCHING:
             return f"{pair} touch"
@@ -119,6 +121,7 @@ class ClearanceCurve:
         k = self.least
         if self.distances[k] >= FARTHEST:
             return f"no obstacle within {FARTHEST:g} m"
+
         where = f"motion {self.motions[k] + 1} at {100.0 * self.shares[k]:.0f} % of it"
         return (
             f"least clearance {1e3 * self.distances[k]:.3g} mm, {where}: '{self.pairs[k][0]}' and '{self.pairs[k][1]}'"

@@ -62,7 +62,8 @@ class JointPath:
     continuous: Mask
     proof: Proof | None
 
-    __reduce__, _repr_html_ = as_value, in_notebook
+    __reduce__ = as_value
+    _repr_html_ = in_notebook
 
     def __init__(
         self,
@@ -73,6 +74,7 @@ class JointPath:
         continuous: ArrayLike | None = None,
     ) -> None:
         rows = usable_waypoints(finite_array(waypoints, (None, None), "path waypoints"))
+
         count = rows.shape[1]
         joint_names = unnamed_joints(count) if joint_names is None else joint_names
         names = tuple(name_of(name, "a joint of a path") for name in listed(joint_names, "joint names of a path"))
@@ -80,6 +82,7 @@ class JointPath:
         sliding, endless = (truths(mask, "mask of a path's joints") for mask in given)
         if not len(names) == count == sliding.size == endless.size:
             raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
+
         values: dict[str, Any] = {
             "waypoints": frozen(rows),
             "joint_names": names,
@@ -114,7 +117,8 @@ class JointPath:
             InputError: If they are no such rows, or have not one column for each joint.
         """
         rows = usable_waypoints(finite_array(waypoints, (None, None), "path waypoints"))
-        count, names = rows.shape[1], self.joint_names
+        count = rows.shape[1]
+        names = self.joint_names
         if count != len(names):
             raise InputError(f"path: waypoints have {count} columns, but {len(names)} joint names were given")
         return path_through(self, rows)
@@ -160,6 +164,7 @@ class JointPath:
         rows = merge_moves(self.waypoints)
         changes = moved(rows[:-1], rows[1:])
         several = np.flatnonzero(changes.sum(axis=1) != 1)
+
         if len(several) and len(rows) > 1:
             together = ", ".join(np.array(self.joint_names)[changes[several[0]]])
             edge = int((moved(self.waypoints[:-1], self.waypoints[1:]).sum(axis=1) > 1).argmax())
@@ -167,7 +172,9 @@ class JointPath:
                 f"path: motion {edge + 1} moves several joints at once ({together}); it is no list of moves: "
                 "convert it with one_joint_moves(path, problem)"
             )
-        joints, units = changes.argmax(axis=1), joint_units(self.prismatic)
+
+        joints = changes.argmax(axis=1)
+        units = joint_units(self.prismatic)
         return tuple(
             Move(self.joint_names[j], float(rows[i, j]), float(rows[i + 1, j]), units[j], bool(self.continuous[j]))
             for i, j in enumerate(joints)
@@ -250,7 +257,8 @@ class JointPath:
             0.001
         """
         require(proof, bool, "proof")
-        document, ending = self.document(), known_ending(path, FORMATS, "path")
+        document = self.document()
+        ending = known_ending(path, FORMATS, "path")
         if proof:
             known_ending(path, FORMATS[:1], "path with its proof")
             document["certificate"] = certificate_by(self.proof, self.waypoints).document()
@@ -294,10 +302,13 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
     """
     require(robot, Robot | None, "robot of a path", "use load_robot(name)")
     ending = known_ending(path, FORMATS, "path")
+
     try:
         document = loads(read_text(path), ending)
-        names, name = document.get("joint_names"), str(document.get("robot", ""))
-        units, endless = document.get("units"), document.get("continuous")
+        names = document.get("joint_names")
+        name = str(document.get("robot", ""))
+        units = document.get("units")
+        endless = document.get("continuous")
         sliding = None if units is None else [unit == "m" for unit in units]
         turning = None if names is None or endless is None else [joint in endless for joint in names]
         found = JointPath(document["waypoints"], names, sliding, name, turning)

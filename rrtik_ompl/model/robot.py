@@ -149,6 +149,7 @@ class Robot:
             InputError: If the number of values is not ``dof`` or one of them is not finite.
         """
         array = np.asarray(values, dtype=object) if isinstance(values, (list, tuple)) else values
+
         if isinstance(array, np.ndarray) and array.ndim == 1 and len(array) != self.dof:
             joints = f"robot '{self.name}' has {self.dof} joints ({', '.join(self.joint_names)})"
             hint = "; a position of the tip: PositionGoal([x, y, z])" if str(what) == "goal" and len(array) == 3 else ""
@@ -187,9 +188,11 @@ class Robot:
             return ""
         if np.shape(q) != (self.dof,):
             raise InputError(f"configuration of robot '{self.name}': expected shape ({self.dof},), got {np.shape(q)}")
+
         joint = int(outside[0])
         factor, unit = shown_unit(self.prismatic[joint])
         value, near, *ends = (factor * float(x[joint]) for x in (q, self.clamp(q), self.lower, self.upper))
+
         shown = (n for n in range(6, 18) if f"{value:.{n}g}" != f"{near:.{n}g}")
         digits = next(shown, 6)  # enough to see the difference; NaN has none
         limits = " .. ".join(f"{end:.{digits}g}" for end in ends)
@@ -197,7 +200,8 @@ class Robot:
 
     def onto_limits(self, Q: Matrix) -> Matrix:
         """Values up to ``LIMIT_TOLERANCE`` outside a limit moved onto it, all others as they are. Shape as given."""
-        clamped, (lower, upper) = self.clamp(Q), _widened_limits(self, LIMIT_TOLERANCE)
+        clamped = self.clamp(Q)
+        lower, upper = _widened_limits(self, LIMIT_TOLERANCE)
         return np.where((lower <= Q) & (upper >= Q), clamped, Q)
 
     def clamp(self, q: Vector) -> Vector:
@@ -236,7 +240,9 @@ class Robot:
         self._require_frame(frame)
         if self.model.nv > MOST_MOVING:
             return np.asarray(jacobians(self, row, frame)[0])
-        full, axes = pinocchio_rows(self, row)[0], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+        full = pinocchio_rows(self, row)[0]
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         number = _frame_number(self, frame)
         jacobian = pin.computeFrameJacobian(self.model, self.model.createData(), full, number, axes)
         return np.asarray(np.reshape(jacobian, (6, -1)) @ self.chain.gain)  # for one joint it comes as a vector
@@ -275,10 +281,13 @@ def pinocchio_rows(robot: Robot, rows: Matrix) -> Matrix:
     values = robot.chain.joint_values(rows)
     if robot.model.nq == len(robot.chain.parent):
         return values
+
     full = np.empty((len(rows), robot.model.nq))
     joints, places, turning, cosines = _places_of(robot)
     angles = values[:, turning]
-    full[:, places], full[:, cosines], full[:, cosines + 1] = values[:, joints], np.cos(angles), np.sin(angles)
+    full[:, places] = values[:, joints]
+    full[:, cosines] = np.cos(angles)
+    full[:, cosines + 1] = np.sin(angles)
     return full
 
 
@@ -299,6 +308,7 @@ def poses_and_jacobians(robot: Robot, rows: Matrix, frame: str | None = None) ->
     frames = chain.joint_frames(rows)
     placed = _poses(robot, number, rows, frames)
     columns = np.zeros((len(frames), 6, len(chain.parent)))
+
     joint = robot.model.frames[number].parentJoint - 1
     while joint >= 0:  # only the joints between the base and the frame move it
         axis = frames[:, joint + 1, :3, :3] @ chain.axis[joint]
@@ -308,6 +318,7 @@ def poses_and_jacobians(robot: Robot, rows: Matrix, frame: str | None = None) ->
             columns[:, :3, joint] = cross_products(axis, placed[:, :3, 3] - frames[:, joint + 1, :3, 3])
             columns[:, 3:, joint] = axis
         joint = int(chain.parent[joint])
+
     return placed, np.asarray(columns @ chain.gain)
 
 
@@ -319,7 +330,9 @@ def _poses(
         target = robot.model.frames[number]
         frames = robot.chain.joint_frames(rows) if joint_frames is None else joint_frames
         return np.asarray(frames[:, target.parentJoint] @ target.placement.homogeneous)
-    data, placed = _data_of(robot, get_ident()), np.empty((len(rows), 4, 4))
+
+    data = _data_of(robot, get_ident())
+    placed = np.empty((len(rows), 4, 4))
     for k, full in enumerate(pinocchio_rows(robot, rows)):
         pin.forwardKinematics(robot.model, data, full)
         placed[k] = pin.updateFramePlacement(robot.model, data, number).homogeneous
@@ -344,6 +357,7 @@ def require_joints(robot: Robot, names: Sequence[str], what: str) -> None:
     """
     if len(names) == robot.dof and tuple(names) in (robot.joint_names, unnamed_joints(robot.dof)):
         return
+
     remedy = "put its columns in that order" if set(names) == set(robot.joint_names) else "it is another robot's"
     own = ", ".join(names)
     wanted = ", ".join(robot.joint_names)
@@ -376,8 +390,10 @@ def _frame_number(robot: Robot, frame: str | None) -> int:
 @lru_cache(maxsize=64)
 def _places_of(robot: Robot) -> tuple[NDArray[np.int64], ...]:
     """Joints with one number in Pinocchio's vectors and where it is; those with two and where their cosines are."""
-    starts, sizes = np.array(robot.model.idx_qs.tolist()[1:]), np.array(robot.model.nqs.tolist()[1:])
-    single, double = np.flatnonzero(sizes == 1), np.flatnonzero(sizes != 1)
+    starts = np.array(robot.model.idx_qs.tolist()[1:])
+    sizes = np.array(robot.model.nqs.tolist()[1:])
+    single = np.flatnonzero(sizes == 1)
+    double = np.flatnonzero(sizes != 1)
     return single, starts[single], double, starts[double]
 
 

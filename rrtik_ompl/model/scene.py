@@ -64,12 +64,14 @@ class TimedPoses:
         stations = tuple(
             rigid(pose, f"motion: pose {k}") for k, pose in enumerate(listed(poses, "poses of a motion"), start=1)
         )
+
         if len(stamps) == 0 or len(stamps) != len(stations):
             raise InputError(
                 f"motion needs as many times as poses, at least one; got {len(stamps)} and {len(stations)}"
             )
         if (np.diff(stamps) <= 0.0).any():
             raise InputError(f"motion times must increase, got {stamps.tolist()}")
+
         object.__setattr__(self, "times", frozen(stamps))
         object.__setattr__(self, "poses", stations)
 
@@ -79,8 +81,10 @@ class TimedPoses:
         k = int(np.searchsorted(self.times, time, side="right"))
         if k == 0 or k == len(self.times):
             return self.poses[max(k - 1, 0)].copy()
+
         share = (time - self.times[k - 1]) / (self.times[k] - self.times[k - 1])
-        a, b = self.poses[k - 1], self.poses[k]
+        a = self.poses[k - 1]
+        b = self.poses[k]
         rotation = a.rotation @ pin.exp3(share * pin.log3(a.rotation.T @ b.rotation))
         return pin.SE3(rotation, (1.0 - share) * a.translation + share * b.translation)
 
@@ -90,26 +94,6 @@ class TimedPoses:
 
 
 Motion: TypeAlias = ConstantVelocity | TimedPoses
-
-
-def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
-    """The pose of an obstacle or attached object, if all three are what they have to be.
-
-    A pose that is not finite would compare as farther away than anything, and what is there would not be seen.
-    """
-    name_of(name, "an obstacle or attached object")
-    if not isinstance(shape, Shape):
-        kinds = " or ".join(kind.__name__ for kind in SHAPES.values())
-        found = f"must be of type {kinds}, got {type(shape).__name__}"
-        raise InputError(f"shape of '{name}' {found}; use rrtik_ompl.model.shapes")
-    return rigid(pose, f"pose of '{name}'")
-
-
-def _room(value: float, what: str) -> float:
-    room = float(bounded_array(value, (), what))
-    if room < 0.0:
-        raise InputError(f"{what} must be 0 metres or more, got {room:g}")
-    return room
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,9 +146,30 @@ class AttachedObject:
         object.__setattr__(self, "allow", listed(self.allow, f"allow of '{self.name}'"))
         for name in self.allow:
             name_of(name, f"what '{self.name}' may touch")
+
         if not self.shape.movable:
             kind = re.sub("(?<=[a-z])(?=[A-Z])", "-", type(self.shape).__name__).lower()
             raise InputError(f"a {kind} cannot be attached to a link: '{self.name}'")
+
+
+def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
+    """The pose of an obstacle or attached object, if all three are what they have to be.
+
+    A pose that is not finite would compare as farther away than anything, and what is there would not be seen.
+    """
+    name_of(name, "an obstacle or attached object")
+    if not isinstance(shape, Shape):
+        kinds = " or ".join(kind.__name__ for kind in SHAPES.values())
+        found = f"must be of type {kinds}, got {type(shape).__name__}"
+        raise InputError(f"shape of '{name}' {found}; use rrtik_ompl.model.shapes")
+    return rigid(pose, f"pose of '{name}'")
+
+
+def _room(value: float, what: str) -> float:
+    room = float(bounded_array(value, (), what))
+    if room < 0.0:
+        raise InputError(f"{what} must be 0 metres or more, got {room:g}")
+    return room
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +197,7 @@ class Touching:
             name_of(name, "a thing that touches another")
         if self.first == self.second:
             raise InputError(f"contacts of a scene: '{self.first}' stands twice in a pair; name two things")
+
         what = f"distance of '{self.first}' and '{self.second}'"
         object.__setattr__(self, "distance", float(bounded_array(self.distance, (), what)))
         if self.distance > 0.0:
@@ -232,16 +238,19 @@ class Scene:
         object.__setattr__(self, "obstacles", listed(self.obstacles, "obstacles of a scene"))
         object.__setattr__(self, "attached", listed(self.attached, "attached objects of a scene"))
         at_most(len(self.obstacles) + len(self.attached), MOST_SOLIDS, "obstacles of a scene", "join some in a mesh")
+
         for obstacle in self.obstacles:
             require(obstacle, Obstacle, "each obstacle of a scene")
         for held in self.attached:
             require(held, AttachedObject, "each attached object of a scene")
+
         pairs = tuple(
             tuple(map(str, pair)) for pair in listed(self.allowed_collisions, "allowed_collisions of a scene")
         )
         if any(len(pair) != 2 for pair in pairs):
             raise InputError(f"allowed_collisions of a scene must be pairs of names, got {list(pairs)}")
         object.__setattr__(self, "allowed_collisions", pairs)
+
         object.__setattr__(self, "contacts", listed(self.contacts, "contacts of a scene"))
         for contact in self.contacts:
             require(contact, Touching, "each contact of a scene")
@@ -250,6 +259,7 @@ class Scene:
             if in_contact[contact.pair] > 1:
                 both = f"'{contact.first}' and '{contact.second}'"
                 raise InputError(f"contacts of a scene: {both} stand there {in_contact[contact.pair]} times; keep one")
+
         names = self.names
         if len(set(names)) < len(names):
             name, times = Counter(names).most_common(1)[0]
@@ -325,12 +335,15 @@ class Scene:
             UnknownNameError: If there is no obstacle of that name.
             InputError: If it has no end, or the pose is none.
         """
-        taken, rest = self.obstacle(name), self.without(name)
+        taken = self.obstacle(name)
+        rest = self.without(name)
         place = pin.SE3.Identity() if pose is None else pose
         held = AttachedObject(name, link, taken.shape, place, padding=padding, margin=taken.margin)
+
         names = listed(allow, f"allow of '{name}'")
         for other in names:
             require(other, str, f"each name of allow of '{name}'")
+
         attached = (*rest.attached, replace(held, allow=names))
         return Scene(rest.obstacles, attached, self.allowed_collisions, self.contacts)
 
@@ -348,6 +361,7 @@ class Scene:
         held = {a.name: a for a in self.attached}
         if name not in held:
             raise UnknownNameError("attached object", name, held)
+
         item = held.pop(name)
         free = Obstacle(name, item.shape, pose, margin=item.margin)
         contacts = tuple(contact for contact in self.contacts if name not in contact.pair)

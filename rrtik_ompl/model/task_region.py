@@ -76,14 +76,17 @@ class TaskRegion(GoalPart):
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_w", rigid(self.T_world_w, "goal region: T_world_w"))
         object.__setattr__(self, "T_w_tip", rigid(self.T_w_tip, "goal region: T_w_tip"))
+
         bounds = finite_array(self.bounds, (6, 2), "goal region: bounds")
         for name, bound in zip(COORDINATES, bounds, strict=True):
             _range(bound, f"goal region: {name}")
         object.__setattr__(self, "bounds", frozen(bounds))
+
         for name in ("position_tolerance", "orientation_tolerance"):
             object.__setattr__(self, name, positive(getattr(self, name), f"goal region: {name}"))
         for name in ("position_allowance", "orientation_allowance"):
             object.__setattr__(self, name, not_negative(getattr(self, name), f"path constraint: {name}"))
+
         require(self.frame, str | None, "frame of a region", "name a link or an attached object")
         if self.frame is not None:
             name_of(self.frame, "the frame of a region")
@@ -119,8 +122,10 @@ class TaskRegion(GoalPart):
         direction = unit_vector(axis, "goal region: axis")
         point = tip.translation if through is None else finite_array(through, (3,), "goal region: through")
         T_world_w = pin.SE3(turned_z(direction), np.array(point))
+
         bounds = np.zeros((6, 2))
-        bounds[2], bounds[5] = _range(slide, "goal region: slide"), _range(turn, "goal region: turn")
+        bounds[2] = _range(slide, "goal region: slide")
+        bounds[5] = _range(turn, "goal region: turn")
         return cls(T_world_w, bounds, T_world_w.actInv(tip), position_tolerance, orientation_tolerance)
 
     @property
@@ -169,7 +174,9 @@ class TaskRegion(GoalPart):
         First the nearest orientation, then the nearest position.
         """
         tips = _rows(tips, (4, 4), "poses of the tip")
-        R_w, R_tip = self.T_world_w.rotation, self.T_w_tip.rotation
+        R_w = self.T_world_w.rotation
+        R_tip = self.T_w_tip.rotation
+
         angles = nearest_angles(R_w.T @ tips[:, :3, :3] @ R_tip.T, self.bounds[3:])
         place = (tips[:, :3, 3] - self.T_world_w.translation) @ R_w - rpy_matrices(angles) @ self.T_w_tip.translation
         return np.hstack([np.clip(place, self.bounds[:3, 0], self.bounds[:3, 1]), angles])
@@ -184,7 +191,9 @@ class TaskRegion(GoalPart):
 def displacements(coordinates: Matrix) -> NDArray[np.float64]:
     """The transforms D of rows of x, y, z [m] and roll, pitch, yaw [rad], shape (m, 6): (m, 4, 4)."""
     D = np.zeros((len(coordinates), 4, 4))
-    D[:, :3, :3], D[:, :3, 3], D[:, 3, 3] = rpy_matrices(coordinates[:, 3:]), coordinates[:, :3], 1.0
+    D[:, :3, :3] = rpy_matrices(coordinates[:, 3:])
+    D[:, :3, 3] = coordinates[:, :3]
+    D[:, 3, 3] = 1.0
     return D
 
 
@@ -213,6 +222,7 @@ def nearest_angles(rotations: NDArray[np.float64], bounds: Matrix) -> Matrix:
     wide = np.flatnonzero(bounds[:, 0] < bounds[:, 1])
     if len(wide) == 0:
         return best
+
     likeness = np.full(len(rotations), -np.inf)
     first = roll_pitch_yaw(rotations)
     for start in (first, first * [1.0, -1.0, 1.0] + np.pi):
@@ -221,7 +231,9 @@ def nearest_angles(rotations: NDArray[np.float64], bounds: Matrix) -> Matrix:
             angles[:, k] = into_range(_best_angle(rotations, angles, int(k)), *bounds[k])
         found = np.einsum("mij,mij->m", rotations, rpy_matrices(angles))
         better = found > likeness
-        best[better], likeness[better] = angles[better], found[better]
+        best[better] = angles[better]
+        likeness[better] = found[better]
+
     return best
 
 
@@ -244,14 +256,17 @@ def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
         C = first @ (C @ second)
     else:
         C = (second @ first) @ C
-    i, j = (k + 1) % 3, (k + 2) % 3
+
+    i = (k + 1) % 3
+    j = (k + 2) % 3
     angle: Vector = np.arctan2(C[:, i, j] - C[:, j, i], C[:, i, i] + C[:, j, j])
     return angle
 
 
 def into_range(angles: NDArray[np.float64], low: ArrayLike, high: ArrayLike) -> NDArray[np.float64]:
     """The nearest of equal angles within bounds, or the nearer bound."""
-    low, high = np.asarray(low), np.asarray(high)
+    low = np.asarray(low)
+    high = np.asarray(high)
     middle = 0.5 * (low + high)
     nearest: NDArray[np.float64] = np.clip(middle + (angles - middle + np.pi) % TAU - np.pi, low, high)
     return nearest

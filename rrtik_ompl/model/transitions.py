@@ -70,7 +70,9 @@ def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
         Shape (m, n), m <= k; a single row if nothing moves.
     """
     rows = _rows(waypoints)
-    values, kept = rows.tolist(), [0]  # lists: most routes are short, and numpy takes longer for a row
+    values = rows.tolist()  # lists: most routes are short, and numpy takes longer for a row
+    kept = [0]
+
     for i in range(1, len(rows)):
         while len(kept) > 1 and _same_joint(values[kept[-2]], values[kept[-1]], values[i], tolerance):
             kept.pop()
@@ -78,6 +80,7 @@ def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
             kept.append(i)
         elif len(kept) > 1:  # a null move: its end takes the place of its beginning, so that the last row is exact
             kept[-1] = i
+
     return rows[kept]
 
 
@@ -182,9 +185,12 @@ def in_parts(counts: Vector, at_once: int) -> list[NDArray[np.int64]]:
 
 def subdivided(rows: Matrix, counts: Vector) -> tuple[Matrix, Vector]:
     """Cut edge i of a polyline, shape (k, n), into ``counts[i]`` equal parts; also the edge number of every point."""
-    points, edges = [rows[:1]], [np.zeros(1, dtype=np.int64)]
+    points = [rows[:1]]
+    edges = [np.zeros(1, dtype=np.int64)]
+
     for i, count in enumerate(np.maximum(counts, 1.0).astype(np.int64)):
         shares = (np.arange(1, count + 1) / count)[:, None]
         points.append((1.0 - shares) * rows[i] + shares * rows[i + 1])
         edges.append(np.full(count, i, dtype=np.int64))
+
     return np.vstack(points), np.concatenate(edges)

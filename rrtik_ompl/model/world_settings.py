@@ -80,6 +80,7 @@ class WorldSettings:
             value = getattr(self, each.name)
             if each.default is MISSING or value == each.default:
                 continue
+
             if each.name == "constraints":
                 yield f"{len(value)} path constraint{'s' * (len(value) > 1)}"
             elif "unit" in each.metadata:

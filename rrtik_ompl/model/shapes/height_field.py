@@ -14,7 +14,8 @@ from rrtik_ompl.base.errors import CloudWarning, InputError, require
 from rrtik_ompl.model.shapes.box_pile import BoxPile, few_enough, merged
 from rrtik_ompl.model.shapes.point_cloud import Invalid, known_choice
 
-FEW, FAR = 0.05, 20.0  # share of the heights that are few; how many times the rest's extent, and the grid's, is far
+FEW = 0.05  # share of the heights that are few
+FAR = 20.0  # how many times the extent of the rest, and of the grid, is far
 COARSER = "take .coarser(2), or a part of it"
 
 
@@ -83,6 +84,7 @@ class HeightField(BoxPile):
         rows = number_rows(heights, what).astype(np.float64)
         if rows.ndim != 2 or rows.size == 0:
             raise InputError(f"{what}: expected rows of numbers, shape (rows, columns), got shape {rows.shape}")
+
         finite = np.isfinite(rows)
         known_choice(invalid, what)
         if not finite.all() and invalid == "refuse":
@@ -90,21 +92,26 @@ class HeightField(BoxPile):
             first = f"the first in row {row}, column {column} (from 0)"
             some = f"{np.count_nonzero(~finite)} of {rows.size} heights are not finite, {first}"
             raise InputError(f"{what}: {some}; invalid='drop' leaves out their columns")
+
         if not finite.any():
             raise InputError(f"{what}: none of the {rows.size} heights is finite")
         if (highest := float(np.abs(rows[finite]).max())) > LARGEST:
             raise InputError(f"{what}: {highest:g} m is too far away; check their unit")
+
         rows = np.where(finite, rows, np.nan)
-        side, lowest = length(cell, f"{what}: cell"), float(np.nanmin(rows))
+        side = length(cell, f"{what}: cell")
+        lowest = float(np.nanmin(rows))
         bottom = lowest - side if floor is None else finite_number(floor, f"{what}: floor")
         if not bottom < lowest:
             raise InputError(f"{what}: floor must be below the lowest height of {lowest:g} m, got {bottom:g}")
+
         object.__setattr__(self, "heights", frozen(rows))
         object.__setattr__(self, "cell", side)
         object.__setattr__(self, "floor", bottom)
         object.__setattr__(self, "source", source)
         object.__setattr__(self, "scale", positive(scale, f"{what}: scale"))
         object.__setattr__(self, "nodata", nodata)
+
         few_enough(len(merged(self.heights)), what, COARSER)
         if far := _far_beyond(rows, side):
             warnings.warn(f"{what}: {far}; if that stands for no data, make it NaN or say nodata=", CloudWarning, 2)
@@ -119,11 +126,13 @@ class HeightField(BoxPile):
         first_row, end_row, first, end = merged(self.heights).T
         rows, columns = self.heights.shape
         tops = self.heights[first_row, first]
-        y, x = 0.5 * (first_row + end_row - rows), 0.5 * (first + end - columns)
+
+        y = 0.5 * (first_row + end_row - rows)
+        x = 0.5 * (first + end - columns)
+
         centres = np.stack([self.cell * x, self.cell * y, 0.5 * (tops + self.floor)], axis=1)
-        return centres, np.stack(
-            [self.cell * (end - first), self.cell * (end_row - first_row), tops - self.floor], axis=1
-        )
+        sizes = np.stack([self.cell * (end - first), self.cell * (end_row - first_row), tops - self.floor], axis=1)
+        return centres, sizes
 
     def coarser(self, factor: int) -> HeightField:
         """Cells that are so many times as wide, the whole grid at most, each as high as the highest of those in it.
@@ -154,11 +163,13 @@ class HeightField(BoxPile):
 def _far_beyond(rows: Matrix, cell: float) -> str:
     """What lies far above or below all but a few heights, in words; "" for nothing."""
     heights = np.sort(rows[np.isfinite(rows)])
-    few, width = max(int(FEW * len(heights)), 1), cell * max(rows.shape)
+    few = max(int(FEW * len(heights)), 1)
+    width = cell * max(rows.shape)
     for ends, word in ((heights, "below"), (-heights[::-1], "above")):
         steps = np.diff(ends[: few + 1])
         if len(steps) == 0:
             continue
+
         k = int(np.argmax(steps))
         rest = ends[k + 1 :]
         if steps[k] > FAR * max(float(rest[-1] - rest[0]), width):

@@ -53,11 +53,13 @@ class Mesh(Shape):
     scale: float = 1.0
     open_edges: int = field(default=0)
 
-    __reduce__, __repr__ = as_value, in_one_line
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike, source: str = "", scale: float = 1.0) -> None:
         require(source, str, "source of a mesh")
         what = f"mesh {source}" if source else "mesh"
+
         points = bounded_array(vertices, (None, 3), f"{what}: vertices")
         rows = number_rows(triangles, f"{what}: triangles")
         if dimensions(triangles) != 2 or rows.shape[1] != 3 or len(rows) == 0:
@@ -69,9 +71,11 @@ class Mesh(Shape):
         faces = numbers.astype(np.int64)
         if faces.min() < 0 or faces.max() >= len(points):
             raise InputError(f"{what}: a triangle names vertex {int(faces.max())}, but there are only {len(points)}")
+
         points, faces = _welded(points, faces)
         if len(faces) == 0:
             raise InputError(f"{what}: every triangle has zero area; check its scale and export it again")
+
         object.__setattr__(self, "vertices", frozen(points))
         object.__setattr__(self, "triangles", frozen(faces, np.int64))
         object.__setattr__(self, "source", source)
@@ -104,6 +108,7 @@ def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[n
     if (np.abs(sides).max(axis=2) < 10.0**-SAME_DIGITS).any() or _open_edges(merged) > 0:
         for shift in (0.0, 0.37 * 10.0**-SAME_DIGITS):  # what one rounding parts, the other one joins
             unique, merged = _merged(np.round(unique + shift, SAME_DIGITS) + 0.0, unique, merged)
+
     a, b, c = (unique[merged[:, k]] for k in range(3))
     return unique, merged[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0.0]
 

@@ -44,13 +44,16 @@ class Octree(BoxPile):
     def __init__(self, centres: ArrayLike, sides: ArrayLike, *, source: str = "", scale: float = 1.0) -> None:
         require(source, str, "source of an octree")
         what = f"octree {source}" if source else "octree"
-        rows, widths = bounded_array(centres, (None, 3), f"{what}: centres"), np.asarray(sides)
+        rows = bounded_array(centres, (None, 3), f"{what}: centres")
+        widths = np.asarray(sides)
         widths = bounded_array(np.broadcast_to(widths, len(rows)) if widths.ndim == 0 else sides, (len(rows),), what)
+
         if len(rows) == 0:
             raise InputError(f"{what}: none of its cells is occupied; leave the obstacle out")
         if not (widths > 0.0).all():
             raise InputError(f"{what}: sides must be greater than 0, got {widths.min():g}")
         few_enough(len(rows), what, "use load_cloud(file, radius).voxel(size), or a map of a coarser resolution")
+
         object.__setattr__(self, "centres", frozen(rows))
         object.__setattr__(self, "sides", frozen(widths))
         object.__setattr__(self, "source", source)

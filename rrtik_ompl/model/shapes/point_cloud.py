@@ -108,11 +108,13 @@ class PointCloud(_Kept, Shape):
         what = f"cloud {source}" if source else "cloud"
         known_choice(invalid, what)
         rows, dropped = _usable(points, invalid, what)
+
         object.__setattr__(self, "points", rows)
         object.__setattr__(self, "radius", length(radius, f"{what}: radius"))
         object.__setattr__(self, "source", source)
         object.__setattr__(self, "scale", positive(scale, f"{what}: scale"))
         object.__setattr__(self, "dropped", dropped)
+
         low, high = extremes(rows)
         if (extent := high - low).max() > WIDEST:
             sides = " x ".join(f"{side:.4g}" for side in extent)
@@ -166,10 +168,12 @@ class PointCloud(_Kept, Shape):
         extent = float((high - low).max())
         if extent / size >= 1 << 20:
             raise InputError(f"voxel size {size:g} m is too small for a cloud {extent:.4g} m wide")
+
         cells = ((self.points - low) / size).astype(np.int64)
         keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
         order = np.argsort(keys, kind="stable")
         starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
+
         ordered = self.points[order].astype(np.float64)
         counts = np.diff(np.append(starts, len(order)))
         middles = (np.add.reduceat(ordered, starts) / counts[:, None]).astype(np.float32)
@@ -212,10 +216,12 @@ def _usable(points: ArrayLike, invalid: Invalid, what: str) -> tuple[Points, int
     if given.ndim != 2 or given.shape[1] != 3:
         raise InputError(f"{what}: expected points of shape (any, 3), got shape {given.shape}")
     at_most(len(given), MOST_POINTS, f"{what}: points", "thin it out before, or crop it")
+
     finite = np.isfinite(given[:, 0]) & np.isfinite(given[:, 1]) & np.isfinite(given[:, 2])
     bad = len(given) - int(np.count_nonzero(finite))
     if bad and invalid == "refuse":
         raise InputError(f"{what}: {bad} of {len(given)} points are not finite; invalid='drop' leaves them out")
+
     rows = given[finite] if bad else given
     if len(rows) == 0:
         raise InputError(f"{what}: it has no {'finite ' if bad else ''}point; leave the obstacle out")

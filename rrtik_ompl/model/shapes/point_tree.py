@@ -61,19 +61,28 @@ def point_tree(points: NDArray[np.float32]) -> PointTree:
     order = np.argsort(_places(points))
     order = np.append(order, np.full(count * LEAF - len(points), order[-1]))
     blocks = points[order.reshape(count, LEAF).T]  # the first points of all blocks, the second ones, ...
-    low, high = blocks.min(axis=0), blocks.max(axis=0)
-    levels, firsts = [], [0]
+
+    low = blocks.min(axis=0)
+    high = blocks.max(axis=0)
+    levels = []
+    firsts = [0]
+
     while True:
         groups = -(-len(low) // LEAF)
         sides = np.empty((2, groups * LEAF, 3), dtype=np.float32)
-        sides[0], sides[1] = FAR, -FAR
-        sides[0, : len(low)], sides[1, : len(high)] = low, high
+        sides[0] = FAR
+        sides[1] = -FAR
+        sides[0, : len(low)] = low
+        sides[1, : len(high)] = high
         grouped = sides.reshape(2, groups, LEAF, 3)
         levels.append(grouped.transpose(1, 3, 0, 2).reshape(groups, 6, LEAF))
         if groups == 1:
             break
+
         firsts.append(firsts[-1] + groups)
-        low, high = grouped[0].min(axis=1), grouped[1].max(axis=1)
+        low = grouped[0].min(axis=1)
+        high = grouped[1].max(axis=1)
+
     packed = np.ascontiguousarray(blocks.transpose(1, 2, 0))
     return PointTree(packed, np.concatenate(levels), np.array(firsts, dtype=np.int32))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
@@ -20,13 +22,15 @@ def check_simple(polygon: Matrix) -> None:
     Raises:
         InputError: If two sides of the polygon cross or touch, or if it has no area.
     """
-    a, b = polygon, np.roll(polygon, -1, axis=0)
+    a = polygon
+    b = np.roll(polygon, -1, axis=0)
     area = 0.5 * float(np.sum(a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]))
     extent = float(np.ptp(polygon, axis=0).max())
     if abs(area) <= 1e-12 * max(extent * extent, 1e-12):
         raise InputError("polygon has no area: its vertices lie on one line")
+
     for i in range(len(a)):
-        if _side(a[i - 1], a[i], b[i]) == 0.0 and (a[i] - a[i - 1]) @ (b[i] - a[i]) < 0.0:
+        if _turn(a[i - 1], a[i], b[i]) == 0.0 and (a[i] - a[i - 1]) @ (b[i] - a[i]) < 0.0:
             raise InputError(f"polygon folds back on itself at vertex {i}; delete it")
         for j in range(i + 2, len(a)):
             if (i, j) != (0, len(a) - 1) and _meet(a[i], b[i], a[j], b[j]):
@@ -37,12 +41,12 @@ def _meet(p: Vector, q: Vector, r: Vector, s: Vector) -> bool:
     """Whether the segments p q and r s have a point in common."""
     if (np.maximum(p, q) < np.minimum(r, s)).any() or (np.maximum(r, s) < np.minimum(p, q)).any():
         return False
-    return _side(p, q, r) * _side(p, q, s) <= 0.0 and _side(r, s, p) * _side(r, s, q) <= 0.0
+    return _turn(p, q, r) * _turn(p, q, s) <= 0.0 and _turn(r, s, p) * _turn(r, s, q) <= 0.0
 
 
-def _side(u: Vector, v: Vector, w: Vector) -> float:
-    """On which side of the line u v the point w lies: positive on the left."""
-    return float((v[0] - u[0]) * (w[1] - u[1]) - (v[1] - u[1]) * (w[0] - u[0]))
+def _turn(p: Vector, q: Vector, r: Vector) -> float:
+    """Twice the signed area of a triangle: positive for a left turn, where r lies left of the line p q."""
+    return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
 
 
 def convex_parts(polygon: Matrix) -> tuple[Matrix, ...]:
@@ -53,11 +57,6 @@ def convex_parts(polygon: Matrix) -> tuple[Matrix, ...]:
     return tuple(frozen(polygon[part]) for part in parts)
 
 
-def _turn(p: Vector, q: Vector, r: Vector) -> float:
-    """Twice the signed area of a triangle: positive for a left turn."""
-    return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
-
-
 def _is_convex(polygon: Matrix, ring: list[int]) -> bool:
     size = len(ring)
     corners = ((polygon[ring[k]], polygon[ring[(k + 1) % size]], polygon[ring[(k + 2) % size]]) for k in range(size))
@@ -66,11 +65,16 @@ def _is_convex(polygon: Matrix, ring: list[int]) -> bool:
 
 def _ears(polygon: Matrix, ring: list[int]) -> list[list[int]]:
     """Triangulate by cutting ears [39]; ``ring`` runs counter-clockwise."""
-    rest, triangles = list(ring), []
+    rest = list(ring)
+    triangles = []
     while len(rest) > 3:
         for k in range(len(rest)):
-            before, tip, after = rest[k - 1], rest[k], rest[(k + 1) % len(rest)]
-            p, q, r = polygon[before], polygon[tip], polygon[after]
+            before = rest[k - 1]
+            tip = rest[k]
+            after = rest[(k + 1) % len(rest)]
+            p = polygon[before]
+            q = polygon[tip]
+            r = polygon[after]
             others = (polygon[i] for i in rest if i not in (before, tip, after))
             if _turn(p, q, r) > 0.0 and not any(_in_triangle(o, p, q, r) for o in others):
                 triangles.append([before, tip, after])
@@ -81,6 +85,7 @@ def _ears(polygon: Matrix, ring: list[int]) -> list[list[int]]:
                 range(len(rest)), key=lambda k: abs(_turn(*(polygon[rest[(k + d) % len(rest)]] for d in (-1, 0, 1))))
             )
             del rest[flat]
+
     return [*triangles, rest]
 
 
@@ -91,26 +96,27 @@ def _in_triangle(point: Vector, p: Vector, q: Vector, r: Vector) -> bool:
 def _merged(polygon: Matrix, parts: list[list[int]]) -> list[list[int]]:
     """Join neighbouring parts while the union stays convex [40]."""
     parts = [list(part) for part in parts]
-    joined = True
-    while joined:
-        joined = False
-        for i in range(len(parts)):
-            for j in range(i + 1, len(parts)):
-                union = _joined(parts[i], parts[j])
-                if union is not None and _is_convex(polygon, union):
-                    parts[i] = union
-                    del parts[j]
-                    joined = True
-                    break
-            if joined:
-                break
+    while (found := _neighbours(polygon, parts)) is not None:
+        i, j, union = found
+        parts[i] = union
+        del parts[j]
     return parts
+
+
+def _neighbours(polygon: Matrix, parts: list[list[int]]) -> tuple[int, int, list[int]] | None:
+    """The first two parts whose union is convex, by their numbers, and the union; None if there are none."""
+    for i, j in combinations(range(len(parts)), 2):
+        union = _joined(parts[i], parts[j])
+        if union is not None and _is_convex(polygon, union):
+            return i, j, union
+    return None
 
 
 def _joined(first: list[int], second: list[int]) -> list[int] | None:
     """Union of two counter-clockwise rings that share one edge, or None."""
     for k in range(len(first)):
-        a, b = first[k], first[(k + 1) % len(first)]
+        a = first[k]
+        b = first[(k + 1) % len(first)]
         for m in range(len(second)):
             if second[m] == b and second[(m + 1) % len(second)] == a:
                 around = [second[(m + 1 + s) % len(second)] for s in range(len(second))]  # from a all round to b

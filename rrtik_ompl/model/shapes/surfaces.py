@@ -24,10 +24,13 @@ def extruded(polygon: Matrix, height: float) -> Triangles:
     """Closed prism over a simple polygon, shape (k, 2), from z = -height/2 to +height/2."""
     ring = polygon if _signed_area(polygon) > 0.0 else polygon[::-1]
     walls = [_quad(a, b, height) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
+
     fans = [np.stack([part[[0, k, k + 1]] for k in range(1, len(part) - 1)]) for part in convex_parts(ring)]
     cap = np.concatenate(fans)  # triangles in the plane, shape (m, 3, 2)
     z = np.full((*cap.shape[:2], 1), 0.5 * height)
-    top, bottom = np.concatenate([cap, z], axis=2), np.concatenate([cap, -z], axis=2)[:, ::-1]
+    top = np.concatenate([cap, z], axis=2)
+    bottom = np.concatenate([cap, -z], axis=2)[:, ::-1]
+
     corners = np.concatenate([top, bottom, *walls]).reshape(-1, 3)
     vertices, index = np.unique(corners, axis=0, return_inverse=True)
     return Triangles(vertices, np.asarray(index, dtype=np.int64).reshape(-1, 3))
@@ -36,7 +39,8 @@ def extruded(polygon: Matrix, height: float) -> Triangles:
 def revolved(radii: Vector, heights: Vector, segments: int) -> Triangles:
     """Circles about z with these radii and heights, shape (k,) each, from below, and the surface between them."""
     turn = np.linspace(0.0, TAU, segments, endpoint=False)
-    x, y = np.outer(radii, np.cos(turn)), np.outer(radii, np.sin(turn))
+    x = np.outer(radii, np.cos(turn))
+    y = np.outer(radii, np.sin(turn))
     circles = np.stack([x, y, np.broadcast_to(heights[:, None], x.shape)], 2)
     return Triangles(circles.reshape(-1, 3), wrap(len(radii), segments))
 
@@ -63,6 +67,7 @@ def rounded(outline: Matrix, turn: Vector, length: float, radius: float, rings: 
     quarter = np.linspace(0.0, 0.5 * np.pi, rings + 1)
     out = np.stack([np.cos(turn), np.sin(turn)], 1)
     side = [outline + radius * np.cos(angle) * out for angle in quarter]
+
     half = 0.5 * length + radius * np.sin(np.append(quarter, quarter[-1]))
     middle = np.broadcast_to(outline.mean(axis=0), outline.shape)
     upper = [np.column_stack([ring, np.full(len(ring), z)]) for ring, z in zip([*side, middle], half, strict=True)]
@@ -73,7 +78,8 @@ def rounded(outline: Matrix, turn: Vector, length: float, radius: float, rings: 
 def wrap(rings: int, sides: int) -> Faces:
     """Faces between consecutive rings of vertices, first and last ring left open."""
     ring, side = (a.reshape(-1) for a in np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij"))
-    a, b = ring * sides + side, ring * sides + (side + 1) % sides
+    a = ring * sides + side
+    b = ring * sides + (side + 1) % sides
     return np.concatenate([np.stack([a, b, b + sides], 1), np.stack([a, b + sides, a + sides], 1)])
 
 
@@ -85,5 +91,6 @@ def _signed_area(polygon: Matrix) -> float:
 def _quad(a: Vector, b: Vector, height: float) -> NDArray[np.float64]:
     """Upright wall over the side from a to b, seen from the right of it, as two triangles, shape (2, 3, 3)."""
     z = 0.5 * height
-    low, high = [[*a, -z], [*b, -z]], [[*a, z], [*b, z]]
+    low = [[*a, -z], [*b, -z]]
+    high = [[*a, z], [*b, z]]
     return np.array([[low[0], low[1], high[1]], [low[0], high[1], high[0]]])
