@@ -82,12 +82,14 @@ def view(
     require(title, str | None, "title of a page")
     require(still, bool, "still")
     require(inline, bool | None, "inline")
+
     text = page(shown, path, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still)
     if html is not None:
         write_text(html, text)
         return Path(html)
     if in_kernel() if inline is None else inline:
         return InlinePage(text)
+
     with PageServer(text, port) as server:
         on_ready(server.url)
         server.wait()
@@ -122,6 +124,7 @@ def play(
 
     if in_kernel():
         raise InputError("play: it would serve its page until Ctrl-C and stop the notebook; use view(problem, path)")
+
     with PageServer(page(problem, path, asks=True), port, lambda asked: opinion(problem, asked)) as server:
         on_ready(server.url)
         server.wait()

@@ -70,15 +70,18 @@ def film(
     still = target.suffix.lower() == ".png"
     if not still and not subject_of(shown, path).is_path:
         raise InputError(f"{target}: a film needs a path; give one (rrtik plan --out path.json), or ask for a .png")
+
     count = 1 if still else round(seconds * rate) + 1
     if not (rate > 0.0 and 1 <= count <= MOST_FRAMES and min(size) >= 64 and max(size) <= 4096):
         raise InputError(f"a film of {seconds:g} s, {rate:g} pictures a second, {size[0]} x {size[1]} px: out of range")
+
     held = 0 if still else round(HOLD * rate)
     pictures = drawn(page(shown, path, still=True), count, size)
     try:
         _write(target, pictures, rate, held)
     except OSError as error:
         raise InputError(f"{target}: cannot be written: {error.strerror or error}") from error
+
     return target
 
 
@@ -96,9 +99,11 @@ def drawn(text: str, frames: int, size: tuple[int, int]) -> list[Image.Image]:
     browser = next((found for found in map(shutil.which, BROWSERS) if found), None)
     if browser is None:
         raise InputError(f"a film needs a browser to draw it: none of {', '.join(BROWSERS)} is on PATH")
+
     work = json.dumps({"frames": frames})
     script = f'<script id="film" type="application/json">{work}</script><script>{asset("film.js")}</script>'
     added = PICTURE_ONLY.format(*size) + script
+
     pictures: list[Image.Image] = []
     news = threading.Event()
     ended = threading.Event()
@@ -118,12 +123,14 @@ def drawn(text: str, frames: int, size: tuple[int, int]) -> list[Image.Image]:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
+
         try:
             while not ended.is_set() and news.wait(PATIENCE) and process.poll() is None:
                 news.clear()
         finally:
             process.terminate()
             process.wait(timeout=30)
+
     if len(pictures) < frames:
         raise InputError(f"{Path(browser).name} drew {len(pictures)} of {frames} pictures; is it a browser with WebGL?")
     return pictures
@@ -146,6 +153,7 @@ def _write(file: Path, pictures: list[Image.Image], rate: float, held: int) -> N
         writer = cv2.VideoWriter(str(file), code, rate, (width, height))
         if not writer.isOpened():
             raise OSError("is the folder there, and yours to write in?")
+
         for each in pictures + [pictures[-1]] * max(held - 1, 0):
             writer.write(np.asarray(each)[:height, :width, ::-1])
         writer.release()

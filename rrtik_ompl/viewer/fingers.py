@@ -46,12 +46,14 @@ def fingers_of(plan: TaskPlan, drawn: Robot, at: Vector) -> Fingers:
     nodes = joint_nodes(drawn)
     first = _placements(drawn)
     places = [_placements(world.robot) for world in plan.worlds]
+
     poses = {}
     for (joint, name), placement in first.items():
         moved = [found[joint, name] * placement.inverse() for found in places]
         if any(np.abs(pin.log6(shift).vector).max() > NO_SHIFT for shift in moved):
             rows = [pose_row(shift) for shift in moved]
             poses[nodes[joint], node_name(name)] = np.array(rows)
+
     return Fingers(poses, at)
 
 

@@ -58,6 +58,7 @@ def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | Non
     else:
         shown = value
         path = None
+
     planning = isinstance(value, (Plan, Problem))
     return InlinePage(page(shown, path, still=not planning))._repr_html_()
 

@@ -67,10 +67,12 @@ def _scene(problem: Problem, placed: list[_Placed]) -> Scene:
     there = {each.name: each for each in placed}
     known = {obstacle.name for obstacle in scene.obstacles}
     scene = scene.without(*(name for name, each in there.items() if name in known and not each.shown))
+
     moved = [_moved(obstacle, there.get(obstacle.name)) for obstacle in scene.obstacles]
     added = [
         _moved(Obstacle(each.name, _shape(each)), each) for each in placed if each.shown and each.name not in known
     ]
+
     return replace(scene, obstacles=(*moved, *added))
 
 

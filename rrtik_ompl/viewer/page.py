@@ -86,10 +86,13 @@ def page(
     else:
         more = listed(marks, "marks")
         subject = subject_of(shown, path, before, ghosts, more) if run is None else subject_of_run(shown, run)
+
     recording, frame = draw(subject)
     heading = _title(subject) if title is None else title
+
     told = story_of(subject, frame, heading)
     told["plan"] = None if still else _planning(shown, subject, frame)
+
     if asks and (not told["plan"] or told["plan"]["courses"]):
         raise InputError(
             f"{subject.name}: its page cannot plan: give a path or a goal of joint values, no path constraints and "
@@ -97,6 +100,7 @@ def page(
         )
     if told["plan"]:
         told["plan"]["asks"] = asks
+
     story = json.dumps(told, allow_nan=False, separators=(",", ":"))
     return Template(asset("page.html")).substitute(
         title=html.escape(heading),
@@ -117,6 +121,7 @@ def _planning(shown: Showable, subject: Subject, frame: Frame) -> dict[str, Any]
     plain = subject.run is None and subject.times is None
     if not isinstance(shown, Problem) or subject.end is None or not plain:
         return None
+
     one_joint = subject.is_path and bool(single_joint(subject.waypoints))
     found = page_planner(shown, subject.end, BOX_SHARE * frame.arm, one_joint=one_joint)
     return None if found is None else found | play_pace(shown.robot, frame.arm)
@@ -127,6 +132,7 @@ def _title(subject: Subject) -> str:
         return subject.name
     if subject.run is not None:
         return f"{subject.name}: {subject.run.planner}, {subject.run.outcome}"
+
     moves = len(subject.waypoints) - 1
     return f"{subject.name}: path of {moves} move{'' if moves == 1 else 's'}"
 
@@ -138,8 +144,13 @@ def asset(name: str) -> str:
 
 
 @cache
-def _packed_scripts(names: tuple[str, ...]) -> str:
-    return packed("\n".join(['"use strict";', *map(asset, names)]).encode("utf-8"))
+def _meshcat(name: str) -> str:
+    """A file of meshcat's viewer, found without an import of meshcat, which would take a second."""
+    spec = find_spec("meshcat")
+    folders = [] if spec is None else list(spec.submodule_search_locations or ())
+    if not folders:
+        raise InputError("the page needs the viewer of meshcat: pip install meshcat")
+    return Path(folders[0], "viewer", "dist", name).read_text(encoding="utf-8")
 
 
 @cache
@@ -148,10 +159,5 @@ def _packed_engine() -> str:
 
 
 @cache
-def _meshcat(name: str) -> str:
-    """A file of meshcat's viewer, found without an import of meshcat, which would take a second."""
-    spec = find_spec("meshcat")
-    folders = [] if spec is None else list(spec.submodule_search_locations or ())
-    if not folders:
-        raise InputError("the page needs the viewer of meshcat: pip install meshcat")
-    return Path(folders[0], "viewer", "dist", name).read_text(encoding="utf-8")
+def _packed_scripts(names: tuple[str, ...]) -> str:
+    return packed("\n".join(['"use strict";', *map(asset, names)]).encode("utf-8"))

@@ -30,6 +30,7 @@ def standing_parts(world: World) -> list[dict[str, Any]] | None:
     for i, j in by_motion(world.bodies, world.pairs)[1]:
         first, second = (i, j) if world.bodies[j].kind == "obstacle" else (j, i)
         partners.setdefault(first, []).append(world.bodies[second].name)
+
     found = []
     for number, names in partners.items():
         body = world.bodies[number]
@@ -38,6 +39,7 @@ def standing_parts(world: World) -> list[dict[str, Any]] | None:
         if solids is None:
             return None
         found.append({"name": body.name, "meets": sorted(set(names)), "solids": solids, "surfaces": surfaces})
+
     return found
 
 
@@ -46,8 +48,10 @@ def _solids(body: Body) -> list[dict[str, Any]] | None:
     placement = body.placement
     if not around or any(solid.kind != CONVEX_SOLID for solid in around):
         return None
+
     rounded = is_mesh(body.geometry)
     digits, more = (DIGITS, 2.0 * 10.0**-DIGITS) if rounded else (17, 0.0)
+
     return [
         {
             "corners": np.round(solid.corners @ placement.rotation.T + placement.translation, digits).tolist(),
@@ -63,11 +67,14 @@ def _surfaces(body: Body) -> list[dict[str, Any]]:
     """The triangles of a mesh, in the world; none of another body, nor of a mesh of very many."""
     if not is_mesh(body.geometry):
         return []
+
     vertices, triangles = mesh_arrays(body.geometry)
     if len(triangles) > MOST_TRIANGLES:
         return []
+
     used, numbers = np.unique(triangles, return_inverse=True)
     placed = vertices[used] @ body.placement.rotation.T + body.placement.translation
+
     return [
         {
             "corners": packed(_planes(np.round(placed / GRAIN))),

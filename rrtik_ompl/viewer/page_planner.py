@@ -56,24 +56,31 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     """
     if problem.constraints:
         return None
+
+    # Before there are spares, which are in no file.
     document = _document(problem)
     scene, courses = _standing_still(problem.world.scene)
     problem, spare = _with_spares(problem, scene, side)
+
     room = room_between(problem.world, np.stack([problem.start, goal]), None) or Room(0.0, 0.0)
     world = leaving_room(densely_checked(problem).world, room)
+
     module = page_kernels()
     motions = world.motions
     if module is None or motions is None:
         return None
+
     try:
         image, places = page_tables(problem, world, motions)
         tips = _tips(problem, image)
     except InputError:  # beyond what the margins of the kernels cover
         return None
+
     obstacles = _obstacles(problem.world, motions.fast, room.searched, spare)
     fixed = standing_parts(problem.world)
     if fixed is None or not {course["name"] for course in courses} <= {obstacle["name"] for obstacle in obstacles}:
         return None
+
     still = JointPath.of(problem.robot, problem.start[None])
     lower, upper = problem.robot.finite_range()
     return {
@@ -104,16 +111,6 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
         "path": {key: value for key, value in still.document().items() if key not in PATH_RESULTS},
         "problem": document,
     }
-
-
-def _tips(problem: Problem, image: MemoryImage) -> list[dict[str, Any]]:
-    """The tips that can be dragged, each with where its inverse kinematics stand, which are added to the image."""
-    robot = problem.robot
-    tips = []
-    for name in dragged_tips(problem.robot, problem.goal):
-        places = add_limb(image, robot if name == robot.tip else replace(robot, tip=name, closed_form=None))
-        tips += [tip_entry(robot, name) | places] if places else []
-    return tips
 
 
 def _document(problem: Problem) -> dict[str, Any] | None:
@@ -148,27 +145,36 @@ def _with_spares(problem: Problem, scene: Scene, side: float) -> tuple[Problem, 
         "cylinder": Cylinder(0.5 * side, side),
         "capsule": Capsule(0.3 * side, side),
     }
+
     far = pose([0.0, 0.0, -FAR_AWAY])
     spares = []
     for key, count in SPARES.items():
         names = [name for name in (f"{key} {k}" for k in range(1, count + len(taken) + 1)) if name not in taken]
         spares += [Obstacle(name, shapes[key], far) for name in names[:count]]
+
     return problem.with_world(problem.world.with_scene(scene.with_(*spares))), {spare.name for spare in spares}
 
 
-def _names(world: World, numbers: Iterable[int]) -> str:
-    return ", ".join(dict.fromkeys(world.bodies[number].name for number in numbers))
+def _tips(problem: Problem, image: MemoryImage) -> list[dict[str, Any]]:
+    """The tips that can be dragged, each with where its inverse kinematics stand, which are added to the image."""
+    robot = problem.robot
+    tips = []
+    for name in dragged_tips(problem.robot, problem.goal):
+        places = add_limb(image, robot if name == robot.tip else replace(robot, tip=name, closed_form=None))
+        tips += [tip_entry(robot, name) | places] if places else []
+    return tips
 
 
 def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str]) -> list[dict[str, Any]]:
     """The obstacles of simple shapes, which a page can move: how they are packed, and what is kept from each [m]."""
     found = []
     shapes = {obstacle.name: obstacle.shape for obstacle in world.scene.obstacles}
+
     for place, number in enumerate(fast.standing):
         body = world.bodies[number]
-        packed = _packed_shape(body)
+        numbers = _packed_shape(body)
         shape = shapes.get(body.name)
-        if packed is not None and shape is not None and shape.key in SPARES:
+        if numbers is not None and shape is not None and shape.key in SPARES:
             placed = body.placement.homogeneous
             found.append(
                 {
@@ -180,15 +186,11 @@ def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str]) -> l
                     "pose": placed.ravel().tolist(),
                     "shape": shape.key,
                     "sizes": _sizes(shape),
-                    **packed,
+                    **numbers,
                 }
             )
+
     return found
-
-
-def _sizes(shape: Shape) -> list[float]:
-    """Its measures in the order of a problem's file [m]."""
-    return [float(size) for measure in shape.measures for size in np.ravel(getattr(shape, measure.name))]
 
 
 def _packed_shape(body: Body) -> dict[str, Any] | None:
@@ -196,10 +198,12 @@ def _packed_shape(body: Body) -> dict[str, Any] | None:
     core = None if body.kind != "obstacle" else core_of(body.geometry)
     if core is None or len(convex_solids(body.geometry).around) != 1:
         return None
+
     kind = primitive_kind(body.geometry)
     half = core.half_sides
     if kind is None or kind >= layout.CENTRED_KINDS:
         return None
+
     return {
         "kind": kind,
         "half": [] if half is None else half.tolist(),
@@ -208,3 +212,12 @@ def _packed_shape(body: Body) -> dict[str, Any] | None:
         "radius": core.radius,
         "corners": core.corners.tolist(),
     }
+
+
+def _sizes(shape: Shape) -> list[float]:
+    """Its measures in the order of a problem's file [m]."""
+    return [float(size) for measure in shape.measures for size in np.ravel(getattr(shape, measure.name))]
+
+
+def _names(world: World, numbers: Iterable[int]) -> str:
+    return ", ".join(dict.fromkeys(world.bodies[number].name for number in numbers))

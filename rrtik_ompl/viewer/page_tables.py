@@ -66,16 +66,19 @@ def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[M
     fast = motions.fast
     for each in fast.tables:
         image.add(each)
+
     places = {
         "world": image.add(fast.table, links=dict(enumerate(fast.tables))),
         "motions": image.add(motions.table, links={motions.table.places["world"]: fast.table}),
         "probe": image.add(probe_table(fast.tables[layout.OUTER_PRIMITIVES : layout.INNER_PRIMITIVES + 1])),
         "pathRows": PATH_ROWS,
     }
+
     places["search"] = _add_connect(image, problem, motions)
     shortcuts = ShortcutSearch(motions, np.zeros((PATH_ROWS, problem.robot.dof)) + problem.start, asking=False)
     places["shortcuts"] = image.add(shortcuts.table)
     places["crdt"] = _add_crdt(image, problem, world, motions)
+
     return image, places
 
 
@@ -97,6 +100,7 @@ def _add_crdt(image: MemoryImage, problem: Problem, world: World, motions: FastM
     same = np.ones(motions.dof)
     none = np.zeros(motions.dof)
     rules = CrdtRules(*problem.robot.finite_range(), same, none, same)
+
     root = problem.start[None]
     table, _ = CrdtSearch(world, rules, 1, None, root, root, vertices=VERTICES).tables
     return image.add(table)

@@ -32,12 +32,15 @@ def dragged_tips(robot: Robot, goal: Goal | None) -> list[str]:
     named = () if goal is None else goal.frames
     tips = list(dict.fromkeys([robot.tip, *named]))
     carried = {row for tip in tips for row in _rows(robot, tip_entry(robot, tip)["joint"] - 1)}
+
+    # Rows that are nobody's parent are the ends of the tree's branches.
     for row in sorted(set(range(len(robot.chain.parent))) - set(robot.chain.parent.tolist())):
         own = set(_rows(robot, row)) - carried
         frames = [f for f in robot.model.frames if f.parentJoint == row + 1 and f.type == pin.FrameType.BODY]
         if frames and np.count_nonzero(np.any(robot.chain.gain[sorted(own)] != 0.0, axis=0)) >= OWN_JOINTS:
             tips.append(min(frames, key=partial(_unlike, robot.model.frames[robot.model.getFrameId(robot.tip)])).name)
             carried |= own
+
     return tips
 
 

@@ -39,25 +39,31 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
     vis = recording.root
     robot = subject.robot
     scene = subject.scene
+
     if robot is None:
         frame = frame_around(None, scene, [mark.vertices for mark in subject.marks])
     else:
         frame = _draw_robot(vis, robot, subject)
         draw_goal(vis, subject.goal, frame)
         draw_constraints(vis, subject.held, frame)
+
         if len(subject.waypoints) > 1:
             doubtful = () if subject.verdict is None else subject.verdict.unproven
             beads = subject.run is None and subject.times is None
             goal = subject.goal
             arms = [robot] if goal is None else goal.arms(robot)
             draw_trail(vis, arms, subject.waypoints, 0.0035 * frame.arm, beads=beads, unproven=doubtful)
+
         if subject.before is not None:
             draw_before(vis, robot, subject.before, 0.0035 * frame.arm)
+
     draw_scene(vis, scene, frame)
     draw_marks(vis, subject.marks)
     draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm)
+
     if robot is not None and robot.planar:
         _flatten(vis, frame)
+
     return recording, frame
 
 
@@ -68,19 +74,24 @@ def _draw_robot(vis: Node, robot: Robot, subject: Subject) -> Frame:
         shown = np.vstack([shown, subject.end])
     if subject.ghosts is not None:
         shown = np.vstack([shown, subject.ghosts])
+
     frames = robot.joint_frames(shown)
     held = attached_parts(robot, subject.scene.attached)
     parts = link_parts(robot) + held
     points = swept_points(parts, frames)
+
     places = _goal_points(subject.goal) + [mark.vertices for mark in subject.marks]
     if subject.before is not None:
         places.append(robot.fk_batch(_spread(subject.before))[:, :3, 3])
+
     frame = frame_around(points, subject.scene, places, whole=robot.planar)
     _draw_parts(vis["robot"], robot, parts, frames[0], frame)
     if subject.start is not None or subject.ghosts is not None:
         _draw_parts(vis["ghost"], robot, link_parts(robot, GHOST_TRIANGLES) + held, frames[0], frame)
+
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
     draw_triad(vis["robot"][joint_nodes(robot)[tip.parentJoint]]["tip frame"], tip.placement, 0.07 * frame.arm)
+
     return frame
 
 

@@ -39,6 +39,11 @@ def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[
     }
 
 
+def _motions(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
+    """Groups of a task as :func:`_groups` makes them: one for each of its motions."""
+    return [{**group, "event": "motion", "text": group["reason"]} for group in _groups(ticks)]
+
+
 def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     """Ticks of the same kind in a row: the first one's number, how many, the event and a text."""
     found: list[dict[str, Any]] = []
@@ -50,11 +55,6 @@ def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
         text += f", {max(spent):.1f} ms" if spent else ""
         found.append({"first": first, "count": len(rows), "event": event, "reason": reason, "text": text})
     return found
-
-
-def _motions(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
-    """The same for a task: one group for each of its motions."""
-    return [{**group, "event": "motion", "text": group["reason"]} for group in _groups(ticks)]
 
 
 def _places(obstacle: Obstacle, run: ReplanRun, frame: Frame) -> dict[str, Any]:
@@ -91,6 +91,7 @@ def _lines(run: ReplanRun, robot: Robot) -> tuple[list[list[list[float]]], list[
             lines.append(np.round(_tips(robot, tick.path), DIGITS).tolist())
             numbers.append(len(lines) - 1)
         known = rest
+
     return lines, numbers
 
 
@@ -99,6 +100,7 @@ def _tips(robot: Robot, path: Matrix) -> Matrix:
     lengths: Vector = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
     wanted = np.union1d(np.linspace(0.0, lengths[-1], MAX_POINTS), lengths)
     rows = np.stack([np.interp(wanted, lengths, column) for column in path.T], axis=1)
+
     tips = robot.fk_batch(rows)[:, :3, 3]
     kept: Matrix = tips[np.append(True, np.linalg.norm(np.diff(tips, axis=0), axis=1) > 1e-6)]
     return kept
@@ -109,9 +111,11 @@ def _replaced(run: ReplanRun, numbers: list[int]) -> list[int]:
     found = []
     last = -1
     until = -1
+
     for k, tick in enumerate(run.ticks):
         if tick.event == "repair" and k and numbers[k - 1] != numbers[k]:
             last = numbers[k - 1]
             until = k + int(SHOWN_SECONDS * run.rate)
         found.append(last if k <= until else -1)
+
     return found

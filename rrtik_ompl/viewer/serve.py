@@ -47,6 +47,7 @@ class PageServer:
         except (OSError, OverflowError, TypeError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"port {port}: cannot be used: {reason}; choose another one, or 0 for any") from error
+
         self._server.body = text.encode("utf-8")
         self._server.answer = answer
         self._thread = threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
@@ -105,7 +106,6 @@ class _Server(socketserver.ThreadingTCPServer):
         super().process_request(request, client_address)
 
     def shutdown_request(self, request: Taken) -> None:
-        """End a connection."""
         self._open.pop(request, None)
         super().shutdown_request(request)
 
@@ -127,11 +127,9 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 10.0  # [s] a silent connection is dropped
 
     def do_GET(self) -> None:
-        """Answer with the page."""
         self._answer(send_body=True)
 
     def do_HEAD(self) -> None:
-        """Answer with the page's headers."""
         self._answer(send_body=False)
 
     def do_POST(self) -> None:

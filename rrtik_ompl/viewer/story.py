@@ -65,35 +65,78 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
     }
 
 
-def _clearance(curve: ClearanceCurve) -> dict[str, Any]:
-    """The curve for the page: places as motion and share of it; distances that are too far to matter as null."""
-    near = curve.distances < FARTHEST
+def _robot(robot: Robot, tips: Sequence[str]) -> dict[str, Any]:
+    chain = robot.chain
     return {
-        "motions": curve.motions.tolist(),
-        "shares": _numbers(curve.shares),
-        "distances": [round(d, DIGITS) if ok else None for d, ok in zip(curve.distances.tolist(), near, strict=True)],
-        "pairs": [list(pair) for pair in curve.pairs],
-        "least": curve.least,
+        "name": robot.name,
+        "nodes": joint_nodes(robot),
+        "parent": chain.parent.tolist(),
+        "placement": _numbers(chain.placement.reshape(-1, 16)),
+        "axis": _numbers(chain.axis),
+        "prismatic": chain.prismatic.tolist(),
+        "gain": _numbers(chain.gain),
+        "offset": _numbers(chain.offset),
+        "tip": tip_entry(robot, robot.tip),
+        "trails": [tip_entry(robot, name) for name in tips],
+        "joints": [
+            {"name": name, "unit": shown_unit(slides)[1], "lower": _limit(low), "upper": _limit(high)}
+            for name, slides, low, high in zip(
+                robot.joint_names, robot.prismatic, robot.lower, robot.upper, strict=True
+            )
+        ],
     }
 
 
-def _proof(verdict: Verdict) -> dict[str, Any]:
-    """What is proven, and the numbers of the moves that are not; a doubt names their colour, ``palette.UNPROVEN``."""
-    text = f"{verdict.doubt} (violet){verdict.text}" if verdict.doubt else verdict.text
-    return {"proven": verdict.proven, "text": text, "unproven": list(verdict.unproven)}
+def _limit(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
-def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]:
-    """A stretch of the path in which bodies touch: what to draw red, what to say, where they touch if that is known."""
-    deepest = contact.deepest
-    point = 0.5 * (deepest.point_first + deepest.point_second)
+def _obstacles(scene: Scene) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": o.name,
+            "node": node_name(o.name),
+            "plate": not o.shape.bounded,
+            "moving": o.motion is not None,
+            "margin": o.margin,
+            "margin_drawn": o.margin > 0.0 and look_of_margin(o.shape, o.margin) is not None,
+        }
+        for o in scene.obstacles
+    ]
+
+
+def _ghosts(rows: Matrix | None) -> list[dict[str, Any]]:
+    """Configurations with a colour each; the colours repeat."""
+    colors = palette.SERIES
+    return [
+        {"name": f"solution {k + 1}", "color": colors[k % len(colors)], "q": _numbers(row)}
+        for k, row in enumerate(np.empty((0, 0)) if rows is None else rows)
+    ]
+
+
+def _mark(mark: Mark, number: int) -> dict[str, Any]:
     return {
-        "begin": contact.begin,
-        "end": contact.end,
-        "nodes": nodes_of(robot, scene, contact.names),
-        "text": str(deepest),
-        "point": _numbers(point) if np.isfinite(point).all() else None,
+        "name": mark.name,
+        "color": mark.color,
+        "opacity": max(mark.opacity, 0.3),
+        "node": f"{number}",
+        "shown": mark.shown,
     }
+
+
+def _compared(before: Matrix, after: Matrix) -> str:
+    """Number of moves and length of two paths: "12 moves, length 16.06; now 7, 3.16"."""
+    lengths = [f"{route_length(rows):.2f}" for rows in (before, after)]
+    return f"{transitions(before)} moves, length {lengths[0]}; now {transitions(after)}, {lengths[1]}"
+
+
+def _moves(waypoints: Matrix) -> list[dict[str, Any]]:
+    """For each move: the numbers of the joints that move, and the piece of the trail to which it belongs."""
+    movers = moved(waypoints[:-1], waypoints[1:])
+    return [
+        {"joints": np.flatnonzero(row).tolist(), "piece": int(piece)}
+        for row, piece in zip(movers, pieces(waypoints), strict=True)
+    ]
 
 
 def _times(subject: Subject, robot: Robot, frame: Frame) -> Vector:
@@ -119,6 +162,7 @@ def play_times(robot: Robot, waypoints: Matrix, arm: float) -> Vector:
     total = float(seconds.sum())
     if total > 0.0:
         seconds *= np.clip(total, *PLAY_SECONDS) / total
+
     return np.concatenate([[0.0], np.cumsum(seconds)])
 
 
@@ -134,50 +178,35 @@ def _speeds(robot: Robot, arm: float) -> Vector:
     return np.where(robot.prismatic, arm / 6.0, PLAY_SPEED)
 
 
-def grid_cell(size: float) -> float:
-    """Width of a grid cell [m] for a picture of this size [m]: 1, 2 or 5 times a power of ten, about a fifteenth."""
-    power = 10.0 ** np.floor(np.log10(size / 15.0))
-    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= size / 15.0))
+def _proof(verdict: Verdict) -> dict[str, Any]:
+    """What is proven, and the numbers of the moves that are not; a doubt names their colour, ``palette.UNPROVEN``."""
+    text = f"{verdict.doubt} (violet){verdict.text}" if verdict.doubt else verdict.text
+    return {"proven": verdict.proven, "text": text, "unproven": list(verdict.unproven)}
 
 
-def _robot(robot: Robot, tips: Sequence[str]) -> dict[str, Any]:
-    chain = robot.chain
+def _clearance(curve: ClearanceCurve) -> dict[str, Any]:
+    """The curve for the page: places as motion and share of it; distances that are too far to matter as null."""
+    near = curve.distances < FARTHEST
     return {
-        "name": robot.name,
-        "nodes": joint_nodes(robot),
-        "parent": chain.parent.tolist(),
-        "placement": _numbers(chain.placement.reshape(-1, 16)),
-        "axis": _numbers(chain.axis),
-        "prismatic": chain.prismatic.tolist(),
-        "gain": _numbers(chain.gain),
-        "offset": _numbers(chain.offset),
-        "tip": tip_entry(robot, robot.tip),
-        "trails": [tip_entry(robot, name) for name in tips],
-        "joints": [
-            {"name": name, "unit": shown_unit(slides)[1], "lower": _limit(low), "upper": _limit(high)}
-            for name, slides, low, high in zip(
-                robot.joint_names, robot.prismatic, robot.lower, robot.upper, strict=True
-            )
-        ],
+        "motions": curve.motions.tolist(),
+        "shares": _numbers(curve.shares),
+        "distances": [round(d, DIGITS) if ok else None for d, ok in zip(curve.distances.tolist(), near, strict=True)],
+        "pairs": [list(pair) for pair in curve.pairs],
+        "least": curve.least,
     }
 
 
-def _ghosts(rows: Matrix | None) -> list[dict[str, Any]]:
-    """Configurations with a colour each; the colours repeat."""
-    colors = palette.SERIES
-    return [
-        {"name": f"solution {k + 1}", "color": colors[k % len(colors)], "q": _numbers(row)}
-        for k, row in enumerate(np.empty((0, 0)) if rows is None else rows)
-    ]
+def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]:
+    """A stretch of the path in which bodies touch: what to draw red, what to say, where they touch if that is known."""
+    deepest = contact.deepest
+    point = 0.5 * (deepest.point_first + deepest.point_second)
 
-
-def _mark(mark: Mark, number: int) -> dict[str, Any]:
     return {
-        "name": mark.name,
-        "color": mark.color,
-        "opacity": max(mark.opacity, 0.3),
-        "node": f"{number}",
-        "shown": mark.shown,
+        "begin": contact.begin,
+        "end": contact.end,
+        "nodes": nodes_of(robot, scene, contact.names),
+        "text": str(deepest),
+        "point": _numbers(point) if np.isfinite(point).all() else None,
     }
 
 
@@ -189,33 +218,10 @@ def _places(subject: Subject) -> Matrix:
     return np.concatenate([frames, subject.robot.fk_batch(subject.waypoints)[:, :3, 3]])
 
 
-def _moves(waypoints: Matrix) -> list[dict[str, Any]]:
-    """For each move: the numbers of the joints that move, and the piece of the trail to which it belongs."""
-    movers = moved(waypoints[:-1], waypoints[1:])
-    return [
-        {"joints": np.flatnonzero(row).tolist(), "piece": int(piece)}
-        for row, piece in zip(movers, pieces(waypoints), strict=True)
-    ]
-
-
-def _compared(before: Matrix, after: Matrix) -> str:
-    """Number of moves and length of two paths: "12 moves, length 16.06; now 7, 3.16"."""
-    lengths = [f"{route_length(rows):.2f}" for rows in (before, after)]
-    return f"{transitions(before)} moves, length {lengths[0]}; now {transitions(after)}, {lengths[1]}"
-
-
-def _obstacles(scene: Scene) -> list[dict[str, Any]]:
-    return [
-        {
-            "name": o.name,
-            "node": node_name(o.name),
-            "plate": not o.shape.bounded,
-            "moving": o.motion is not None,
-            "margin": o.margin,
-            "margin_drawn": o.margin > 0.0 and look_of_margin(o.shape, o.margin) is not None,
-        }
-        for o in scene.obstacles
-    ]
+def grid_cell(size: float) -> float:
+    """Width of a grid cell [m] for a picture of this size [m]: 1, 2 or 5 times a power of ten, about a fifteenth."""
+    power = 10.0 ** np.floor(np.log10(size / 15.0))
+    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= size / 15.0))
 
 
 def _colors() -> dict[str, str]:
@@ -239,10 +245,6 @@ def _colors() -> dict[str, str]:
         "GRID_DARK",
     )
     return {name.lower(): getattr(palette, name) for name in names}
-
-
-def _limit(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def _numbers(values: NDArray[np.float64] | None) -> list[object] | None:

@@ -99,6 +99,7 @@ class Subject:
             return q if q is not None and (self.ghosts == q).all(axis=1).any() else None
         if not self.is_path or (self.run is not None and not self.run.arrived):
             return q
+
         end: Vector = self.waypoints[-1]
         return end
 
@@ -126,13 +127,6 @@ Showable: TypeAlias = HasWorld | Shown | World | Robot | Scene
 ShownPath: TypeAlias = JointPath | Trajectory | ArrayLike
 
 
-def _drawn(marks: tuple[Mark, ...]) -> tuple[Mark, ...]:
-    """The marks that have something to draw."""
-    for mark in marks:
-        require(mark, Mark, "mark of a view", "see rrtik_ompl.viewer.drawing.marks")
-    return tuple(mark for mark in marks if len(mark.faces))
-
-
 def subject_of(
     shown: Showable,
     path: ShownPath | None = None,
@@ -155,11 +149,13 @@ def subject_of(
     """
     if before is not None and path is None:
         raise InputError("view: there is a path before, but none after it; give the path to show too")
+
     marks = _drawn(marks)
     if isinstance(shown, Scene):
         if path is not None or ghosts is not None:
             raise InputError("view: a path needs a robot; show a problem, a world or a robot instead of a scene alone")
         return Subject("Scene", None, shown, None, frozen(np.empty((0, 0))), False, marks=marks)
+
     if isinstance(shown, Robot):
         robot = shown
         scene = Scene()
@@ -169,14 +165,23 @@ def subject_of(
             raise InputError(f"view: cannot show a {type(shown).__name__}; give a problem, world, robot or scene")
         robot = world.robot
         scene = world.scene
-    subject = _posture(shown, robot, scene)
+
+    subject = replace(_posture(shown, robot, scene), marks=marks)
     if ghosts is not None:
         subject = replace(subject, ghosts=_path(robot, ghosts).waypoints)
-    subject = replace(subject, marks=marks)
+
     if path is None:
         return subject
+
     earlier = None if before is None else _path(robot, before).waypoints
     return replace(_moving(subject, getattr(shown, "world", shown), path), before=earlier)
+
+
+def _drawn(marks: tuple[Mark, ...]) -> tuple[Mark, ...]:
+    """The marks that have something to draw."""
+    for mark in marks:
+        require(mark, Mark, "mark of a view", "see rrtik_ompl.viewer.drawing.marks")
+    return tuple(mark for mark in marks if len(mark.faces))
 
 
 def _posture(shown: Showable, robot: Robot, scene: Scene) -> Subject:
@@ -185,8 +190,10 @@ def _posture(shown: Showable, robot: Robot, scene: Scene) -> Subject:
     name = robot.name if named == "problem" else str(named)
     start = getattr(shown, "start", None)
     posture = robot.clamp(np.zeros(robot.dof)) if start is None else robot.configuration(start, "start")
+
     world = getattr(shown, "world", shown)
     regions = () if not isinstance(world, World) or world.constraints is None else world.constraints.regions
+
     return Subject(
         name,
         robot,
@@ -208,6 +215,7 @@ def _moving(subject: Subject, world: object, path: ShownPath) -> Subject:
         motion: JointPath | Trajectory = path
     else:
         motion = _path(robot, path)
+
     played = motion.played(world if isinstance(world, World) else None)
     found = replace(
         subject,
@@ -216,10 +224,29 @@ def _moving(subject: Subject, world: object, path: ShownPath) -> Subject:
         times=played.times,
         held=tuple((region, played.waypoints[0]) for region, _ in subject.held),
     )
+
     judged = played.judged
     if judged is None:
         return found
     return replace(found, verdict=judged.verdict, curve=judged.curve, contacts=judged.contacts)
+
+
+def _path(robot: Robot, path: ShownPath) -> JointPath:
+    """A path of a robot: one that names its joints names those of the robot."""
+    given: Any = path
+    for part in ("path", "trajectory", "run"):
+        if isinstance(getattr(given, part, None), JointPath | Trajectory | ReplanRun):
+            raise InputError(f"view: cannot play a {type(given).__name__}; give its {part}")
+
+    rows = finite_array(getattr(given, "waypoints", given), (None, None), "path")
+    if len(rows) == 0 or rows.shape[1] != robot.dof:
+        raise InputError(
+            f"path: robot '{robot.name}' has {robot.dof} joints ({', '.join(robot.joint_names)}), "
+            f"but the path has shape {rows.shape}"
+        )
+    if isinstance(path, JointPath):
+        return fitted(path, robot)
+    return JointPath(rows, robot.joint_names, robot.prismatic, robot.name, robot.continuous)
 
 
 def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
@@ -230,10 +257,12 @@ def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
     """
     subject = replayed(problem, run)
     scene = run.scenes[0].scene if run.scenes else subject.scene  # a feed may begin elsewhere than the problem
+
     still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
     for name in {obstacle.name for obstacle in still}.union(*(tick.poses for tick in run.ticks)):
         subject.scene.obstacle(name)  # or it is a run of another problem
     scene = replace(subject.scene, obstacles=still)
+
     judged = run.judged(problem if isinstance(problem, Problem) else None)
     return replace(subject, scene=scene, verdict=judged.verdict, contacts=judged.contacts)
 
@@ -247,27 +276,12 @@ def replayed(shown: Showable, run: ReplanRun) -> Subject:
     require(run, ReplanRun, "run to show", "use replan() or load_run(file)")
     if len(run.ticks) == 0:
         raise InputError("run to show: it has no tick")
+
     subject = subject_of(shown)
     robot = subject.robot
     rows = run.configurations
     if robot is None or robot.joint_names != run.joint_names:
         raise InputError(f"run to show: one of robot '{run.robot}' with other joints; give the problem that was run")
+
     held = tuple((region, rows[0]) for region, _ in subject.held)
     return replace(subject, waypoints=_path(robot, rows).waypoints, is_path=True, run=run, held=held)
-
-
-def _path(robot: Robot, path: ShownPath) -> JointPath:
-    """A path of a robot: one that names its joints names those of the robot."""
-    given: Any = path
-    for part in ("path", "trajectory", "run"):
-        if isinstance(getattr(given, part, None), JointPath | Trajectory | ReplanRun):
-            raise InputError(f"view: cannot play a {type(given).__name__}; give its {part}")
-    rows = finite_array(getattr(given, "waypoints", given), (None, None), "path")
-    if len(rows) == 0 or rows.shape[1] != robot.dof:
-        raise InputError(
-            f"path: robot '{robot.name}' has {robot.dof} joints ({', '.join(robot.joint_names)}), "
-            f"but the path has shape {rows.shape}"
-        )
-    if isinstance(path, JointPath):
-        return fitted(path, robot)
-    return JointPath(rows, robot.joint_names, robot.prismatic, robot.name, robot.continuous)

@@ -35,12 +35,14 @@ def subject_of_task(shown: Showable, played: PlayedTask) -> Subject:
     first = plan.worlds[0]
     kept = _kept(plan)
     places = _places(first, played.waypoints[0])
+
     loose = [item for item in first.scene.attached if item.name not in kept]
     things: list[Obstacle | AttachedObject] = [*first.scene.obstacles, *loose]
     scene = Scene(
         tuple(Obstacle(each.name, each.shape, places[each.name], margin=each.margin) for each in things),
         tuple(item for item in first.scene.attached if item.name in kept),
     )
+
     return replace(
         replayed(shown, run_of(played)),
         robot=first.robot,
@@ -57,6 +59,7 @@ def run_of(played: PlayedTask) -> ReplanRun:
     plan = played.plan
     robot = plan.worlds[0].robot
     kept = _kept(plan)
+
     ticks: list[Tick] = []
     for number, q in zip(played.motions.tolist(), played.waypoints, strict=True):
         path = plan.paths[number]
@@ -64,6 +67,7 @@ def run_of(played: PlayedTask) -> ReplanRun:
         text = f"motion {number + 1} of {len(plan.paths)}: {plan.stages[number]}"
         poses = {name: pose_row(place) for name, place in _places(world, q).items() if name not in kept}
         ticks.append(Tick(len(ticks) / played.rate, q, "walk", path.waypoints, poses, {}, reason=text))
+
     return ReplanRun(
         problem=robot.name,
         robot=robot.name,

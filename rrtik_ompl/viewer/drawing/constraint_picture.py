@@ -35,11 +35,13 @@ def draw_constraints(vis: Node, held: Iterable[tuple[HeldRegion, Vector]], frame
     for k, (region, start) in enumerate(held):
         node = vis["constraints"][f"{k}"]
         D = region.displacements(start[None])[0]
+
         if (np.abs(region.region.bounds[:3]) < ANYWHERE).any():
             low, high = _seen(region.region.bounds[:3], D[:3, 3], frame)
             look = look_of_shape(Box(np.maximum(high - low, THINNEST * frame.arm)))
             node["place"].set_object(look.geometry, look_material(palette.GOAL, OPACITY))
             node["place"].set_transform(region.T_world_w @ pin.SE3(np.eye(3), 0.5 * (low + high)).homogeneous)
+
         if region.turning == Turning.AXIS:
             length = CONE * frame.arm
             cone = _cone(length, length * np.tan(region.region.orientation_tolerance))
@@ -57,8 +59,11 @@ def _cone(length: float, radius: float) -> tuple[Matrix, NDArray[np.int64]]:
     """A cone that opens along z from its tip: corners and faces, shapes (n, 3)."""
     angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(SIDES, length)])
+
+    # Corner 0 is the tip, 1 to SIDES the rim, SIDES + 1 the middle of the lid.
     around = np.arange(SIDES) + 1
     following = np.roll(np.arange(SIDES) + 1, -1)
     faces = np.column_stack([np.zeros(SIDES, dtype=np.int64), following, around])
     lid = np.column_stack([np.full(SIDES, SIDES + 1), around, following])
+
     return np.vstack([np.zeros(3), rim, [0.0, 0.0, length]]), np.vstack([faces, lid])

@@ -58,10 +58,12 @@ def frame_around(
         low = everything.min(axis=0)
         high = everything.max(axis=0)
         return Frame(low, high, max(float(np.linalg.norm(high - low)), 1e-3))
+
     points = np.concatenate([arm_points, *extra])
     low = points.min(axis=0)
     high = points.max(axis=0)
     arm = max(float(np.linalg.norm(high - low)), 1e-3)
+
     near_low = low - SURROUNDINGS_MARGIN * arm
     near_high = high + SURROUNDINGS_MARGIN * arm
     for corners in boxes:
@@ -69,6 +71,7 @@ def frame_around(
             corners = np.clip(corners, near_low, near_high)
         low = np.minimum(low, corners.min(axis=0))
         high = np.maximum(high, corners.max(axis=0))
+
     return Frame(low, high, max(arm, 0.1 * float(np.linalg.norm(high - low))))
 
 

@@ -92,15 +92,18 @@ def cubes(
     origin = np.asarray(corner, dtype=np.float64)
     pieces = []
     filled = np.pad(inside, 1)
+
     for axis in range(3):
         for side in (0, 1):
             neighbour = np.roll(filled, 1 - 2 * side, axis=axis)
+            # A face is drawn where a filled cell has an empty one beside it.
             places = np.argwhere(filled & ~neighbour) - 1.0
             square = np.zeros((len(places), 4, 3))
             square[..., axis] = side
             for k in (0, 1):
                 square[..., (axis + 1 + k) % 3] = CORNERS[:, k]
             pieces.append(origin + size * (places[:, None] + square))
+
     corners = np.concatenate(pieces)
     faces = (4 * np.arange(len(corners))[:, None] + SQUARE_FACES).reshape(-1, 3)
     return Mark(name, color, frozen(corners.reshape(-1, 3)), frozen(faces, np.int64), **options)
@@ -118,8 +121,10 @@ def _joined(name: str, color: str, bodies: Iterable[tuple[Matrix, Faces]], optio
     vertices = [np.empty((0, 3))]
     faces = [np.empty((0, 3), dtype=np.int64)]
     count = 0
+
     for points, triangles in bodies:
         vertices.append(points)
         faces.append(np.asarray(triangles, dtype=np.int64) + count)
         count += len(points)
+
     return Mark(name, color, frozen(np.concatenate(vertices)), frozen(np.concatenate(faces), np.int64), **options)

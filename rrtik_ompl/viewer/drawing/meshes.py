@@ -56,9 +56,11 @@ def look_of_shape(shape: Shape, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look:
     own = OWN_LOOKS.get(type(shape))
     if own is not None:
         return own(shape)
+
     surface = shape.surface()
     if shape.smooth:
         return look_of_triangles(*surface)
+
     return look_of_triangles(*split_creases(*(thin_out(*surface, limit) if shape.fine else surface)))
 
 
@@ -85,11 +87,22 @@ def half_space_plate(shape: HalfSpace, centre: ArrayLike, size: float) -> tuple[
     """
     thickness = 0.002 * size
     near = np.asarray(centre, dtype=np.float64)
+    # The plate lies half its thickness below the plane, so that its upper side is in it.
     foot = near - (shape.normal @ near - shape.offset + 0.5 * thickness) * shape.normal
+
     pose = np.eye(4)
     pose[:3, :3] = _frame_along(shape.normal)
     pose[:3, 3] = foot
+
     return look_of_shape(Box([size, size, thickness])), pose
+
+
+def _frame_along(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A rotation whose z axis is ``normal``, shape (3, 3)."""
+    aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    x = np.cross(aside, normal)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(normal, x), normal], 1)
 
 
 def thickened(look: Look, least: float) -> Look:
@@ -97,10 +110,12 @@ def thickened(look: Look, least: float) -> Look:
     sides = np.ptp(look.corners, axis=0)
     if np.median(sides) >= least:
         return look
+
     middle = look.corners.mean(axis=0)
     half = 0.5 * np.where(sides == sides.max(), sides, 0.0)
     if sides.max() >= 2.0 * least:
         return look_of_triangles(*tube(np.stack([middle - half, middle + half]), 0.5 * least))
+
     place = np.eye(4)
     place[:3, 3] = middle
     return Look(SphereGeometry(BEAD * least), place, look.corners)
@@ -116,10 +131,12 @@ def look_of_coal(geometry: coal.CollisionGeometry, limit: int = MAX_OBSTACLE_TRI
     if isinstance(geometry, coal.Ellipsoid):
         stretch = np.diag([*geometry.radii, 1.0])
         return Look(SphereGeometry(1.0), stretch, box_corners([-geometry.radii, geometry.radii]))
+
     if isinstance(geometry, coal.Cone):
         half = [geometry.radius, geometry.radius, geometry.halfLength]
         cone = CylinderGeometry(2.0 * geometry.halfLength, 0.0, geometry.radius)
         return _primitive(cone, _Y_TO_Z, half)
+
     try:
         shape = _shape_of(geometry)
         return None if shape is None else look_of_shape(shape, limit)
@@ -127,23 +144,15 @@ def look_of_coal(geometry: coal.CollisionGeometry, limit: int = MAX_OBSTACLE_TRI
         return None
 
 
-@once_per_geometry
-def _shape_of(geometry: coal.CollisionGeometry) -> Shape | None:
-    """The shape of a coal geometry; an arm and its ghosts, which have fewer triangles, ask for the same."""
-    return shape_of(geometry)
-
-
 def _primitive(geometry: Geometry, placement: NDArray[np.float64], half: ArrayLike) -> Look:
     sides = np.asarray(half, dtype=np.float64)
     return Look(geometry, placement, box_corners([-sides, sides]))
 
 
-def _frame_along(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A rotation whose z axis is ``normal``, shape (3, 3)."""
-    aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    x = np.cross(aside, normal)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(normal, x), normal], 1)
+@once_per_geometry
+def _shape_of(geometry: coal.CollisionGeometry) -> Shape | None:
+    """The shape of a coal geometry; an arm and its ghosts, which have fewer triangles, ask for the same."""
+    return shape_of(geometry)
 
 
 def _points(cloud: PointCloud) -> PointGeometry:

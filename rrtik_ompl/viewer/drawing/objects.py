@@ -129,10 +129,12 @@ def described_object(path: str, geometry: Geometry, material: Material) -> dict[
     names = {part: f"{path}/{part}" for part in ("geometry", "material")}
     kind = "Mesh"
     look = material.described()
+
     if isinstance(geometry, PointGeometry):
         seen = {name: look[name] for name in ("color", "opacity", "transparent")}
         kind = "Points"
         look = {"type": "PointsMaterial", "size": 2.0 * geometry.radius, **seen}
+
     return {
         "metadata": {"version": 4.5, "type": "Object"},
         "geometries": [{"uuid": names["geometry"], **geometry.described()}],

@@ -22,9 +22,11 @@ def reach_marks(reach: ReachMap, *, cut: bool = True) -> list[Mark]:
     if cut and seen.shape[2] > 1:
         x, y = (reach.centres(k) - reach.base[k] for k in (0, 1))
         seen[np.ix_(x > 0.0, y < 0.0, np.ones(seen.shape[2], dtype=bool))] = False
+
     most = 1.0 if reach.measure == "orientations" else float(reach.values.max(initial=0.0))
     step = most / len(SCALE)
     kind = np.minimum((reach.values / step).astype(int), len(SCALE) - 1) if most else np.zeros(seen.shape, dtype=int)
+
     names = [f"{k * step:.2g} to {(k + 1) * step:.2g} {MEANING[reach.measure]}" for k in range(len(SCALE))]
     return [
         cubes(name, color, seen & (kind == k), reach.corner, reach.size)

@@ -69,6 +69,7 @@ def link_parts(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> list[Part]:
 def _link_parts(bodies: Sequence[pin.GeometryObject], triangles: int) -> list[Part]:
     total = max(sum(triangle_count(body.geometry) for body in bodies), 1)
     parts = []
+
     for body in bodies:
         share = triangles * triangle_count(body.geometry) // total
         look = look_of_coal(body.geometry, max(share, 200))
@@ -98,6 +99,7 @@ def attached_parts(robot: Robot, attached: Sequence[AttachedObject]) -> list[Par
             raise UnknownNameError(
                 f"link of robot '{robot.name}'", item.link, robot.link_names, where=f"attached '{item.name}'"
             )
+
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         placement = (frame.placement * item.pose).homogeneous
         name = held_node_name(item.name)
@@ -110,9 +112,11 @@ def nodes_of(robot: Robot, scene: Scene, names: Collection[str]) -> list[list[st
     joints = joint_nodes(robot)
     frames = robot.model.frames
     solids = (*robot.visual.geometryObjects, *robot.collision.geometryObjects)
+
     links = {(joints[s.parentJoint], node_name(s.name)) for s in solids if frames[s.parentFrame].name in names}
     held = {(joints[p.joint], p.name) for p in attached_parts(robot, [a for a in scene.attached if a.name in names])}
     obstacles = [["obstacles", node_name(o.name)] for o in scene.obstacles if o.name in names]
+
     return [["robot", *steps] for steps in sorted(links | held)] + obstacles
 
 
@@ -121,6 +125,7 @@ def draw_parts(node: Node, robot: Robot, parts: list[Part], frames: NDArray[np.f
     names = joint_nodes(robot)
     for name, placement in zip(names, frames, strict=True):
         node[name].set_transform(placement)
+
     for part in parts:
         leaf = node[names[part.joint]][part.name]
         leaf.set_object(part.look.geometry, Material(color=palette.number(part.color), shininess=40))

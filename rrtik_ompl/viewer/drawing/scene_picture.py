@@ -61,9 +61,11 @@ def _draw_margin(node: Node, obstacle: Obstacle, placement: Matrix) -> None:
 def _draw_motion(node: Node, obstacle: Obstacle, motion: Motion, frame: Frame) -> None:
     times = LATER_SECONDS if isinstance(motion, ConstantVelocity) else tuple(motion.times[motion.times > 0.0])
     look = look_of_shape(obstacle.shape)
+
     for k, time in enumerate(times):
         node[f"at {k}"].set_object(look.geometry, look_material(palette.OBSTACLE, opacity=0.2))
         node[f"at {k}"].set_transform(motion.pose_at(obstacle.pose, time).homogeneous @ look.placement)
+
     stations = np.array([motion.pose_at(obstacle.pose, time).translation for time in np.linspace(0.0, times[-1], 40)])
     draw_tube(node["way"], stations, 0.003 * frame.arm, palette.OBSTACLE)
 
@@ -72,6 +74,7 @@ def draw_goal(vis: Node, goal: Goal | None, frame: Frame) -> None:
     """Draw under ``goal`` the frame of a pose, the point of a position, or all parts of a region."""
     if goal is None:
         return
+
     for k, part in enumerate(goal.parts[:MAX_GOALS_DRAWN]):
         node = vis["goal"][f"{k}"]
         if not isinstance(part, Target):
@@ -92,6 +95,7 @@ def _draw_region(node: Node, region: TaskRegion, frame: Frame) -> None:
         node["region"].set_object(look.geometry, look_material(palette.GOAL, opacity=0.3))
         middle = pin.SE3(np.eye(3), 0.5 * (low + high)[:3] + region.T_w_tip.translation)
         node["region"].set_transform((region.T_world_w * middle).homogeneous)
+
     for k, pose in enumerate(goal_frames(region)):
         draw_triad(node["frame" if k == 0 else f"frame {k}"], pin.SE3(pose), (0.12 if k == 0 else 0.05) * frame.arm)
 
@@ -100,10 +104,12 @@ def goal_frames(region: TaskRegion) -> NDArray[np.float64]:
     """Poses of the tip that show a region: the one of least displacement, and others along each range; (k, 4, 4)."""
     low, high = region.bounds.T
     least = np.clip(np.zeros(6), low, high)
+
     rows = [least]
     for k in np.flatnonzero(region.free):
         for value in np.linspace(low[k], min(high[k], low[k] + TAU), FRAMES_PER_RANGE):
             rows.append(np.where(np.arange(6) == k, value, least))
+
     return region.poses(np.array(rows))
 
 

@@ -26,14 +26,6 @@ def pieces(waypoints: Matrix) -> NDArray[np.int64]:
     return np.arange(moves) * min(moves, MAX_PIECES) // max(moves, 1)
 
 
-def draw_before(vis: Node, robot: Robot, waypoints: Matrix, radius: float) -> None:
-    """Draw the tip's trail on another path, thinner, under ``before``; arguments as of :func:`draw_trail`."""
-    tips = robot.fk_batch(_dense(robot, waypoints, len(waypoints)))[:, :3, 3]
-    tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
-    if len(tips) > 1:
-        draw_tube(vis["before"], tips, 0.6 * radius, palette.BEFORE)
-
-
 def draw_trail(
     vis: Node,
     arms: Sequence[Robot],
@@ -55,16 +47,17 @@ def draw_trail(
     """
     piece = pieces(waypoints)
     doubtful = set(piece[list(unproven)].tolist())
+
     for k in np.unique(piece):
         first, last = np.flatnonzero(piece == k)[[0, -1]]
         rows = _dense(arms[0], waypoints[first : last + 2], len(waypoints))
         for number, arm in enumerate(arms):
-            tips = arm.fk_batch(rows)[:, :3, 3]
-            tips = tips[np.insert(np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius, 0, True)]
+            tips = _way(arm, rows, radius)
             node = vis["trail"][f"piece {k}"]
             if len(tips) > 1:  # a turning wrist need not move the tip
                 color = palette.UNPROVEN if k in doubtful else palette.TRAIL
                 draw_tube(node if number == 0 else node[f"tip {number + 1}"], tips, radius, color)
+
     if beads and len(waypoints) <= MAX_PIECES:
         for k, tip in enumerate(arms[0].fk_batch(waypoints)):
             bead = vis["beads"][f"waypoint {k}"]
@@ -72,12 +65,29 @@ def draw_trail(
             bead.set_transform(tip)
 
 
+def draw_before(vis: Node, robot: Robot, waypoints: Matrix, radius: float) -> None:
+    """Draw the tip's trail on another path, thinner, under ``before``; arguments as of :func:`draw_trail`."""
+    tips = _way(robot, _dense(robot, waypoints, len(waypoints)), radius)
+    if len(tips) > 1:
+        draw_tube(vis["before"], tips, 0.6 * radius, palette.BEFORE)
+
+
+def _way(arm: Robot, rows: Matrix, radius: float) -> Matrix:
+    """Positions of the tip, shape (m, 3), without those that a tube of this radius [m] would not show."""
+    tips = arm.fk_batch(rows)[:, :3, 3]
+    far = np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius
+    way: Matrix = tips[np.insert(far, 0, True)]
+    return way
+
+
 def _dense(robot: Robot, waypoints: Matrix, total: int) -> Matrix:
     """Configurations along some moves, close enough that the tip's arcs appear round. Shape (m, dof)."""
     most = max(MAX_RINGS // total, 2)
     rows = [waypoints[:1]]
+
     for a, b in pairwise(waypoints):
         turn = float(np.abs(b - a)[~robot.prismatic].max(initial=0.0))
         steps = int(np.clip(np.ceil(turn / RING_STEP), 1, most))
         rows.append(a + (b - a) * np.linspace(0.0, 1.0, steps + 1)[1:, None])
+
     return np.concatenate(rows)

@@ -28,6 +28,7 @@ def tree_marks(run: TreeSearch, *, unit: float = 1.0) -> list[Mark]:
     require(run, TreeSearch, "tree to show")
     reach = run.links.reach * unit
     goal = _in_space(run.goal[None]) * unit
+
     marks = []
     for index in range(1, run.links.count + 1):
         color = palette.SERIES[(index - 1) % len(palette.SERIES)]
@@ -35,17 +36,20 @@ def tree_marks(run: TreeSearch, *, unit: float = 1.0) -> list[Mark]:
             name = f"where joint {index + 1} can be"
             far = float(run.links.remaining[index]) * unit
             marks.append(balls(name, color, goal, far, opacity=REGION_OPACITY))
+
         before, level = (_in_space(run.nodes[k]) * unit for k in (index - 1, index))
         edges = np.stack([before[run.parents[index - 1]], level], axis=1)[:MAX_LINKS]
         rest = len(level) - len(edges)
         name = f"links of index {index}" + (f" (all but {rest})" if rest else "")
         marks.append(tubes(name, color, edges, LINK_RADIUS * reach))
+
     chain = _in_space(run.chain) * unit
     marks.append(
         tubes("answer", palette.INK, [chain[k : k + 2] for k in range(len(chain) - 1)], SOLUTION_RADIUS * reach)
     )
     marks.append(balls("its joints", palette.INK, chain, 1.6 * SOLUTION_RADIUS * reach))
     marks.append(balls("goal", palette.TRAIL, goal, 2.4 * SOLUTION_RADIUS * reach))
+
     return marks
 
 

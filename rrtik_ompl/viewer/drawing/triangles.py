@@ -27,17 +27,51 @@ def split_creases(vertices: Matrix, faces: Faces, angle: float = CREASE) -> tupl
     start = faces.reshape(-1)
     end = np.roll(faces, -1, axis=1).reshape(-1)  # half-edge h starts at corner h
     first, second = _half_edge_pairs(start, end, len(vertices))
+
     normals = _unit_normals(vertices, faces)
     smooth = np.einsum("ij,ij->i", normals[first // 3], normals[second // 3]) > np.cos(angle)
     first = first[smooth]
     second = second[smooth]
+
+    # Of both half-edges, the corners that stand at the same vertex; on a sound surface they run in opposite directions.
     opposed = start[first] == end[second]
     at_start = np.where(opposed, _next_corner(second), second)
     at_end = np.where(opposed, second, _next_corner(second))
     label = _components(np.concatenate([first, _next_corner(first)]), np.concatenate([at_start, at_end]), len(start))
+
     split = np.empty((label.max() + 1, 3))
     split[label] = vertices[start]
+
     return split, label.reshape(-1, 3)
+
+
+def _half_edge_pairs(start: Faces, end: Faces, count: int) -> tuple[Faces, Faces]:
+    """Numbers of the two half-edges of every edge that belongs to exactly two triangles."""
+    key = np.minimum(start, end) * count + np.maximum(start, end)
+    _, group, users = np.unique(key, return_inverse=True, return_counts=True)
+    group = np.asarray(group).reshape(-1)
+
+    shared = np.flatnonzero(users[group] == 2)
+    pairs = shared[np.argsort(group[shared], kind="stable")].reshape(-1, 2)
+
+    return pairs[:, 0], pairs[:, 1]
+
+
+def _unit_normals(vertices: Matrix, faces: Faces) -> Matrix:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    unit: Matrix = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return unit
+
+
+def _next_corner(half_edge: Faces) -> Faces:
+    return half_edge - half_edge % 3 + (half_edge + 1) % 3
+
+
+def _components(rows: Faces, columns: Faces, count: int) -> Faces:
+    """Number of the connected component of each of ``count`` nodes, joined by edges rows[k] - columns[k]."""
+    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def thin_out(vertices: Matrix, faces: Faces, limit: int) -> tuple[Matrix, Faces]:
@@ -49,22 +83,45 @@ def thin_out(vertices: Matrix, faces: Faces, limit: int) -> tuple[Matrix, Faces]
     cell = extent / 400.0
     thin_vertices = vertices
     thin_faces = faces
+
     while len(thin_faces) > limit and cell < extent:
         thin_vertices, thin_faces = _cluster(vertices, faces, cell)
         cell *= max(1.1, 0.9 * np.sqrt(len(thin_faces) / limit))  # the number of triangles goes with the cell's area
     return thin_vertices, thin_faces
 
 
+def _cluster(vertices: Matrix, faces: Faces, cell: float) -> tuple[Matrix, Faces]:
+    grid = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64)
+    size = grid.max(axis=0) + 1
+    _, label = np.unique((grid[:, 0] * size[1] + grid[:, 1]) * size[2] + grid[:, 2], return_inverse=True)
+    label = label.reshape(-1)
+
+    count = np.bincount(label)
+    means = np.stack([np.bincount(label, vertices[:, k]) / count for k in range(3)], 1)
+
+    merged = label[faces]
+    kept = (merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2]) & (merged[:, 2] != merged[:, 0])
+    merged = merged[kept]
+
+    # Of triangles that now lie upon each other, as the two sides of a thin wall do, one is enough.
+    low, middle, high = np.sort(merged, axis=1).T
+    _, different = np.unique((low * len(means) + middle) * len(means) + high, return_index=True)
+
+    return means, merged[np.sort(different)].astype(np.int64)
+
+
 def tube(points: Matrix, radius: float, sides: int = 8) -> tuple[Matrix, Faces]:
     """Tube of the given radius along a line through at least two points, shape (k, 3)."""
     along = np.gradient(points, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+
     across = np.empty_like(points)
     normal = np.eye(3)[int(np.argmin(np.abs(along[0])))]
     for k, direction in enumerate(along):  # carry one normal along the line, so that the tube does not twist
         normal = normal - (normal @ direction) * direction
         normal /= max(float(np.linalg.norm(normal)), 1e-12)
         across[k] = normal
+
     beside = np.cross(along, across)
     turn = np.linspace(0.0, TAU, sides, endpoint=False)[:, None]
     circles = points[:, None] + radius * (np.cos(turn) * across[:, None] + np.sin(turn) * beside[:, None])
@@ -76,49 +133,8 @@ def box_corners(points: ArrayLike) -> Matrix:
     rows = np.asarray(points, dtype=np.float64)
     low = rows.min(axis=0)
     high = rows.max(axis=0)
+
+    # Bits 0, 1 and 2 of a corner's number say where it is along x, y and z.
     pick = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], dtype=bool)
     corners: Matrix = np.where(pick, high, low)
     return corners
-
-
-def _half_edge_pairs(start: Faces, end: Faces, count: int) -> tuple[Faces, Faces]:
-    """Numbers of the two half-edges of every edge that belongs to exactly two triangles."""
-    key = np.minimum(start, end) * count + np.maximum(start, end)
-    _, group, users = np.unique(key, return_inverse=True, return_counts=True)
-    group = np.asarray(group).reshape(-1)
-    shared = np.flatnonzero(users[group] == 2)
-    pairs = shared[np.argsort(group[shared], kind="stable")].reshape(-1, 2)
-    return pairs[:, 0], pairs[:, 1]
-
-
-def _components(rows: Faces, columns: Faces, count: int) -> Faces:
-    """Number of the connected component of each of ``count`` nodes, joined by edges rows[k] - columns[k]."""
-    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
-
-
-def _next_corner(half_edge: Faces) -> Faces:
-    return half_edge - half_edge % 3 + (half_edge + 1) % 3
-
-
-def _unit_normals(vertices: Matrix, faces: Faces) -> Matrix:
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    unit: Matrix = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    return unit
-
-
-def _cluster(vertices: Matrix, faces: Faces, cell: float) -> tuple[Matrix, Faces]:
-    grid = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64)
-    size = grid.max(axis=0) + 1
-    _, label = np.unique((grid[:, 0] * size[1] + grid[:, 1]) * size[2] + grid[:, 2], return_inverse=True)
-    label = label.reshape(-1)
-    count = np.bincount(label)
-    means = np.stack([np.bincount(label, vertices[:, k]) / count for k in range(3)], 1)
-    merged = label[faces]
-    kept = (merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2]) & (merged[:, 2] != merged[:, 0])
-    merged = merged[kept]
-    # Of triangles that now lie upon each other, as the two sides of a thin wall do, one is enough.
-    low, middle, high = np.sort(merged, axis=1).T
-    _, different = np.unique((low * len(means) + middle) * len(means) + high, return_index=True)
-    return means, merged[np.sort(different)].astype(np.int64)

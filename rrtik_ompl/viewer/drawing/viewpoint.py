@@ -24,17 +24,21 @@ def overview(points: Matrix, scene: Scene) -> Vector:
     obstacles = [o for o in scene.obstacles if o.shape.bounded]
     best = direction(0.0, float(ELEVATIONS[0]))
     least = np.inf
+
     for elevation in ELEVATIONS:
         for turn in TURNS:
             away = direction(float(turn), float(elevation))
             hidden = np.zeros(len(points), dtype=bool)
             for obstacle in obstacles:
                 hidden |= behind(points, away, obstacle)
+
             extra = TURN_COST * (abs(turn) / (0.5 * np.pi) + (elevation > ELEVATIONS[0]))
             cost = (float(hidden.mean()) if len(points) else 0.0) + float(extra)
+
             if cost < least - 1e-9:
                 best = away
                 least = cost
+
     return best
 
 
@@ -49,11 +53,14 @@ def behind(points: Matrix, away: Vector, obstacle: Obstacle) -> Mask:
     corners = look_of_shape(obstacle.shape).corners
     rotation = obstacle.pose.rotation.T
     local = (points - obstacle.pose.translation) @ rotation.T
+
+    # Slabs: the ray is inside the box where it is inside all three pairs of planes.
     ray = rotation @ away
     ray = np.where(np.abs(ray) < 1e-12, 1e-12, ray)
     to_low = (corners.min(axis=0) - local) / ray
     to_high = (corners.max(axis=0) - local) / ray
     enter = np.minimum(to_low, to_high).max(axis=1)
     leave = np.maximum(to_low, to_high).min(axis=1)
+
     hit: Mask = (leave >= enter) & (leave > 1e-9)
     return hit

@@ -36,17 +36,21 @@ def plot_distances(
         raise InputError("runs to plot: there is none")
     for name, run in runs.items():
         require(run, GeneticRun, f"run '{name}' to plot")
+
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     panel = figure.subplots()
+
     for k, (name, run) in enumerate(runs.items()):
         counts = f"{name}: {len(run.q)} points in {run.generations} generations"
         over = np.arange(1, run.generations + 1)
         distance = MILLIMETRES * np.maximum(run.distances, LEAST)
         panel.plot(over, distance, color=COLORS[k % len(COLORS)], linewidth=0.9, label=counts)
+
     if tolerance is not None:
         panel.axhline(MILLIMETRES * tolerance, color="#1d2733", linewidth=1.0, linestyle="dashed", label="tolerance")
+
     panel.set(xscale="log", yscale="log", xlabel="generation", ylabel="distance of the best [mm]")
     tidy(panel)
     figure.legend(loc="outside upper center", ncols=2, frameon=False, fontsize=9)

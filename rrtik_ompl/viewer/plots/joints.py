@@ -53,58 +53,26 @@ def plot_joints(
     require(motion, Trajectory | JointPath, "motion to plot")
     require(limits, RateLimits | None, "limits to plot", "use RateLimits.of(robot)")
     bounds = None if limits is None else limits.for_joints(len(motion.joint_names))
-    over, label, rows = _rows(motion)
     from matplotlib.figure import Figure
 
+    over, label, rows = _rows(motion)
     kinds = [(mask, unit) for mask, unit in ((~motion.prismatic, "deg"), (motion.prismatic, "m")) if mask.any()]
     figure = Figure(figsize=(9.0, 0.9 + 2.4 * len(rows) * len(kinds)), layout="constrained")
     panels = figure.subplots(len(rows) * len(kinds), 1, sharex=True, squeeze=False)[:, 0]
+
     pairs = [(name, power, values, kind) for name, power, values in rows for kind in kinds]
     for panel, (name, power, values, (mask, unit)) in zip(panels, pairs, strict=True):
-        _draw(panel, over, np.rad2deg(values) if unit == "deg" else values, mask, motion)
-        panel.set_ylabel(f"{name} [{unit}{power}]")
         factor = np.rad2deg(1.0) if unit == "deg" else 1.0
+        _draw(panel, over, factor * values, mask, motion)
+        panel.set_ylabel(f"{name} [{unit}{power}]")
         if bounds is not None and power:
             _draw_limits(panel, factor * (bounds.velocity if power == "/s" else bounds.acceleration), mask)
         if isinstance(motion, Trajectory) and power == "/s²":
             _mark_jumps(panel, motion, mask, factor)
+
     panels[-1].set_xlabel(label)
-    lines = {line.get_label(): line for panel in panels for line in panel.get_lines()}
-    names = [_plain(name) for name in motion.joint_names]
-    handles = [lines[name] for name in names]
-    columns = int(figure.get_figwidth() * LETTERS_AN_INCH) // (max(map(len, names)) + LETTERS_BESIDE_A_NAME)
-    figure.legend(handles, names, loc="outside upper center", ncols=max(1, min(len(names), 6, columns)), frameon=False)
+    _legend(figure, motion)
     save_figure(figure, file)
-
-
-def save_figure(figure: Figure, file: str | os.PathLike[str], *, dpi: int = 150) -> None:
-    """Write a matplotlib figure so that the same figure gives the same file, whole or not at all.
-
-    Raises:
-        InputError: If the ending is none of ``FORMATS``, or the file cannot be written.
-    """
-    import matplotlib
-
-    ending = known_ending(file, FORMATS, "plot")
-    picture = BytesIO()
-    metadata = {"Date": None} if ending == ".svg" else {}
-    with matplotlib.rc_context({"svg.hashsalt": "rrtik", "svg.fonttype": "none"}):
-        figure.savefig(picture, format=ending[1:], dpi=dpi, metadata=metadata)
-    write_bytes(file, picture.getvalue())
-
-
-def _plain(name: str) -> str:
-    """A name as a label that matplotlib takes for no formula, and does not leave out of a legend."""
-    return " " * name.startswith("_") + name.replace("$", r"\$")
-
-
-def tidy(panel: Axes, *, grid: bool = True) -> None:
-    """Leave out the frame's upper and right side; a pale grid behind everything."""
-    if grid:
-        panel.grid(color="#e3e9ef", linewidth=0.8)
-        panel.set_axisbelow(True)
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)
 
 
 def _rows(motion: Trajectory | JointPath) -> tuple[Vector, str, list[tuple[str, str, Matrix]]]:
@@ -114,9 +82,26 @@ def _rows(motion: Trajectory | JointPath) -> tuple[Vector, str, list[tuple[str, 
     # a jump of acceleration is a vertical line: each knot is drawn from both sides
     knots = np.concatenate([motion.times, np.nextafter(motion.times[1:], 0.0)])
     clock = np.unique(np.concatenate([np.linspace(0.0, motion.duration, SAMPLES), knots]))
+
     state = motion(clock)
     values = (("position", "", state.positions), ("velocity", "/s", state.velocities))
     return clock, "time [s]", [*values, ("acceleration", "/s²", state.accelerations)]
+
+
+def _draw(panel: Axes, over: Vector, values: Matrix, mask: NDArray[np.bool_], motion: Trajectory | JointPath) -> None:
+    for k in np.flatnonzero(mask):
+        style: dict[str, Any] = {"color": COLORS[k % len(COLORS)]}
+        style["linestyle"] = DASHES[k // len(COLORS) % len(DASHES)]
+        marker: dict[str, Any] = {"marker": "o", "markersize": 3} if isinstance(motion, JointPath) else {}
+        panel.plot(over, values[:, k], label=_plain(motion.joint_names[k]), linewidth=1.6, **style, **marker)
+
+    tidy(panel)
+    panel.margins(x=0.01)
+
+
+def _plain(name: str) -> str:
+    """A name as a label that matplotlib takes for no formula, and does not leave out of a legend."""
+    return " " * name.startswith("_") + name.replace("$", r"\$")
 
 
 def _draw_limits(panel: Axes, limits: Vector, mask: NDArray[np.bool_]) -> None:
@@ -134,11 +119,37 @@ def _mark_jumps(panel: Axes, motion: Trajectory, mask: NDArray[np.bool_], factor
             panel.plot(motion.times[at], values, "v", color=COLORS[k % len(COLORS)], markersize=4, label="_jump")
 
 
-def _draw(panel: Axes, over: Vector, values: Matrix, mask: NDArray[np.bool_], motion: Trajectory | JointPath) -> None:
-    for k in np.flatnonzero(mask):
-        style: dict[str, Any] = {"color": COLORS[k % len(COLORS)]}
-        style["linestyle"] = DASHES[k // len(COLORS) % len(DASHES)]
-        marker: dict[str, Any] = {"marker": "o", "markersize": 3} if isinstance(motion, JointPath) else {}
-        panel.plot(over, values[:, k], label=_plain(motion.joint_names[k]), linewidth=1.6, **style, **marker)
-    tidy(panel)
-    panel.margins(x=0.01)
+def _legend(figure: Figure, motion: Trajectory | JointPath) -> None:
+    """One line for each joint, whichever panel draws it, in as many columns as have room beside each other."""
+    lines = {line.get_label(): line for panel in figure.axes for line in panel.get_lines()}
+    names = [_plain(name) for name in motion.joint_names]
+    handles = [lines[name] for name in names]
+    columns = int(figure.get_figwidth() * LETTERS_AN_INCH) // (max(map(len, names)) + LETTERS_BESIDE_A_NAME)
+    figure.legend(handles, names, loc="outside upper center", ncols=max(1, min(len(names), 6, columns)), frameon=False)
+
+
+def save_figure(figure: Figure, file: str | os.PathLike[str], *, dpi: int = 150) -> None:
+    """Write a matplotlib figure so that the same figure gives the same file, whole or not at all.
+
+    Raises:
+        InputError: If the ending is none of ``FORMATS``, or the file cannot be written.
+    """
+    import matplotlib
+
+    ending = known_ending(file, FORMATS, "plot")
+    picture = BytesIO()
+    metadata = {"Date": None} if ending == ".svg" else {}
+
+    with matplotlib.rc_context({"svg.hashsalt": "rrtik", "svg.fonttype": "none"}):
+        figure.savefig(picture, format=ending[1:], dpi=dpi, metadata=metadata)
+
+    write_bytes(file, picture.getvalue())
+
+
+def tidy(panel: Axes, *, grid: bool = True) -> None:
+    """Leave out the frame's upper and right side; a pale grid behind everything."""
+    if grid:
+        panel.grid(color="#e3e9ef", linewidth=0.8)
+        panel.set_axisbelow(True)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)

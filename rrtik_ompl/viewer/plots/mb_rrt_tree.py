@@ -38,15 +38,18 @@ def plot_tree(run: TreeSearch, file: str | os.PathLike[str]) -> None:
         raise InputError(
             "tree to plot: it grows in space, and only planar ones are drawn; see rrtik_ompl.viewer.drawing.tree_marks"
         )
+
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 7.2), layout="constrained")
     panel = figure.subplots()
+
     for index in range(1, run.links.count):
         _region(panel, run, index)
     _links(panel, run)
     _chain(panel, run)
     _frame(panel, run)
+
     save_figure(figure, file, dpi=100)
 
 
@@ -62,6 +65,8 @@ def _region(panel: Axes, run: TreeSearch, index: int) -> None:
     near = float(run.links.folded[index])
     x = float(run.goal[0])
     y = float(run.goal[1])
+
+    # Annulus refuses a ring as wide as its radius.
     width = min(far - near, 0.999 * far)
     if width > 1e-3 * run.links.reach:
         panel.add_patch(Annulus((x, y), far, width, facecolor=_color(index), alpha=0.05, edgecolor="none", zorder=0))
@@ -80,6 +85,8 @@ def _links(panel: Axes, run: TreeSearch) -> None:
         panel.add_collection(
             LineCollection(list(edges), colors=_color(index), linewidths=0.7, alpha=0.55, zorder=2, label=label)
         )
+
+        # Nodes of the last index are tips, which no region bounds.
         far = np.linalg.norm(level - run.goal, axis=1) > run.links.remaining[index] * (1.0 + 1e-9)
         inside = level[~far] if index < run.links.count else level
         panel.plot(*inside.T, linestyle="none", marker="o", markersize=2.2, color=_color(index), zorder=3)
@@ -101,6 +108,7 @@ def _frame(panel: Axes, run: TreeSearch) -> None:
     panel.set_xlim(float(low[0]), float(high[0]))
     panel.set_ylim(float(low[1]), float(high[1]))
     panel.set_aspect("equal")
+
     tidy(panel)
     missed = f"{run.misses.min():.2g}"
     panel.set_title(

@@ -40,6 +40,7 @@ def plot_slices(
     known_ending(file, FORMATS, "plot")
     if not slices:
         raise InputError("slices to plot: there is none")
+
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
@@ -47,6 +48,7 @@ def plot_slices(
     panels = figure.subplots(1, len(slices), squeeze=False)[0]
     drawn: list[Any] = []
     most = max(float(each.values.max(initial=0.0)) for each in slices) or 1.0
+
     for panel, each in zip(panels, slices, strict=True):
         steps = [float(axis[1] - axis[0]) if len(axis) > 1 else 1.0 for axis in (each.x, each.y)]
         extent = tuple(
@@ -54,22 +56,27 @@ def plot_slices(
             for axis, step in zip((each.x, each.y), steps, strict=True)
             for end, side in ((0, -1), (-1, 1))
         )
+
         values = np.ma.masked_equal(each.values, 0.0)
         drawn.append(
             panel.imshow(values, origin="lower", extent=extent, cmap=colors, vmin=0.0, vmax=most, aspect="equal")
         )
+
         for x, y, right, top in each.boxes:
             panel.add_patch(Rectangle((x, y), right - x, top - y, **VEHICLE))
         if each.points:
             panel.plot(*np.array(each.points).T, **MARK)
         panel.plot(*each.base, **BASE)
+
         panel.set(xlabel=each.across, ylabel=each.up, xlim=extent[:2], ylim=extent[2:])
         panel.set_title(each.title, fontsize=10)
         tidy(panel, grid=False)
+
     if label:
         figure.colorbar(drawn[0], ax=panels, label=label, shrink=0.8)
     if slices[0].meanings:
         figure.legend(handles=_keys(slices[0].meanings, drawn[0]), loc="outside lower center", ncols=5, frameon=False)
+
     figure.suptitle(title, fontsize=11)
     save_figure(figure, file, dpi=110)
 
