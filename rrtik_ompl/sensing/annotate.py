@@ -35,6 +35,7 @@ def annotated(
             cv2.polylines(drawn, [outline[:, None]], True, colour, 2, cv2.LINE_AA, 4)
         _draw_axes(drawn, camera, each, axis_length)
         _write(drawn, _caption(each), np.vstack([m.corners for m in each.markers]), colour)
+
     return np.asarray(drawn, dtype=np.uint8)
 
 
@@ -51,6 +52,7 @@ def _draw_axes(drawn: NDArray[np.uint8], camera: Camera, sight: Sighting, length
     tips = np.vstack([np.zeros(3), length * np.eye(3)]) @ pose.rotation.T + pose.translation
     if (tips[:, 2] <= 0.01).any():
         return
+
     pixels = np.clip(np.rint(16.0 * camera.project(tips)), -(2**20), 2**20).astype(int)
     for k, colour in enumerate(AXES):
         cv2.line(drawn, tuple(pixels[0]), tuple(pixels[k + 1]), colour, 2, cv2.LINE_AA, 4)
@@ -62,5 +64,6 @@ def _write(drawn: NDArray[np.uint8], text: str, corners: NDArray[np.float64], co
     (wide, high), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
     x = int(np.clip(corners[:, 0].min(), 2, max(width - wide - 4, 2)))
     y = int(np.clip(corners[:, 1].max() + high + 10, high + 4, height - below - 2))
+
     cv2.rectangle(drawn, (x - 2, y - high - 3), (x + wide + 2, y + below), (30, 30, 30), -1)
     cv2.putText(drawn, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)

@@ -62,18 +62,22 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board) -> Calibratio
     grays = [as_gray(picture) for picture in pictures]
     if len({gray.shape for gray in grays}) > 1:
         raise InputError("the photographs differ in size; take all of them with the same camera and settings")
+
     found = [board_corners(gray, board) for gray in grays]
     unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
     used = [k for k, reason in enumerate(unused) if not reason]
+
+    # The worst view is left out until all are good, one at a time: it spoils the errors of the others.
     result = None
     while len(used) >= MIN_VIEWS:
         result = _solve([found[k] for k in used], grays[0].shape)
-        errors = np.ravel(result[7])
+        errors = np.ravel(result[-1])
         worst = int(errors.argmax())
         if errors[worst] <= MAX_VIEW_ERROR:
             break
         unused[used.pop(worst)] = f"corners lie {errors[worst]:.1f} pixels off: blurred, or the board is bent"
         result = None
+
     if result is None:
         reasons = "; ".join(sorted({reason for reason in unused if reason})) or "there are no more"
         raise InputError(
@@ -81,11 +85,13 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board) -> Calibratio
             "take more, the board filling a third of the picture or more, sharp, under different angles; a chessboard "
             "is another kind of board, and has to be in view as a whole"
         )
+
     error, matrix, distortion, _, _, sigmas, _, each = result
     view_errors = np.full(len(grays), np.nan)
     view_errors[used] = np.ravel(each)
     height, width = grays[0].shape
     doubts = np.ravel(sigmas)[:9]
+
     tone = _tone([(grays[k], found[k][1]) for k in used[:TONE_VIEWS]], board)
     camera = Camera(matrix, width, height, np.ravel(distortion)[:5], sigmas=doubts, tone=tone)
     return Calibration(camera, frozen(doubts[:4]), float(error), frozen(view_errors), tuple(unused))
@@ -115,6 +121,7 @@ def _tone(views: Sequence[tuple[NDArray[np.uint8], Matrix]], board: Board) -> fl
         looks = [look_of(*each) for each in pieces if np.ptp(each[1], axis=0).max() >= MIN_TONE_SIDE]
     else:
         looks = _looks_of_markers([gray for gray, _ in views], dictionary_of(board))
+
     tones = [each.tone for each in looks if each is not None]
     return round(float(np.median(tones)), 3) if len(tones) >= TONE_LOOKS else None
 

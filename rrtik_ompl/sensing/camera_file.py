@@ -61,9 +61,11 @@ def load_camera(path: str | os.PathLike[str]) -> Camera:
     text = read_text(path)
     if is_of_opencv(text):
         return camera_from_opencv(text, str(path))
+
     document = read_yaml(path)
     if is_of_ros(document):
         return camera_from_ros(document)
+
     entry = parse(document, CameraFile).camera
     with document.at(("camera",)):
         return entry.build()
@@ -79,14 +81,17 @@ def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> N
     (fx, _, cx), (_, fy, cy), _ = lens.matrix.tolist()
     data: dict[str, Any] = {"size": [lens.width, lens.height], "fx": fx, "fy": fy, "cx": cx, "cy": cy}
     data["distortion"] = lens.distortion.tolist()
+
     if lens.sigmas.any():
         data["sigmas_px"] = lens.sigmas[:4].tolist()
         data["distortion_sigmas"] = lens.sigmas[4:].tolist()
     if lens.tone is not None:
         data["tone"] = lens.tone
+
     if isinstance(camera, Calibration):
         data["error_px"] = camera.error
         data["view_errors_px"] = [e for e in camera.view_errors.tolist() if e == e]
     elif not isinstance(camera, Camera):
         raise InputError(f"camera to save must be a Camera or a Calibration, got {type(camera).__name__}")
+
     write_yaml(path, {"version": 1, "camera": data})

@@ -55,17 +55,21 @@ def cloud_from_depth(
     if picture.shape != (camera.height, camera.width):
         size = f"{camera.height} rows of {camera.width}"
         raise InputError(f"depth picture: the camera has {size} pixels, got an array of shape {picture.shape}")
+
     step = whole_number(every, "every", 1)
     low = not_negative(nearest, "nearest")
     z = positive(scale, "scale") * picture[::step, ::step]
     seen = np.isfinite(z) & (z >= low) & (z <= positive(farthest, "farthest")) & (z > 0.0)
     if not seen.any():
         raise InputError(f"depth picture: no pixel has a depth between {low:g} and {farthest:g} m; check its scale")
+
     row, column = np.nonzero(seen)
     away = z[row, column]
     flat = camera.rays(step * np.column_stack([column, row]).astype(np.float64))
     points = np.column_stack([flat * away[:, None], away])
+
     if pose is not None:
         place = rigid(pose, "pose of the camera")
         points = points @ place.rotation.T + place.translation
+
     return PointCloud(points, radius)

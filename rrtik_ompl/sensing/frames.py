@@ -27,6 +27,7 @@ def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> 
     """
     if marker_map.T_base_camera is not None:
         return marker_map.T_base_camera, np.zeros((6, 6))
+
     name = marker_map.base.name if marker_map.base is not None else "base"
     for each in sightings:
         if each.object.role == "base":
@@ -53,10 +54,12 @@ def place_in_base(T_base_camera: pin.SE3, base_covariance: Matrix, sight: Sighti
     """
     pose = T_base_camera * sight.pose.T_camera_object
     turn = T_base_camera.rotation
+
     T_camera_base = T_base_camera.inverse()
     arm = sight.pose.T_camera_object.translation - T_camera_base.translation
     lever = np.eye(6)
     lever[:3, 3:] = -pin.skew(arm)
     spread = sight.pose.covariance + lever @ base_covariance @ lever.T
+
     axes = np.kron(np.eye(2), turn)
     return pose, axes @ spread @ axes.T

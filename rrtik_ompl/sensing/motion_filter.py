@@ -22,7 +22,6 @@ class MotionFilter:
     """Position, small rotation from a reference, and their rates, by both models. Begin with `restart`."""
 
     def __init__(self) -> None:
-        """Begin without a pose."""
         self._reference = np.eye(3)
         self._states = np.zeros((2, 12))
         self._spreads = np.zeros((2, 12, 12))
@@ -36,6 +35,7 @@ class MotionFilter:
         state[:3] = pose.translation
         spread[_MEASURED, _MEASURED] = covariance
         spread[_RATES, _RATES] = np.diag(np.repeat(np.square(FIRST_SPEED), 3))
+
         self._states = np.stack([state] * 2)
         self._spreads = np.stack([spread] * 2)
         self._shares = np.full(2, 0.5)
@@ -45,13 +45,16 @@ class MotionFilter:
         stay = np.exp(-seconds / STAY)
         passing = np.array([[stay, 1.0 - stay], [1.0 - stay, stay]])
         before, begin = self._mixed(passing)
+
         seen = np.concatenate([pose.translation, pin.log3(pose.rotation @ self._reference.T)])
         likely = np.array([
             self._step(k, *begin[k], seen, covariance, seconds) for k in range(2)
         ])  # fmt: skip
+
         shares = before * np.exp(likely - likely.max())
         self._shares = np.maximum(shares / shares.sum(), LEAST_LIKELY)
         self._shares /= self._shares.sum()
+
         return self._settle()
 
     def ahead(self, seconds: float) -> pin.SE3:
@@ -64,6 +67,7 @@ class MotionFilter:
         """What each model is likely to be before a measurement, and what it begins with."""
         joint = passing * self._shares[:, None]
         before = joint.sum(axis=0)
+
         begin = []
         for k in range(2):
             weights = joint[:, k] / before[k]
@@ -71,6 +75,7 @@ class MotionFilter:
             away = self._states - state
             spread = np.tensordot(weights, self._spreads + away[:, :, None] * away[:, None, :], 1)
             begin.append((state, spread))
+
         return before, begin
 
     def _step(self, k: int, state: Vector, spread: Matrix, seen: Vector, noise: Matrix, seconds: float) -> float:
@@ -79,14 +84,18 @@ class MotionFilter:
         forward[_MEASURED, _RATES] = seconds * np.eye(6)
         change = np.diag(np.repeat(np.square((STILL, MOVING)[k]), 3))
         growth = np.kron([[seconds**3 / 3.0, seconds**2 / 2.0], [seconds**2 / 2.0, seconds]], change)
+
         state = forward @ state
         spread = forward @ spread @ forward.T + growth
+
         away = seen - state[_MEASURED]
         expected = spread[_MEASURED, _MEASURED] + noise
         gain = np.linalg.solve(expected, spread[_MEASURED]).T
         self._states[k] = state + gain @ away
+
         spread = spread - gain @ spread[_MEASURED]
-        self._spreads[k] = 0.5 * (spread + spread.T)
+        self._spreads[k] = 0.5 * (spread + spread.T)  # rounding must not make it lopsided
+
         return -0.5 * float(away @ np.linalg.solve(expected, away) + np.linalg.slogdet(expected)[1])
 
     def _settle(self) -> pin.SE3:

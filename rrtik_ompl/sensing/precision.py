@@ -74,6 +74,7 @@ def series_of(values: ArrayLike) -> Series:
     rows = finite_array(values, (None,), "measurements")
     if len(rows) < 2:
         raise InputError(f"a series needs at least two measurements, got {len(rows)}")
+
     low, middle, high = np.quantile(rows, [0.25, 0.5, 0.75]).tolist()
     mean = float(rows.mean())
     deviation = float(rows.std(ddof=1))

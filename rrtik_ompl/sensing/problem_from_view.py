@@ -43,11 +43,14 @@ def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind:
     if wanted is None:
         names = ", ".join(each.object.name for each in objects) or "nothing"
         raise InputError(f"object '{name}' was not seen; {names} was")
+
     levels = len(wanted.object.grasp(kind).levels)
     if not 1 <= level <= levels:
         raise InputError(f"grasp type '{kind}' of '{name}' has levels 1 to {levels}, not {level}")
+
     solids = [solid for each in objects for solid in each.solids()]
     scene = scene_with(problem.world.scene, solids)
     world = problem.world.with_accuracy("exact").with_scene(scene)
+
     before = wanted.grasp_pose(kind, level - 1) * pose([0.0, 0.0, -wanted.object.grasp(kind).approach])
     return Problem(world, problem.start, PoseGoal(before), name=f"{name}_{kind}_{level}")

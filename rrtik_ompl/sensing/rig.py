@@ -27,6 +27,10 @@ from rrtik_ompl.sensing.sight import Sighting, check_size, detect_objects
 MAX_CONTRADICTION = 5.0  # squared deviations for each number that the cameras both give; 1 is usual
 NEAREST = 0.01  # [m] before a camera that it can see
 ROUNDS = 4  # of Gauss-Newton: rotations are nearly vectors after one
+CONTRADICTION = (
+    "the cameras contradict each other by {:.0f} times what is stated: check their focal lengths, the marker's side, "
+    "and how they stand to each other"
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,11 +83,13 @@ def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: M
     """
     if len(pictures) != len(rig.cameras):
         raise InputError(f"a rig of {len(rig.cameras)} cameras needs as many pictures, got {len(pictures)}")
+
     seen: dict[str, list[Sighting]] = {}
     for number, (picture, camera) in enumerate(zip(pictures, rig.cameras, strict=True)):
         check_size(picture, camera, f"picture of camera {number + 1}")
         for each in detect_objects(picture, camera, marker_map):
             seen.setdefault(each.object.name, []).append(_in_first(each, rig, number))
+
     return tuple(joined(seen[each.name]) for each in marker_map.objects if each.name in seen)
 
 
@@ -92,48 +98,19 @@ def joined(sightings: Sequence[Sighting]) -> Sighting:
     usable = [each for each in sightings if not each.refused]
     if len(usable) < 2:
         return (usable or list(sightings))[0]
+
+    # Each camera may leave two poses open: the combination that contradicts itself least is taken.
     tried = [_joined(usable, poses) for poses in product(*(_branches(each) for each in usable))]
     pose = min(tried, key=lambda each: each.surprise)
+
     others = [each for each in tried if each is not pose]
     second = min(others, key=lambda each: each.surprise, default=None)
-    doubtful = second is not None and second.surprise < MAX_CONTRADICTION
-    if doubtful and second is not None:
+    if second is not None and second.surprise < MAX_CONTRADICTION:
         pose = replace(pose, other=second.T_camera_object, other_error=pose.error)
+
     markers = {marker.number: marker for each in reversed(usable) for marker in each.markers}
     refused = "" if pose.surprise <= MAX_CONTRADICTION else CONTRADICTION.format(pose.surprise**0.5)
     return Sighting(usable[0].object, pose, tuple(markers[number] for number in sorted(markers)), refused)
-
-
-CONTRADICTION = (
-    "the cameras contradict each other by {:.0f} times what is stated: check their focal lengths, the marker's side, "
-    "and how they stand to each other"
-)
-
-
-def _in_first(sight: Sighting, rig: Rig, number: int) -> Sighting:
-    """A sighting of one of the cameras in the frame of the first one."""
-    if number == 0:
-        return sight
-    T = rig.poses[number]
-    pose = sight.pose
-    axes = np.kron(np.eye(2), T.rotation)
-    lever = np.eye(6)
-    lever[:3, 3:] = -pin.skew(T.rotation @ pose.T_camera_object.translation)
-    doubt = np.diag(np.repeat(np.square([rig.position_sigma, rig.rotation_sigma]), 3))
-    spread = axes @ pose.covariance @ axes.T + lever @ doubt @ lever.T
-    other = None if pose.other is None else T * pose.other
-    moved = replace(pose, T_camera_object=T * pose.T_camera_object, other=other, covariance=frozen(spread))
-    return replace(sight, pose=moved, markers=tuple(_marker_in_first(m, moved, sight, rig) for m in sight.markers))
-
-
-def _marker_in_first(marker: SeenMarker, pose: CornerPose, sight: Sighting, rig: Rig) -> SeenMarker:
-    """A marker with its corners where the first camera of the rig would see them; in its corner what is behind it."""
-    mounted = next(each for each in sight.object.markers if each.number == marker.number)
-    T = pose.T_camera_object
-    corners = mounted.corners @ T.rotation.T + T.translation
-    ahead = bool((corners[:, 2] > NEAREST).all())
-    seen = rig.cameras[0].project(corners) if ahead else np.zeros((4, 2))
-    return replace(marker, corners=frozen(seen), spread=None)
 
 
 def _branches(sight: Sighting) -> list[pin.SE3]:
@@ -145,11 +122,13 @@ def _joined(sightings: Sequence[Sighting], poses: Sequence[pin.SE3]) -> CornerPo
     """The pose that is nearest to some poses by their covariances, and by how much they contradict each other."""
     weights = [np.linalg.inv(each.pose.covariance) for each in sightings]
     covariance = np.linalg.inv(sum(weights))
+
     found = poses[0]
     for _ in range(ROUNDS):
         away = [_away(found, pose) for pose in poses]
         step = covariance @ sum(w @ a for w, a in zip(weights, away, strict=True))
         found = pin.SE3(pin.exp3(step[3:]) @ found.rotation, found.translation + step[:3])
+
     squares = sum(float(a @ w @ a) for w, a in zip(weights, (_away(found, pose) for pose in poses), strict=True))
     surprise = squares / (6.0 * (len(poses) - 1))
     error = max(each.pose.error for each in sightings)
@@ -160,3 +139,33 @@ def _away(begin: pin.SE3, end: pin.SE3) -> Vector:
     """From one pose to another: position, and a small rotation about the axes of the camera. Shape (6,)."""
     turned: Matrix = end.rotation @ begin.rotation.T
     return np.concatenate([end.translation - begin.translation, pin.log3(turned)])
+
+
+def _in_first(sight: Sighting, rig: Rig, number: int) -> Sighting:
+    """A sighting of one of the cameras in the frame of the first one."""
+    if number == 0:
+        return sight
+
+    T = rig.poses[number]
+    pose = sight.pose
+    axes = np.kron(np.eye(2), T.rotation)
+
+    lever = np.eye(6)
+    lever[:3, 3:] = -pin.skew(T.rotation @ pose.T_camera_object.translation)
+    doubt = np.diag(np.repeat(np.square([rig.position_sigma, rig.rotation_sigma]), 3))
+    spread = axes @ pose.covariance @ axes.T + lever @ doubt @ lever.T
+
+    other = None if pose.other is None else T * pose.other
+    moved = replace(pose, T_camera_object=T * pose.T_camera_object, other=other, covariance=frozen(spread))
+
+    return replace(sight, pose=moved, markers=tuple(_marker_in_first(m, moved, sight, rig) for m in sight.markers))
+
+
+def _marker_in_first(marker: SeenMarker, pose: CornerPose, sight: Sighting, rig: Rig) -> SeenMarker:
+    """A marker with its corners where the first camera of the rig would see them; in its corner what is behind it."""
+    mounted = next(each for each in sight.object.markers if each.number == marker.number)
+    T = pose.T_camera_object
+    corners = mounted.corners @ T.rotation.T + T.translation
+    ahead = bool((corners[:, 2] > NEAREST).all())
+    seen = rig.cameras[0].project(corners) if ahead else np.zeros((4, 2))
+    return replace(marker, corners=frozen(seen), spread=None)

@@ -73,37 +73,42 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
             f"a chessboard of {board.columns} x {board.rows} squares looks the same upside down, so that two cameras "
             "may take each other's corners: use one with an even and an odd side, or a ChArUco board"
         )
+
     cameras = []
     for number, taken in enumerate(pictures, start=1):
         try:
             cameras.append(calibrate(taken, board))
         except InputError as reason:
             raise InputError(f"camera {number}: {reason}") from None
+
     corners = [[board_corners(as_gray(picture), board) for picture in taken] for taken in pictures]
-    poses = [pin.SE3.Identity()]
-    moments = []
-    errors = []
-    sigmas = []
-    for number in range(1, len(pictures)):
-        common = [each for pair in zip(corners[0], corners[number], strict=True) if (each := _common(*pair))]
-        if len(common) < MIN_MOMENTS:
-            raise InputError(
-                f"cameras 1 and {number + 1} see the board together in {len(common)} moments, at least {MIN_MOMENTS} "
-                "are needed: hold it where both see it"
-            )
-        pose, error, sigma = _stands(cameras[0].camera, cameras[number].camera, common)
-        if error > MAX_ERROR:
-            raise InputError(
-                f"camera {number + 1}: corners lie {error:.1f} pixels off where the first has them: pictures "
-                "are of other times, or the cameras moved against each other"
-            )
-        poses.append(pose)
-        moments.append(len(common))
-        errors.append(error)
-        sigmas.append(sigma)
+    beside = [_beside_first(cameras, corners, number) for number in range(1, len(pictures))]
+    poses, moments, errors, sigmas = zip(*beside, strict=True)
+
     position, rotation = np.max(sigmas, axis=0)
-    rig = Rig(tuple(each.camera for each in cameras), tuple(poses), float(position), float(rotation))
-    return RigCalibration(rig, tuple(cameras), tuple(moments), tuple(errors))
+    lenses = tuple(each.camera for each in cameras)
+    rig = Rig(lenses, (pin.SE3.Identity(), *poses), float(position), float(rotation))
+    return RigCalibration(rig, tuple(cameras), moments, errors)
+
+
+def _beside_first(
+    cameras: Sequence[Calibration], corners: Sequence[Sequence[tuple[Matrix, Matrix]]], number: int
+) -> tuple[pin.SE3, int, float, Vector]:
+    """How a camera stands to the first one: its pose, in how many moments both saw the board, and as of `_stands`."""
+    common = [each for pair in zip(corners[0], corners[number], strict=True) if (each := _common(*pair))]
+    if len(common) < MIN_MOMENTS:
+        raise InputError(
+            f"cameras 1 and {number + 1} see the board together in {len(common)} moments, at least {MIN_MOMENTS} "
+            "are needed: hold it where both see it"
+        )
+
+    pose, error, sigma = _stands(cameras[0].camera, cameras[number].camera, common)
+    if error > MAX_ERROR:
+        raise InputError(
+            f"camera {number + 1}: corners lie {error:.1f} pixels off where the first has them: pictures "
+            "are of other times, or the cameras moved against each other"
+        )
+    return pose, len(common), error, sigma
 
 
 def _common(first: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix]) -> Common | None:
@@ -112,6 +117,7 @@ def _common(first: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix]) -> Commo
     both = [(k, places[key]) for k, point in enumerate(first[0]) if (key := tuple(np.round(point, 6))) in places]
     if len(both) < MIN_CORNERS:
         return None
+
     one, two = np.array(both).T
     return Common(*(each.astype(np.float32) for each in (first[0][one], first[1][one], other[1][two])))
 
@@ -123,6 +129,7 @@ def _stands(first: Camera, other: Camera, common: Sequence[Common]) -> tuple[pin
     for left_out in range(len(common)):
         less, _ = _solved(first, other, [each for k, each in enumerate(common) if k != left_out])
         away.append([*(less.translation - pose.translation), *pin.log3(less.rotation @ pose.rotation.T)])
+
     spread = (len(common) - 1) / len(common) * np.square(away).sum(axis=0)
     return pose, error, np.sqrt([spread[:3].max(), spread[3:].max()])
 

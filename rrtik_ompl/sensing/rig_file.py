@@ -51,6 +51,7 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
     """
     document = read_yaml(path)
     entry = parse(document, RigFile)
+
     cameras = []
     poses = []
     for k, each in enumerate(entry.cameras):
@@ -60,6 +61,7 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
             poses.append(each.build())
         with document.at(("cameras", k, "file")):
             cameras.append(load_camera(document.path.parent / each.file))
+
     with document.at(("cameras",)):
         turn = float(np.deg2rad(entry.rotation_sigma_deg))
         return Rig(tuple(cameras), tuple(poses), entry.position_sigma, turn)
@@ -76,10 +78,12 @@ def save_rig(rig: Rig, path: str | os.PathLike[str]) -> list[Path]:
     """
     target = Path(path)
     files = [target.with_name(f"{target.stem}_{k}.yaml") for k in range(1, len(rig.cameras) + 1)]
+
     entries: list[dict[str, Any]] = []
     for camera, T, file in zip(rig.cameras, rig.poses, files, strict=True):
         save_camera(camera, file)
         entries.append({"file": file.name} | ({"pose": pose_data(T)} if entries else {}))
+
     sigmas = {"position_sigma": rig.position_sigma, "rotation_sigma_deg": float(np.rad2deg(rig.rotation_sigma))}
     write_yaml(target, {"version": 1, "cameras": entries} | sigmas)
     return files
@@ -99,6 +103,7 @@ def pictures_together(sources: Sequence[str]) -> Iterator[tuple[Picture, ...]]:
             number = taken.index(None)
             others = next(each.name for each in taken if each is not None)
             raise InputError(f"{sources[number]}: has no picture to {others}; give as many of each camera")
+
         times = [each.time for each in taken]
         if films and max(times) - min(times) > MAX_APART:
             late = int(np.argmax(times))
@@ -106,4 +111,5 @@ def pictures_together(sources: Sequence[str]) -> Iterator[tuple[Picture, ...]]:
                 f"{taken[late].name}: {max(times) - min(times):.2f} s later than the other camera's picture; give "
                 "films of the same rate that begin together"
             )
+
         yield taken

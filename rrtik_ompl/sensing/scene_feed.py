@@ -36,21 +36,27 @@ def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None 
         name for each in sensor.marker_map.objects if each.role not in ("base", "arm") for name in each.solid_names
     ]
     given = {obstacle.name for obstacle in given_scene.obstacles}
+
     seen = dict[str, Obstacle]()
     around = replace(given_scene, obstacles=tuple(_at_rest(o, solids) for o in given_scene.obstacles))
+
     begin = None
     why = ""
     last = dict[str, float]()  # when each was seen
+
     for picture in pictures:
         view = sensor.view(picture)
         now = {solid.name: solid for each in view.placed for solid in each.solids()}
         seen |= now
         last |= dict.fromkeys(now, picture.time)
+
         if (given | seen.keys()).issuperset(solids):
             begin = picture.time if begin is None else begin
             unseen = {name: picture.time - last.get(name, begin) for name in solids if name not in now}
             yield Snapshot(picture.time - begin, scene_with(around, seen.values()), unseen)
+
         why = view.why_not_placed
+
     if begin is None:
         lacking = [name for name in solids if name not in given | seen.keys()]
         what = ", ".join(lacking) or "any picture"

@@ -127,9 +127,11 @@ class Sensor:
         found = self._detected(picture, others)
         self._before = found if self._trackers else ()
         self._count += 1
+
         seen = tuple(self._tracked(each, picture.time) for each in found)
         if not seen:
             self._blank = picture.pixels
+
         try:
             placed = objects_in_base(seen, self.marker_map, sigmas=self._sigmas)
             return View(picture, self.camera, seen, placed)
@@ -142,8 +144,10 @@ class Sensor:
             raise InputError(f"{len(cameras)} cameras need as many pictures of a moment, got {1 + len(others)}")
         for each, camera in zip((picture, *others), cameras, strict=True):
             check_size(each.pixels, camera, each.name)
+
         if self._rig is not None:
             return detect_in_rig([each.pixels for each in (picture, *others)], self._rig, self.marker_map)
+
         near = bool(self._trackers) and self._count % WHOLE_EVERY != 0
         return detect_objects(picture.pixels, self.camera, self.marker_map, before=self._before, near=near)
 
@@ -154,6 +158,7 @@ class Sensor:
         """
         if self._blank is None:
             return f"{source}: markers of the map are in view, but none that says where the arm's base is"
+
         wanted = self.marker_map.dictionary
         found = dictionaries_seen(as_gray(self._blank))
         if wanted in found:
@@ -166,14 +171,17 @@ class Sensor:
         tracker = self._trackers.get(sight.object.name)
         if tracker is None or sight.refused:
             return sight
+
         found = tracker.update(sight, time)
         pose = sight.pose
         refused = "jumped: left out as an outlier" if found.outlier else ""
+
         first = (pose.T_camera_object, pose.error)
         second = (pose.other, pose.other_error)
         taken, other = (second, first) if found.other_branch else (first, second)
         if found.sure:  # by this picture or those before it
-            other = None, np.inf
+            other = (None, np.inf)
+
         pose = CornerPose(found.T_camera_object, other[0], taken[1], other[1], found.covariance)
         return replace(sight, pose=pose, refused=refused)
 
@@ -181,11 +189,14 @@ class Sensor:
 def _line(sight: Sighting, place: SeenObject | None) -> str:
     if sight.refused:
         return f"{sight.object.name}: refused: {sight.refused}"
+
     pose, frame = _pose_and_frame(sight, place)
     xyz = " ".join(f"{value:.4f}" for value in pose.translation)
     rpy = " ".join(f"{value:.2f}" for value in np.degrees(pin.rpy.matrixToRpy(pose.rotation)))
+
     sigma = (sight.pose if place is None else place).position_sigma
     doubt = "; two poses fit: tilt the marker or add another" if sight.pose.ambiguous else ""
+
     return (
         f"{sight.object.name} in the frame of the {frame}: xyz {xyz} m, rpy {rpy} deg, "
         f"+- {1e3 * sigma:.2f} mm, quality {sight.quality:.2f}, {len(sight.markers)} markers{doubt}"
@@ -194,14 +205,15 @@ def _line(sight: Sighting, place: SeenObject | None) -> str:
 
 def _data(sight: Sighting, place: SeenObject | None) -> dict[str, Any]:
     pose, frame = _pose_and_frame(sight, place)
+    doubt = sight.pose if place is None else place
     return {
         "name": sight.object.name,
         "role": sight.object.role,
         "frame": frame,
         "xyz": pose.translation.tolist(),
         "quat_xyzw": quaternion_xyzw(pose).tolist(),
-        "position_sigma": (sight.pose if place is None else place).position_sigma,
-        "rotation_sigma": (sight.pose if place is None else place).rotation_sigma,
+        "position_sigma": doubt.position_sigma,
+        "rotation_sigma": doubt.rotation_sigma,
         "quality": sight.quality,
         "ambiguous": sight.pose.ambiguous,
         "refused": sight.refused,

@@ -69,6 +69,7 @@ def as_gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         raise InputError(f"a picture has 8 bits and 1, 3 or 4 channels; got {array.dtype} of shape {array.shape}")
     if array.ndim == 2:
         return np.ascontiguousarray(array)
+
     import cv2
 
     code = cv2.COLOR_BGR2GRAY if array.shape[2] == 3 else cv2.COLOR_BGRA2GRAY
@@ -99,8 +100,10 @@ def detect_objects(
     """
     gray = as_gray(picture)
     check_size(gray, camera)
+
     known = [marker for each in before for marker in each.markers]
     seen = find_markers(gray, marker_map.dictionary, align=align, tone=camera.tone, before=known, near=near)
+
     sightings = (sighting(camera, each, seen) for each in marker_map.objects)
     return tuple(found for found in sightings if found is not None)
 
@@ -123,12 +126,14 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
     """The sighting of one object by the markers in view; None if none of them is on it."""
     mounted = {marker.number: marker for marker in thing.markers}
     own = tuple(marker for marker in seen if marker.number in mounted)
-    usable = [marker for marker in own if marker.side >= MIN_SIDE_PIXELS] or list(own)
     if not own:
         return None
+
+    usable = [marker for marker in own if marker.side >= MIN_SIDE_PIXELS] or list(own)
     sharp = [marker for marker in usable if marker.likeness >= MIN_LIKENESS]
     sigma = ALIGNED_SIGMA if sharp else ROUGH_SIGMA
     usable = [_straightened(camera, marker, mounted[marker.number].side) for marker in sharp] or usable
+
     if len(usable) == 1:
         pose = _of_one(camera, usable[0], mounted[usable[0].number], sigma)
     else:
@@ -136,6 +141,7 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
         spread = None if any(m.spread is None for m in usable) else block_diag(*(m.spread for m in usable))
         shifts = _side_shifts([mounted[m.number] for m in usable])
         pose = pose_of_points(camera, np.vstack([m.corners for m in usable]), points, sigma, spread, shifts)
+
     return Sighting(thing, pose, own, _refusal(pose, usable))
 
 
@@ -152,11 +158,14 @@ def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: f
     """The pose of the object from that of its only visible marker."""
     found = pose_of_square(camera, marker.corners, mounted.side, sigma, marker.spread, mounted.side_sigma)
     T_marker_object = mounted.T_object_marker.inverse()
+
     first = found.T_camera_object * T_marker_object
     second = None if found.other is None else found.other * T_marker_object
+
     arm = first.translation - found.T_camera_object.translation  # a rotation at the marker moves the object's origin
     lever = np.eye(6)
     lever[:3, 3:] = -pin.skew(arm)
+
     return CornerPose(first, second, found.error, found.other_error, lever @ found.covariance @ lever.T)
 
 
@@ -169,6 +178,7 @@ def _side_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
             around = marker.corners - marker.T_object_marker.translation
             shift[4 * k : 4 * k + 4] = around * marker.side_sigma / marker.side
             shifts.append(shift)
+
     return shifts
 
 
@@ -176,6 +186,7 @@ def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
     side = max(marker.side for marker in markers)
     if side < MIN_SIDE_PIXELS:
         return f"too far away or too small: {side:.0f} pixels a side, {MIN_SIDE_PIXELS:.0f} are needed"
+
     likeness = max(marker.likeness for marker in markers)
     if likeness < MIN_LIKENESS:
         return f"covered or blurred: {likeness:.2f} like the marker, {MIN_LIKENESS:g} is needed; free it, hold still"
@@ -191,4 +202,5 @@ def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
             f"its markers contradict the camera's file by {pose.strain**0.5:.1f} standard deviations of its focal "
             "length or lens: calibrate the camera, or state what is not certain (sigmas_px, distortion_sigmas)"
         )
+
     return ""

@@ -57,7 +57,6 @@ class PoseTracker:
     """
 
     def __init__(self) -> None:
-        """Begin without a pose."""
         self._filter = MotionFilter()
         self._time = -np.inf
         self._branches: list[pin.SE3] = []  # poses of the last sighting, not smoothed
@@ -73,21 +72,27 @@ class PoseTracker:
         """
         if not time > self._time:
             raise InputError(f"times of pictures must increase, got {time:g} s after {self._time:g} s")
+
         seconds = time - self._time
         pose = sight.pose
+
         branches = [pose.T_camera_object, pose.other] if pose.ambiguous else [pose.T_camera_object]
         belief = self._believed(branches, np.array([pose.error, pose.other_error])[: len(branches)], pose, seconds)
         taken, switched = self._taken(branches, belief)
+
         settled = not self._sure(self._belief) and self._sure(belief)  # a wrong pose may have been tracked until now
         outlier = not switched and self._is_outlier(branches[taken], sight, seconds)
         self._strays = self._strays + 1 if outlier else 0
+
         if outlier and not settled and self._strays < MAX_OUTLIERS:
             return Tracked(self._filter.ahead(seconds), pose.covariance, True, taken == 1, self._sure(self._belief))
+
         begin = outlier or switched or self._last is None
         self._time = time
         self._branches = branches
         self._belief = belief
         self._last = branches[taken]
+
         smooth = self._smoothed(branches[taken], pose.covariance, None if begin else seconds)
         return Tracked(*smooth, False, taken == 1, self._sure(belief))
 
@@ -96,6 +101,7 @@ class PoseTracker:
         if seconds is None:
             self._filter.restart(seen, covariance)
             return seen, covariance
+
         found = self._filter.update(seen, covariance, seconds)
         moved = np.concatenate([found.translation - seen.translation, pin.log3(found.rotation @ seen.rotation.T)])
         return found, frozen(covariance + np.outer(moved, moved))
@@ -109,6 +115,7 @@ class PoseTracker:
             passed = 1.0 / (1.0 + (apart / reach) ** 2)  # a much larger change is rare, not impossible
             before = self._belief**BELIEF_MEMORY
             prior = before / before.sum() @ (passed / passed.sum(axis=1, keepdims=True))
+
         squares = errors**2 + ALIGNED_SIGMA**2
         belief = prior / np.minimum(squares / squares.min(), MAX_ODDS)
         return np.asarray(belief / belief.sum())
@@ -118,6 +125,7 @@ class PoseTracker:
         best = int(belief.argmax())
         if self._last is None:
             return best, False
+
         next_one = int(np.argmin([turn_between(self._last, each) for each in branches]))
         switched = best != next_one and belief[best] > SWITCH_BELIEF
         return (best if switched else next_one), switched
@@ -129,6 +137,7 @@ class PoseTracker:
     def _is_outlier(self, pose: pin.SE3, sight: Sighting, seconds: float) -> bool:
         if self._last is None:
             return False
+
         shift = float(np.linalg.norm(pose.translation - self._last.translation))
         turn = turn_between(self._last, pose)
         return (

@@ -62,9 +62,11 @@ class Camera:
             raise InputError("camera matrix must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0, no skew")
         if int(width) != width or int(height) != height or width < 1 or height < 1:
             raise InputError(f"camera size must be two positive whole numbers, got {width} x {height}")
+
         doubts = finite_array(sigmas, (9,), "camera sigmas")
         if (doubts < 0.0).any():
             raise InputError(f"camera sigmas must be 0 or more, got {doubts.min():g}")
+
         object.__setattr__(self, "matrix", frozen(given))
         object.__setattr__(self, "sigmas", frozen(doubts))
         object.__setattr__(self, "distortion", frozen(finite_array(distortion, (5,), "camera distortion")))
@@ -83,6 +85,7 @@ class Camera:
         rows = finite_array(pixels, (None, 2), "pixels")
         if not self.distortion.any():
             return (rows - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
+
         stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
         found: Any = UNDISTORT(rows[:, None], self.matrix, self.distortion, R=None, P=None, criteria=stop)
         return np.asarray(found, dtype=np.float64)[:, 0]

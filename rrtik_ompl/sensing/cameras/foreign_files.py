@@ -70,10 +70,12 @@ def camera_from_opencv(text: str, name: str) -> Camera:
         width, height = (_first(storage, names, cv2.FileNode.real) for names in (_WIDTHS, _HEIGHTS))
     except (cv2.error, SystemError):
         raise InputError(f"{name}: is not a file of OpenCV that can be read; write the camera anew") from None
+
     if matrix is None:
         raise InputError(f"{name}: has no camera_matrix; it is a file of OpenCV without a camera")
     if width is None or height is None:
         raise InputError(f"{name}: has no image_width and image_height; add the size of the calibrated pictures")
+
     try:
         return _camera(matrix, np.zeros(5) if lens is None else lens, width, height)
     except InputError as error:
@@ -111,6 +113,7 @@ def _camera(matrix: ArrayLike, lens: ArrayLike, width: float, height: float) -> 
         raise InputError(
             f"the lens has {len(numbers)} coefficients; five are modelled: k1, k2, p1, p2, k3; calibrate with these"
         )
+
     square = np.asarray(matrix, dtype=np.float64)
     if square.size != 9:
         raise InputError(f"camera matrix must have 3 x 3 numbers, got {square.size}")

@@ -72,6 +72,7 @@ class PanTiltZoom:
             raise InputError("a zoom lens needs a camera for each of its zooms, which increase")
         if len({(each.width, each.height) for each in self.cameras}) > 1:
             raise InputError("cameras of one zoom lens have one size of pictures")
+
         self.T_base_head = rigid(T_base_head, "pose of the head")
         self.T_head_camera = rigid(T_head_camera, "pose of the camera on its head")
         self._pan = pan
@@ -96,14 +97,18 @@ class PanTiltZoom:
             raise InputError(
                 f"zoom {at:g} lies outside of what was calibrated, {self.zooms[0]:g} to {self.zooms[-1]:g}"
             )
+
         low = int(np.clip(np.searchsorted(self.zooms, at, side="right") - 1, 0, max(len(self.zooms) - 2, 0)))
         high = min(low + 1, len(self.zooms) - 1)
         share = (at - self.zooms[low]) / (self.zooms[high] - self.zooms[low]) if high > low else 0.0
+
         first = self.cameras[low]
         second = self.cameras[high]
+
         matrix = (1.0 - share) * first.matrix + share * second.matrix
         for k in range(2):
             matrix[k, k] = first.matrix[k, k] ** (1.0 - share) * second.matrix[k, k] ** share
+
         lens = (1.0 - share) * first.distortion + share * second.distortion
         sigmas = np.maximum(first.sigmas, second.sigmas)
         tone = first.tone if first.tone == second.tone else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,12 +59,11 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     except (OSError, ValueError) as error:  # a name that the system cannot have is a ValueError
         why = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{path}: {why.lower()}; check the name") from None
+
     picture = None
     if size:
-        try:
+        with suppress(cv2.error):  # a header with a size larger than memory
             picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
-        except cv2.error:  # a header with a size larger than memory
-            picture = None
     if picture is None:
         raise InputError(f"{path}: is not an image that can be read; use {', '.join(IMAGE_ENDINGS)}")
     return np.asarray(picture, dtype=np.uint8)
@@ -93,6 +92,7 @@ def pictures_from(source: str | os.PathLike[str] | int) -> Iterator[Picture]:
     if isinstance(source, int) or str(source).isdecimal():
         yield from _device(int(str(source)))
         return
+
     path = Path(source)
     if os.path.isdir(path):
         files = sorted(f for f in path.iterdir() if f.suffix.lower() in IMAGE_ENDINGS)
@@ -115,6 +115,7 @@ def _video(path: Path) -> Iterator[Picture]:
     with _opened(str(path)) as capture:
         if not capture.isOpened():
             raise InputError(f"{path}: is not a video that can be read")
+
         rate = capture.get(cv2.CAP_PROP_FPS) or 30.0
         count = 0
         while (frame := _next(capture)) is not None:
@@ -129,6 +130,7 @@ def _device(number: int) -> Iterator[Picture]:
     with _opened(number) as capture:
         if not capture.isOpened():
             raise InputError(f"camera {number} cannot be opened; is it plugged in, free, and yours to read?")
+
         begin = time.monotonic()
         while True:
             frame = _next(capture)

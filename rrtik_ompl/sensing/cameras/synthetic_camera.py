@@ -98,11 +98,14 @@ def photograph(
         picture = cv2.GaussianBlur(picture, (0, 0), blur)
     if motion >= 1.0:
         picture = cv2.blur(picture, (round(motion), 1))
+
     grain = rng.standard_normal(picture.shape, dtype=np.float32)
     picture = picture * np.float32(1.0 + flicker * rng.standard_normal()) + np.float32(noise) * grain
+
     taken: NDArray[np.uint8] = np.clip(np.rint(np.float32(255.0) * picture), 0, 255).astype(np.uint8)
     if jpeg is None:
         return taken
+
     _, packed = cv2.imencode(".jpg", taken, [cv2.IMWRITE_JPEG_QUALITY, jpeg])
     return np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
 
@@ -112,14 +115,18 @@ def _draw(picture: NDArray[np.float32], camera: Camera, pose: pin.SE3, sheet: Pr
     around = np.c_[corners, np.zeros(4)] @ pose.rotation.T + pose.translation
     if (around[:, 2] <= 0.0).any():
         return
+
     pixels = camera.project(around)
     left, top = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - 3, 0)
     right, bottom = np.minimum(np.ceil(pixels.max(axis=0)).astype(int) + 4, (camera.width, camera.height))
+
     brightness = (BLACK + (WHITE - BLACK) * sheet.cells / 255.0).astype(np.float32)
     within = (np.arange(rays) + 0.5) / rays - 0.5
     for row in range(top, bottom if right > left else top):  # one row of photosites at a time, for the memory's sake
         u, v = np.meshgrid((np.arange(left, right)[:, None] + within).ravel(), row + within)
         seen = _seen(camera.rays(np.c_[u.ravel(), v.ravel()]), pose, sheet, brightness)
+
+        # What rays miss stays as it was drawn before.
         seen = seen.reshape(rays, right - left, rays)
         share = np.isfinite(seen).mean(axis=(0, 2))
         picture[row, left:right] = np.nansum(seen, axis=(0, 2)) / rays**2 + (1.0 - share) * picture[row, left:right]
@@ -132,9 +139,11 @@ def _seen(rays: Matrix, pose: pin.SE3, sheet: Print, brightness: NDArray[np.floa
     with np.errstate(divide="ignore"):
         depth = (normal @ pose.translation) / (directions @ normal)
     points = (directions * depth[:, None] - pose.translation) @ pose.rotation
+
     column = np.floor((points[:, 0] + sheet.half[0]) / sheet.cell)
     row = np.floor((sheet.half[1] - points[:, 1]) / sheet.cell)
     rows, columns = sheet.cells.shape
+
     hit = (depth > 0.0) & (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
     value = np.full(len(rays), np.nan, dtype=np.float32)
     value[hit] = brightness[row[hit].astype(int), column[hit].astype(int)]

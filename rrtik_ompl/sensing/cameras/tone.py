@@ -25,6 +25,7 @@ def coded(light: NDArray[np.float32], tone: float) -> NDArray[np.float32]:
         light: From 0 for none to 1 for the brightest that is not cut off.
         tone: 0 linear, 1 sRGB.
     """
+    # The inverse of `_decoded`, between 4097 of its values.
     value = np.linspace(0.0, 1.0, 4097)
     return np.interp(light, _decoded(value, tone), value).astype(np.float32)
 

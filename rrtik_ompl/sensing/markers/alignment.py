@@ -89,16 +89,17 @@ def aligned_corners(
         Below `MIN_LIKENESS` the corners are returned unchanged.
     """
     framed = np.pad(cells, 1, constant_values=255)
-    side = float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
     low, square, fit = _laid_over(gray, corners, framed, _CELL_PIXELS, tone, before)
     if fit is None:
         return Aligned(corners, 0.0, None, None)
+
     moved = cv2.perspectiveTransform(square[:, None], fit.homography.astype(np.float64))[:, 0]
     better = np.asarray(moved, dtype=np.float64)
-    if np.abs(better + low - corners).max() > max(2.0, _MAX_CORNER_SHIFT * side):
+    if np.abs(better + low - corners).max() > max(2.0, _MAX_CORNER_SHIFT * mean_side(corners)):
         return Aligned(corners, 0.0, None, None)
     if fit.likeness < MIN_LIKENESS:
         return Aligned(corners, fit.likeness, None, None)
+
     corners, spread = corner_spread(fit.model, fit.seen, square, better)
     return Aligned(corners + low, fit.likeness, spread, fit.look)
 
@@ -113,6 +114,11 @@ def look_of(gray: NDArray[np.uint8], corners: Matrix, framed: NDArray[np.uint8])
     """
     fit = _laid_over(gray, corners, framed, _SQUARE_PIXELS)[2]
     return None if fit is None or fit.likeness < MIN_LIKENESS else fit.look
+
+
+def mean_side(corners: Matrix) -> float:
+    """Mean length of the edges of a marker, from its corners, shape (4, 2), in their unit."""
+    return float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
 
 
 class _Fit(NamedTuple):
@@ -140,20 +146,35 @@ def _laid_over(
         fit; None if it does not converge.
     """
     count = len(framed) - 2
-    side = float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
+    side = mean_side(corners)
     cell = int(np.clip(round(side / count), *sizes))
     rim = round(_RIM_CELLS * cell)
     square = np.array([[0, 0], [count, 0], [count, count], [0, count]], dtype=np.float64) * cell + rim - 0.5
+
     low, piece = _neighbourhood(gray, corners, margin=int(0.35 * side) + 4)
     guess = cv2.getPerspectiveTransform(square.astype(np.float32), (corners - low).astype(np.float32))
+
     ideal = _ideal(framed, cell, rim)
     try:
         fit = _aligned(ideal, piece, guess.astype(np.float32), tone, before)
-        if before is not None and fit.likeness < MIN_LIKENESS:
+        if before is not None and fit.likeness < MIN_LIKENESS:  # the picture before it misled
             fit = _aligned(ideal, piece, guess.astype(np.float32), tone, None)
     except cv2.error:  # the alignment did not converge
         return low, square, None
+
     return low, square, fit
+
+
+def _neighbourhood(gray: NDArray[np.uint8], corners: Matrix, margin: int) -> tuple[Matrix, Pixels]:
+    low = np.maximum(np.floor(corners.min(axis=0)).astype(int) - margin, 0)
+    high = np.ceil(corners.max(axis=0)).astype(int) + margin
+    return low.astype(np.float64), gray[low[1] : high[1], low[0] : high[0]].astype(np.float32)
+
+
+def _ideal(framed: NDArray[np.uint8], cell: int, rim: int) -> Pixels:
+    large = np.kron(framed, np.ones((cell, cell), dtype=np.uint8))
+    cut = slice(cell - rim, rim - cell)
+    return large[cut, cut].astype(np.float32)
 
 
 def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | None, before: Look | None) -> _Fit:
@@ -163,9 +184,11 @@ def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | Non
     if before is not None:
         starts = [before if tone is None else before._replace(tone=tone)]
     best = max((_fit(ideal, piece, homography, start) for start in starts), key=lambda fit: fit.likeness)
+
     known = before is not None
     if before is not None and 1.0 - best.likeness <= _AS_LIKE * (1.0 - before.likeness):
         return best
+
     for number in range(_ROUNDS):
         spots: Vector = np.asarray(best.look.spot * _NEAR_SPOTS if known else _SPOTS, dtype=np.float64)
         look = _spot_and_tone(ideal, best.seen, _spread(best.homography, ideal.shape), best.look, tones, spots)
@@ -175,12 +198,8 @@ def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | Non
             break
         best = _fit(ideal, piece, best.homography, look)
         known = True
+
     return best._replace(look=best.look._replace(likeness=best.likeness))
-
-
-def _as_before(look: Look, other: Look) -> bool:
-    near = abs(look.spot - other.spot) < _SPOT_TOLERANCE * other.spot
-    return near and abs(look.tone - other.tone) < _TONE_TOLERANCE
 
 
 def _fit(ideal: Pixels, piece: Pixels, homography: Pixels, look: Look) -> _Fit:
@@ -223,8 +242,10 @@ def _spot_and_tone(
 
     place = _peak(likenesses([blurred(each) for each in spots], few, [look.tone]))
     spot = float(spots[0] * (spots[1] / spots[0]) ** place)
+
     if len(tones) == 1:
         return Look(spot, tones[0])
+
     place = _peak(likenesses([blurred(spot)], few, list(tones)))
     return Look(spot, float(np.clip(tones[0] + (tones[1] - tones[0]) * place, tones[0], tones[-1])))
 
@@ -237,10 +258,9 @@ def _peak(values: Vector) -> float:
     return best + (float(np.clip(0.5 * (low - high) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0)
 
 
-def _ideal(framed: NDArray[np.uint8], cell: int, rim: int) -> Pixels:
-    large = np.kron(framed, np.ones((cell, cell), dtype=np.uint8))
-    cut = slice(cell - rim, rim - cell)
-    return large[cut, cut].astype(np.float32)
+def _as_before(look: Look, other: Look) -> bool:
+    near = abs(look.spot - other.spot) < _SPOT_TOLERANCE * other.spot
+    return near and abs(look.tone - other.tone) < _TONE_TOLERANCE
 
 
 def _spread(homography: Pixels, shape: tuple[int, ...]) -> Matrix:
@@ -249,6 +269,7 @@ def _spread(homography: Pixels, shape: tuple[int, ...]) -> Matrix:
     x, y = homography[:2] @ middle
     bottom = homography[2] @ middle
     slope = (homography[:2, :2] - np.outer([x, y], homography[2, :2]) / bottom) / bottom
+
     back = np.linalg.inv(slope)
     return np.asarray(back @ back.T, dtype=np.float64)
 
@@ -259,11 +280,6 @@ def _blurred(picture: Pixels, spread: Matrix) -> Pixels:
     y = x[:, None]
     (a, b), (_, c) = np.linalg.inv(spread)
     weights = np.exp(-0.5 * (a * x * x + 2.0 * b * x * y + c * y * y))
+
     blurred = cv2.filter2D(picture, cv2.CV_32F, weights / weights.sum(), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(blurred, dtype=np.float32)
-
-
-def _neighbourhood(gray: NDArray[np.uint8], corners: Matrix, margin: int) -> tuple[Matrix, Pixels]:
-    low = np.maximum(np.floor(corners.min(axis=0)).astype(int) - margin, 0)
-    high = np.ceil(corners.max(axis=0)).astype(int) + margin
-    return low.astype(np.float64), gray[low[1] : high[1], low[0] : high[0]].astype(np.float32)

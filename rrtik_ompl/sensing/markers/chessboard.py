@@ -56,8 +56,10 @@ class Chessboard:
         except cv2.error:  # its copies take more memory than there is
             size = " x ".join(map(str, gray.shape[::-1]))
             raise InputError(f"a picture of {size} pixels is too large to find a chessboard in; scale it") from None
+
         if not found or pixels is None:
             return np.zeros((0, 3)), np.zeros((0, 2))
+
         found_at = np.reshape(pixels, (-1, 2)).astype(np.float64)
         if (self.columns + self.rows) % 2 == 1 and self._first_is_white(gray, found_at):
             found_at = found_at[::-1].copy()
@@ -89,6 +91,8 @@ class Chessboard:
                 middles = 0.25 * sum(
                     grid[row + a : row + a + side, column + b : column + b + side] for a in (0, 1) for b in (0, 1)
                 )
+
+                # Which colour comes first is told by the picture.
                 across, down = np.rint(middles).astype(np.intp).reshape(-1, 2).T
                 seen = gray[down, across]
                 inner = odd[1:-1, 1:-1].ravel()

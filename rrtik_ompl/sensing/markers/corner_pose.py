@@ -99,19 +99,23 @@ def pose_of_square(
     """
     points = square_corners(side)
     shifts = [points * side_sigma / side] if side_sigma else []
+
     # Exactly in front of the camera the closed form fails: not a number, or a marker that faces away.
     guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE_SQUARE) or _guesses(camera, points, pixels)
+
     refined = [_refined(camera, points, pixels, guess) for guess in guesses]
     errors = [_error(camera, points, pixels, pose) for pose in refined]
     best = int(np.argmin(errors))
     first = refined[best]
     error = errors[best]
+
     other = None
     other_error = np.inf
     if len(guesses) > 1:
         merged = turn_between(first, refined[1 - best]) < MIN_BRANCH_ANGLE
         other = max(guesses, key=lambda guess: turn_between(first, guess)) if merged else refined[1 - best]
         other_error = _error(camera, points, pixels, other)
+
     known = _of_pixels(len(points), sigma, spread), _of_points(camera, points, first, shifts)
     return CornerPose(first, other, error, other_error, *_covariance(camera, points, pixels, first, known))
 
@@ -156,6 +160,7 @@ def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> p
     """The nearby pose of least error: Levenberg's steps about the axes of the camera, kept where they help."""
     damping = 1e-6
     error = _error(camera, points, pixels, pose)
+
     for _ in range(_MAX_STEPS):
         turned = points @ pose.rotation.T
         slopes = camera.jacobian(turned, pose.translation)
@@ -163,6 +168,7 @@ def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> p
         normal = slopes.T @ slopes
         step = np.linalg.solve(normal + damping * np.diag(normal.diagonal()), slopes.T @ away)
         tried = pin.SE3(pin.exp3(step[3:]) @ pose.rotation, pose.translation + step[:3])
+
         better = _error(camera, points, pixels, tried)
         gain = error - better
         if gain > 0.0:
@@ -171,8 +177,10 @@ def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> p
             damping = 0.1 * damping
         else:
             damping *= 100.0
+
         if abs(gain) <= 1e-9 * error or damping > 1e3:
             break
+
     return pose
 
 
@@ -191,9 +199,11 @@ def _of_points(camera: Camera, points: Matrix, pose: pin.SE3, shifts: Sequence[M
     turned = points @ pose.rotation.T
     found = camera.doubt(turned + pose.translation)
     slopes = camera.jacobian(turned, pose.translation)[:, :3].reshape(-1, 2, 3)
+
     for shift in shifts:
         moved = np.einsum("kij,kj->ki", slopes, shift @ pose.rotation.T).ravel()
         found = found + np.outer(moved, moved)
+
     return found
 
 
@@ -206,9 +216,11 @@ def _covariance(
     slopes = camera.jacobian(turned, pose.translation)
     back = np.linalg.pinv(slopes)
     away = (camera.project(turned + pose.translation) - pixels).ravel()
+
     weighed = np.linalg.solve(found + doubted, np.c_[away, slopes])
     lever = slopes.T @ weighed  # of a pose near this one that explains the pixels best by what is known of them
     squares = float(away @ weighed[:, 0] - lever[:, 0] @ np.linalg.solve(lever[:, 1:], lever[:, 0]))
+
     covariance = max(squares / MAX_SURPRISE, 1.0) * (back @ found @ back.T) + back @ doubted @ back.T
     return frozen(covariance), max(squares, 0.0) / (2 * len(points) - 6)
 
@@ -219,11 +231,14 @@ def _strain(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, known
     seen = turned + pose.translation
     away = (camera.project(seen) - pixels).ravel()
     slopes = camera.jacobian(turned, pose.translation)
+
     own = camera.own_slopes(seen)
     lens = np.c_[own[:, :2] @ camera.matrix[[0, 1], [0, 1]], own[:, 4]]
+
     weighed = np.linalg.solve(known[0] + known[1], np.c_[away, slopes, lens])
     lever = slopes.T @ weighed
     freed = weighed - weighed[:, 1:7] @ np.linalg.solve(lever[:, 1:7], lever)  # of what another pose explains
+
     score = lens.T @ freed[:, 0]
     told = np.einsum("ij,ij->j", lens, freed[:, 7:])
     return float((score**2 / np.maximum(told, 1e-9)).max())

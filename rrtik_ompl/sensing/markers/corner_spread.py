@@ -45,17 +45,21 @@ def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) 
     shape = columns.shape[:2]
     columns = columns.reshape(len(light), -1)
     repeated = max(_area(square) / _area(corners) / every**2, 1.0)  # samples of one pixel err alike
+
     normal = columns.T @ columns
     right = columns.T @ light
     normal += np.diag(_TINY * normal.diagonal() + _TINY)
     whole = np.linalg.inv(normal)
+
     found = whole @ right
     rest = light - columns @ found
     variance = repeated * float(rest @ rest) / max(len(light) - len(normal), 1)
+
     left_out = _left_out(shape, columns, rest, normal)
     bent = float(found[_BENDS] @ found[_BENDS]) * _area(corners) / _area(square)  # by as much corners may lie off
     cut = CUT_SHIFT * float((light >= CUT_OFF).mean())  # blocks err alike there, which the jackknife does not see
     spread = left_out + variance * whole[:8, :8] + (bent + FLOOR**2) * np.eye(8) + cut**2 * _ALIKE
+
     return corners + found[:8].reshape(4, 2), frozen(spread)
 
 
@@ -67,15 +71,18 @@ def _columns(model: Pixels, square: Matrix, corners: Matrix, every: int) -> Matr
     across = _slope(model, 1, 0)
     down = _slope(model, 0, 1)
     blurs = [_slope(across, 1, 0), _slope(across, 0, 1), _slope(down, 0, 1)]
+
     across = across[::every, ::every]
     down = down[::every, ::every]
     model = model[::every, ::every]
     blurs = [each[::every, ::every] for each in blurs]
+
     x, y = _places(*model.shape, every)
     low = square[0]
     high = square[2]
     u = (2.0 * x - low[0] - high[0]) / (high[0] - low[0])
     v = (2.0 * y - low[1] - high[1]) / (high[1] - low[1])
+
     # Motions of second order that no homography has: those of homographies are (u u, u v) and (u v, v v).
     bends = [across * v * v, down * u * u, across * u * u - down * u * v, across * u * v - down * v * v]
     more = [np.ones(model.shape), model, np.hypot(across, down), *blurs, *bends]
@@ -84,6 +91,50 @@ def _columns(model: Pixels, square: Matrix, corners: Matrix, every: int) -> Matr
 
 def _slope(picture: NDArray[np.floating[Any]], across: int, down: int) -> Matrix:
     return np.asarray(cv2.Sobel(picture, cv2.CV_64F, across, down, scale=0.125), dtype=np.float64)
+
+
+@lru_cache(maxsize=64)
+def _places(height: int, width: int, every: int) -> tuple[Matrix, Matrix]:
+    """Where the samples are, across and down. Each of shape (height, width)."""
+    y, x = np.mgrid[0.0:height, 0.0:width] * every
+    return x, y
+
+
+def _slopes(across: Matrix, down: Matrix, places: tuple[Matrix, Matrix], square: Matrix, corners: Matrix) -> Matrix:
+    """How the model's grey values change with each number of the corners [1 / pixel]. Shape (h, w, 8)."""
+    x, y = (each.ravel() for each in places)
+    moved = corners.reshape(8) + _STEP * np.eye(8)
+
+    back = _perspectives(corners[None], square[None])[0]
+    turned = back @ _perspectives(np.broadcast_to(square, (8, 4, 2)), moved.reshape(8, 4, 2))
+    at = turned[..., 0, None] * x + (turned[..., 1, None] * y + turned[..., 2, None])
+    shift = (at[:, :2] / at[:, 2:] - [x, y]) * (-1.0 / _STEP)
+
+    found = across.ravel() * shift[:, 0] + down.ravel() * shift[:, 1]
+    return np.asarray(found.T.reshape(*across.shape, 8), dtype=np.float64)
+
+
+def _perspectives(before: Matrix, after: Matrix) -> Matrix:
+    """The homographies that lead four points to four others, in float64. Each of shape (k, 4, 2); (k, 3, 3)."""
+    count = len(before)
+    x, y = np.moveaxis(before, 2, 0)
+    u, v = np.moveaxis(after, 2, 0)
+    one = np.ones((count, 4))
+    none = np.zeros((count, 4))
+    # Two equations a point, for the eight numbers beside the last one, which is 1.
+    rows = np.concatenate([
+        np.stack([x, y, one, none, none, none, -u * x, -u * y], axis=2),
+        np.stack([none, none, none, x, y, one, -v * x, -v * y], axis=2),
+    ], axis=1)  # fmt: skip
+
+    found = np.linalg.solve(rows, np.concatenate([u, v], axis=1)[..., None])[..., 0]
+    return np.append(found, np.ones((count, 1)), axis=1).reshape(count, 3, 3)
+
+
+def _area(corners: Matrix) -> float:
+    a, b = corners[2] - corners[0]
+    c, d = corners[3] - corners[1]
+    return 0.5 * abs(float(a * d - b * c))
 
 
 def _left_out(shape: tuple[int, ...], slopes: Matrix, rest: Vector, normal: Matrix) -> Matrix:
@@ -103,43 +154,3 @@ def _blocks(height: int, width: int) -> tuple[NDArray[np.intp], NDArray[np.intp]
     block = (rows[:, None] * _BLOCKS + columns).ravel()
     order = np.argsort(block, kind="stable")
     return order, np.searchsorted(block[order], np.arange(1, _BLOCKS**2))
-
-
-def _area(corners: Matrix) -> float:
-    a, b = corners[2] - corners[0]
-    c, d = corners[3] - corners[1]
-    return 0.5 * abs(float(a * d - b * c))
-
-
-def _slopes(across: Matrix, down: Matrix, places: tuple[Matrix, Matrix], square: Matrix, corners: Matrix) -> Matrix:
-    """How the model's grey values change with each number of the corners [1 / pixel]. Shape (h, w, 8)."""
-    x, y = (each.ravel() for each in places)
-    moved = corners.reshape(8) + _STEP * np.eye(8)
-    back = _perspectives(corners[None], square[None])[0]
-    turned = back @ _perspectives(np.broadcast_to(square, (8, 4, 2)), moved.reshape(8, 4, 2))
-    at = turned[..., 0, None] * x + (turned[..., 1, None] * y + turned[..., 2, None])
-    shift = (at[:, :2] / at[:, 2:] - [x, y]) * (-1.0 / _STEP)
-    found = across.ravel() * shift[:, 0] + down.ravel() * shift[:, 1]
-    return np.asarray(found.T.reshape(*across.shape, 8), dtype=np.float64)
-
-
-def _perspectives(before: Matrix, after: Matrix) -> Matrix:
-    """The homographies that lead four points to four others, in float64. Each of shape (k, 4, 2); (k, 3, 3)."""
-    count = len(before)
-    x, y = np.moveaxis(before, 2, 0)
-    u, v = np.moveaxis(after, 2, 0)
-    one = np.ones((count, 4))
-    none = np.zeros((count, 4))
-    rows = np.concatenate([
-        np.stack([x, y, one, none, none, none, -u * x, -u * y], axis=2),
-        np.stack([none, none, none, x, y, one, -v * x, -v * y], axis=2),
-    ], axis=1)  # fmt: skip
-    found = np.linalg.solve(rows, np.concatenate([u, v], axis=1)[..., None])[..., 0]
-    return np.append(found, np.ones((count, 1)), axis=1).reshape(count, 3, 3)
-
-
-@lru_cache(maxsize=64)
-def _places(height: int, width: int, every: int) -> tuple[Matrix, Matrix]:
-    """Where the samples are, across and down. Each of shape (height, width)."""
-    y, x = np.mgrid[0.0:height, 0.0:width] * every
-    return x, y

@@ -1,4 +1,4 @@
-"""Square markers [50]: dictionaries, pictures and detection. OpenCV's ``aruco`` is used in this module only.
+"""Square markers [50]: dictionaries, pictures and detection. OpenCV's ``aruco`` is called in this module only.
 
 OpenCV stores AprilTag families turned by half a turn; here top is where the AprilTag library's own prints have it.
 """
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import LARGEST, Matrix, frozen
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.sensing.markers.alignment import Look, aligned_corners
+from rrtik_ompl.sensing.markers.alignment import Look, aligned_corners, mean_side
 from rrtik_ompl.sensing.markers.chessboard import SMALLEST_SIDE
 
 DICTIONARIES = {
@@ -62,7 +62,7 @@ class SeenMarker:
     @property
     def side(self) -> float:
         """Mean length of its edges, in pixels."""
-        return float(np.linalg.norm(np.roll(self.corners, -1, 0) - self.corners, axis=1).mean())
+        return mean_side(self.corners)
 
 
 def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
@@ -75,6 +75,7 @@ def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
     count = len(table.bytesList)
     if not 0 <= number < count:
         raise InputError(f"dictionary {dictionary} has markers 0 to {count - 1}, not {number}")
+
     cells = cv2.aruco.generateImageMarker(table, number, table.markerSize + 2)
     return np.ascontiguousarray(np.rot90(cells, 2 if _is_turned(dictionary) else 0), dtype=np.uint8)
 
@@ -100,6 +101,28 @@ def find_markers(
             not for what is blurred most, which costs as much again.
     """
     known = {marker.number: marker.look for marker in before}
+    corners, numbers = _detected(gray, dictionary, before, near)
+    if numbers is None:
+        return ()
+
+    found: list[SeenMarker] = []
+    for k in np.argsort(np.ravel(numbers), kind="stable"):
+        number = int(np.ravel(numbers)[k])
+        rough = corners[k].reshape(4, 2).astype(np.float64)
+        rough = np.roll(rough, 2 if _is_turned(dictionary) else 0, axis=0)
+
+        if not align:
+            found.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
+            continue
+
+        fit = aligned_corners(gray, rough, marker_cells(dictionary, number), tone, known.get(number))
+        found.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.look))
+
+    return tuple(found)
+
+
+def _detected(gray: NDArray[np.uint8], dictionary: str, before: Sequence[SeenMarker], near: bool) -> tuple[Any, Any]:
+    """Corners and numbers by the cheapest try that finds any, OpenCV's way: numbers are None where none does."""
     corners, numbers = _again(gray, before) if near and before else ([], None)
     if numbers is None:
         corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
@@ -107,36 +130,28 @@ def find_markers(
         corners, numbers, _ = _detector(dictionary, thorough=True).detectMarkers(gray)
     if numbers is None:
         corners, numbers = _further_tries(gray, dictionary, 1 if near else 2)
-    found: list[SeenMarker] = []
-    if numbers is None:
-        return ()
-    for k in np.argsort(np.ravel(numbers), kind="stable"):
-        number = int(np.ravel(numbers)[k])
-        rough = corners[k].reshape(4, 2).astype(np.float64)
-        rough = np.roll(rough, 2 if _is_turned(dictionary) else 0, axis=0)
-        if not align:
-            found.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
-            continue
-        fit = aligned_corners(gray, rough, marker_cells(dictionary, number), tone, known.get(number))
-        found.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.look))
-    return tuple(found)
+    return corners, numbers
 
 
 def _again(gray: NDArray[np.uint8], before: Sequence[SeenMarker]) -> tuple[Any, Any]:
     """Corners and numbers of what the picture before showed, searched for around its place; None where one is not."""
     corners = []
     numbers = []
+
     for marker in before:
         around = int(_NEAR_SIDES * marker.side) + _NEAR_PIXELS
         low = np.maximum(np.floor(marker.corners.min(axis=0)).astype(int) - around, 0)
         high = np.ceil(marker.corners.max(axis=0)).astype(int) + around
         window = np.ascontiguousarray(gray[low[1] : high[1], low[0] : high[0]])
+
         found, seen, _ = _detector(marker.dictionary, _NEAR_OUTLINE_SHARE).detectMarkers(window)
         own = [] if seen is None else np.flatnonzero(np.ravel(seen) == marker.number)
         if len(own) != 1:
             return [], None
+
         corners.append(found[own[0]] + low)
         numbers.append(marker.number)
+
     return corners, np.array(numbers)
 
 
@@ -155,6 +170,7 @@ def _further_tries(gray: NDArray[np.uint8], dictionary: str, tries: int) -> tupl
         corners, numbers, _ = _detector(dictionary).detectMarkers(_evened(calm))
         if numbers is not None:
             break
+
     return [(each + 0.5) / _ENLARGED - 0.5 for each in corners], numbers
 
 
@@ -194,6 +210,7 @@ def charuco_corners(gray: NDArray[np.uint8], board: cv2.aruco.CharucoBoard) -> t
     pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(gray)
     if numbers is None or len(numbers) == 0:
         return np.zeros((0, 3)), np.zeros((0, 2))
+
     match: Any = board.matchImagePoints  # its type requires a sequence where an array is allowed
     points, seen = match(np.asarray(pixels).reshape(-1, 1, 2), np.ravel(numbers))
     return np.reshape(points, (-1, 3)).astype(np.float64), np.reshape(seen, (-1, 2)).astype(np.float64)
@@ -217,9 +234,11 @@ def _detector(
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     parameters.minMarkerPerimeterRate = outline_share
+
     if thorough:
         parameters.adaptiveThreshWinSizeMax = _WIDEST
         far_apart = _table(dictionary).maxCorrectionBits >= _FAR_APART
         parameters.errorCorrectionRate = 1.0 if far_apart else parameters.errorCorrectionRate
+
     parameters.minDistanceToBorder = 0  # else markers that fill half of the picture are lost, though wholly in view
     return cv2.aruco.ArucoDetector(_table(dictionary), parameters)

@@ -52,16 +52,20 @@ def _shown(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Pixels:
     shares = np.stack([ideal.ravel() for ideal in ideals]) / np.float32(255.0)
     places = np.clip(np.rint(grey), 0, 255).astype(np.intp)
     lights = np.stack([light_of(tone)[places] for tone in tones])
+
+    # Normal equations of three numbers for black and three for white, of what is not cut off.
     known = (pairs * whole).T
     squares = [np.ones((1, len(grey)), dtype=np.float32) @ known, shares @ known, (shares * shares) @ known]
     normal = np.empty((len(shares), 6, 6))
     for (row, column), product in zip(((0, 0), (0, 3), (3, 3)), squares, strict=True):
         normal[:, row : row + 3, column : column + 3] = product.reshape(-1, 3, 3)
     normal[:, 3:, :3] = normal[:, :3, 3:]
+
     inside = (even * whole).T
     right = np.empty((max(len(shares), len(tones)), 6))
     right[:, :3] = lights @ inside
     right[:, 3:] = (lights * shares) @ inside
+
     weights = np.linalg.solve(normal + 1e-3 * np.eye(6), right[..., None])[..., 0].astype(np.float32)
     made = weights[:, :3] @ even + shares * (weights[:, 3:] @ even)
     if len(tones) == 1:
@@ -75,6 +79,8 @@ def _even(height: int, width: int) -> tuple[Pixels, Pixels]:
     down, across = np.mgrid[-1.0 : 1.0 : height * 1j, -1.0 : 1.0 : width * 1j].astype(np.float32)
     found = np.stack([np.ones(height * width, dtype=np.float32), across.ravel(), down.ravel()])
     pairs = (found[:, None] * found).reshape(9, -1)
+
     for each in (found, pairs):
         each.flags.writeable = False
+
     return found, pairs

@@ -67,6 +67,7 @@ class GraspType:
         object.__setattr__(self, "levels", tuple(poses))
         for word, value in (("approach", approach), ("lift", lift)):
             object.__setattr__(self, word, not_negative(value, f"grasp type '{name}': {word}"))
+
         if not self.levels:
             raise InputError(f"grasp type '{name}' needs at least one level")
 
@@ -95,6 +96,7 @@ class MarkedObject:
     def __post_init__(self) -> None:
         for word in ("markers", "solids", "grasps"):
             object.__setattr__(self, word, tuple(getattr(self, word)))
+
         if self.role not in ROLES:
             raise UnknownNameError("role of an object", self.role, ROLES, where=self.name)
         if not self.markers:
@@ -137,6 +139,7 @@ class MarkerMap:
         object.__setattr__(self, "objects", tuple(self.objects))
         if self.T_base_camera is not None:
             object.__setattr__(self, "T_base_camera", rigid(self.T_base_camera, "pose of the camera"))
+
         for what, names in (
             ("object", [o.name for o in self.objects]),
             ("marker", [m.number for o in self.objects for m in o.markers]),
@@ -144,6 +147,7 @@ class MarkerMap:
             twice = [name for name, count in Counter(names).items() if count > 1]
             if twice:
                 raise InputError(f"{what} {twice[0]} is twice in the marker map; every one needs its own")
+
         bases = [o.name for o in self.objects if o.role == "base"]
         if len(bases) > 1:
             raise InputError(f"two objects are the base: {bases[0]} and {bases[1]}; there is one arm")

@@ -81,6 +81,7 @@ class MarkerMapFile(Section):
                 objects.append(entry.build(document.path.parent))
                 for marker in entry.markers:
                     marker_cells(self.dictionary, marker.id)  # raises where there is no such marker
+
         with document.at(()):
             return MarkerMap(
                 self.dictionary, tuple(objects), None if self.camera_pose is None else self.camera_pose.build()

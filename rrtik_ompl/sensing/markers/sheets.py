@@ -60,12 +60,14 @@ def print_markers(
         raise InputError("no marker is named; give at least one number")
     if not 0.002 <= side <= 1.0:
         raise InputError(f"side of a marker must be between 0.002 and 1 m, got {side:g}")
+
     cell = side / len(cells[0])
     outer = side + 2.0 * cell  # with its white rim
     columns = int((width - 2 * EDGE + GAP) // (outer + GAP))
     rows = int((height - 2 * EDGE - 2 * CAPTION + GAP) // (outer + CAPTION + GAP))
     if columns < 1 or rows < 1:
         raise InputError(f"a marker of {side:g} m does not fit on {paper}; the rim takes {2 * cell:.3f} m more")
+
     tiles = []
     for place, (number, each) in enumerate(zip(numbers, cells, strict=True)):
         row, column = divmod(place % (rows * columns), columns)
@@ -73,6 +75,7 @@ def print_markers(
         y = height - EDGE - (row + 1) * (outer + CAPTION) - row * GAP + CAPTION + cell
         caption = f"{UP}  {dictionary}  id {number}  side {1e3 * side:g} mm"
         tiles.append(_Tile(each, x, y, cell, caption, y - cell - 0.5 * CAPTION))
+
     pages = [tiles[k : k + rows * columns] for k in range(0, len(tiles), rows * columns)]
     _write(path, pages, (width, height), dots_per_inch)
     return len(pages)
@@ -98,11 +101,14 @@ def print_board(
     width, height = _paper(paper)
     if columns * square > width - 2 * EDGE or rows * square > height - 2 * EDGE - 2 * CAPTION:
         raise InputError(f"a board of {columns * square:.3f} x {rows * square:.3f} m does not fit on {paper}")
+
     fine = 100  # cells a square: the side of a marker becomes a whole number of them to 1 %
     picture = np.asarray(board.generateImage((columns * fine, rows * fine), marginSize=0, borderBits=1), dtype=np.uint8)
+
     caption = f"ChArUco {columns} x {rows}, {dictionary}, squares {1e3 * square:g} mm, markers {1e3 * marker:g} mm"
     x = 0.5 * (width - columns * square)
     y = height - EDGE - rows * square
+
     _write(path, [[_Tile(picture, x, y, square / fine, caption, y - CAPTION)]], (width, height), dots_per_inch)
 
 
@@ -121,6 +127,7 @@ def _write(
 
     file = Path(path)
     check_target(file, SHEET_FORMATS)
+
     figures = [_page(page, size) for page in pages]
     if file.suffix.lower() == ".pdf":
         made = BytesIO()
@@ -129,6 +136,7 @@ def _write(
                 book.savefig(figure)
         write_bytes(file, made.getvalue())
         return
+
     for k, figure in enumerate(figures):
         target = file if len(figures) == 1 else file.with_stem(f"{file.stem}-{k + 1}")
         made = BytesIO()
@@ -144,15 +152,18 @@ def _page(tiles: list[_Tile], size: tuple[float, float]) -> Figure:
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, size[0]), ylim=(0.0, size[1]))
     axes.axis("off")
+
     for tile in tiles:
         rows, columns = tile.cells.shape
         box = (tile.x, tile.x + columns * tile.cell, tile.y, tile.y + rows * tile.cell)
         axes.imshow(tile.cells, cmap="gray", vmin=0, vmax=255, extent=box, interpolation="none", aspect="auto")
         axes.text(tile.x, tile.caption_y, tile.caption, fontsize=7, va="center")
+
     axes.plot([EDGE, EDGE + RULE], [EDGE, EDGE], color="black", linewidth=0.8)
     axes.text(
         EDGE + RULE + 0.003, EDGE, "100 mm: measure it; print at 100 %, not fitted to the page", fontsize=6, va="center"
     )
+
     axes.set_xlim(0.0, size[0])
     axes.set_ylim(0.0, size[1])
     return figure
