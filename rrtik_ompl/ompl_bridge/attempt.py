@@ -103,10 +103,26 @@ def attempt(
         return replace(found, rows=form.found(found.rows, goals))
 
     with quiet():
-        ou.RNG.setSeed(1 + budget.seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
+        seed_ompl(budget.seed)
         if is_safe(factory):
             return _on_arrays(problem, factory, goals, budget, parameters, checked=checked)
         return _in_ompl(problem, factory, goals, budget, parameters)
+
+
+def seed_ompl(seed: int) -> None:
+    """Seed OMPL's random numbers, before any object is made that draws from them; OMPL does not take 0."""
+    ou.RNG.setSeed(1 + seed % (2**31 - 2))
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Silence OMPL's log, which goes to standard output, for the time of one attempt."""
+    level = ou.getLogLevel()
+    ou.setLogLevel(ou.LogLevel.LOG_NONE)
+    try:
+        yield
+    finally:
+        ou.setLogLevel(level)
 
 
 def _on_arrays(
@@ -118,7 +134,7 @@ def _on_arrays(
     *,
     checked: bool,
 ) -> Attempt:
-    """Of a planner of ours, which needs of OMPL a space alone."""
+    """An attempt of a planner of ours, which needs of OMPL a space alone."""
     name = factory.__name__
     bounds = planning_bounds(problem, goals)
     limit = {} if budget.iterations is None else {ITERATION_LIMIT: budget.iterations}
@@ -129,6 +145,7 @@ def _on_arrays(
     straight = _straight_motion(problem, goals) if factory.straight_first else None
     if straight is not None:
         return Attempt(straight, "Exact solution", {})
+
     status, rows = planner.solve_rows(problem.start[None], goals, bounds, budget.over, checked=checked)
     _raise_failure(planner, name, status, None)
     return Attempt(rows, str(status), dict(planner.statistics), planner.reason)
@@ -137,11 +154,12 @@ def _on_arrays(
 def _in_ompl(
     problem: Problem, factory: PlannerFactory, goals: Matrix, budget: Budget, parameters: Mapping[str, Any]
 ) -> Attempt:
-    """Of a planner of OMPL, or of anybody else's, whose objects all live in here."""
+    """An attempt of a planner of OMPL, or of anybody else's, whose objects all live in here."""
     name = getattr(factory, "__name__", str(factory))
     traits = traits_of(factory)
     seconds = max(budget.left, 0.0)
     most = np.inf if budget.iterations is None else budget.iterations * MOTIONS_PER_ITERATION
+
     validity = ValidityCallback(problem.world, most_motions=most)
     si = space_information(problem, goals, validity)
     definition = problem_definition(problem, goals, si)
@@ -164,18 +182,10 @@ def _in_ompl(
     rows = exact_path(definition, si)
     if rows is None and validity.late and status in INVALID:  # only because all answers were no by then
         status = ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
+
     begin = time.perf_counter()
     graph = _graph(planner, si) if factory in OMPL_TRAITS and traits.has_graph else {}
     return Attempt(rows, str(status), {**validity.counts(), **graph}, counting=time.perf_counter() - begin)
-
-
-def _status(answer: object) -> ob.PlannerStatus:
-    """What ``solve`` returned; one that is written in Python may return anything."""
-    if isinstance(answer, ob.PlannerStatus):
-        return answer
-    if isinstance(answer, ob.PlannerStatus.PlannerStatusType):
-        return ob.PlannerStatus(answer)
-    raise TypeError(f"its solve() must return an ompl.base.PlannerStatus, got {type(answer).__name__}")
 
 
 @contextmanager
@@ -195,6 +205,47 @@ def _named(name: str) -> Iterator[None]:
         said = str(error) if type(error) is RuntimeError else f"{type(error).__name__}: {error}".removesuffix(": ")
         place = "" if at.filename == __file__ else f" ({Path(at.filename).name}, line {at.lineno})"
         raise PlannerError(f"planner {name} broke: {said}{place}") from None
+
+
+def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:
+    """The straight motion from the start to the nearest goal if it is free, shape (2, n): no path is shorter."""
+    nearest = goals[np.linalg.norm(goals - problem.start, axis=1).argmin()]
+    return np.stack([problem.start, nearest]) if problem.world.motion_valid(problem.start, nearest) else None
+
+
+@contextmanager
+def interrupt_ends(condition: ob.PlannerTerminationCondition) -> Iterator[None]:
+    """Ctrl-C ends the planner through its termination condition and is raised afterwards.
+
+    Raised inside a callback it would end the process under planners that run a second thread.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    interrupted = False
+
+    def stop(*_: object) -> None:
+        nonlocal interrupted
+        interrupted = True
+        condition.terminate()
+
+    previous = signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+        if interrupted:
+            raise KeyboardInterrupt
+
+
+def _status(answer: object) -> ob.PlannerStatus:
+    """What ``solve`` returned; one that is written in Python may return anything."""
+    if isinstance(answer, ob.PlannerStatus):
+        return answer
+    if isinstance(answer, ob.PlannerStatus.PlannerStatusType):
+        return ob.PlannerStatus(answer)
+    raise TypeError(f"its solve() must return an ompl.base.PlannerStatus, got {type(answer).__name__}")
 
 
 def _raise_failure(planner: ob.Planner, name: str, status: ob.PlannerStatus, error: Exception | None) -> None:
@@ -222,45 +273,3 @@ def _graph(planner: ob.Planner, si: ob.SpaceInformation) -> dict[str, int]:
     graph = ob.PlannerData(si)
     planner.getPlannerData(graph)
     return {"vertices": graph.numVertices(), "edges": graph.numEdges()}
-
-
-def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:
-    """The straight motion from the start to the nearest goal if it is free, shape (2, n): no path is shorter."""
-    nearest = goals[np.linalg.norm(goals - problem.start, axis=1).argmin()]
-    return np.stack([problem.start, nearest]) if problem.world.motion_valid(problem.start, nearest) else None
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Silence OMPL's log, which goes to standard output, for the time of one attempt."""
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LogLevel.LOG_NONE)
-    try:
-        yield
-    finally:
-        ou.setLogLevel(level)
-
-
-@contextmanager
-def interrupt_ends(condition: ob.PlannerTerminationCondition) -> Iterator[None]:
-    """Ctrl-C ends the planner through its termination condition and is raised afterwards.
-
-    Raised inside a callback it would end the process under planners that run a second thread.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    interrupted = False
-
-    def stop(*_: object) -> None:
-        nonlocal interrupted
-        interrupted = True
-        condition.terminate()
-
-    previous = signal.signal(signal.SIGINT, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)
-        if interrupted:
-            raise KeyboardInterrupt

@@ -39,6 +39,7 @@ class BenchmarkNotes:
     def __init__(self, benchmark: ot.Benchmark) -> None:
         if not isinstance(benchmark, ot.Benchmark):
             raise InputError(f"benchmark: expected an ompl.tools.Benchmark, got {type(benchmark).__name__}")
+
         self._benchmark = benchmark
         self._heard: list[_Run | None] = []
         heard = self._heard  # an event that held the notes would hold the benchmark, which holds the event
@@ -53,6 +54,7 @@ class BenchmarkNotes:
         data = self._benchmark.getRecordedExperimentData()
         if sum(len(each.runs) for each in data.planners) != len(self._heard):
             raise PlannerError("benchmark notes: make them before benchmark(), once a benchmark, and write after it")
+
         heard = iter(self._heard)
         for planner in data.planners:
             runs = [next(heard) for _ in planner.runs]
@@ -63,7 +65,8 @@ class BenchmarkNotes:
 
 class _Run:
     def __init__(self, planner: SafePlanner) -> None:
-        self.options, self.progress = planner.parameters(), planner.progress
+        self.options = planner.parameters()
+        self.progress = planner.progress
         self.sizes = (0, 0)
         with suppress(PlannerError):  # it found nothing, or was refused
             graph = planner.graph()
@@ -78,8 +81,10 @@ def _write_planner(planner: ot.PlannerExperiment, runs: list[_Run], seconds: flo
     common = planner.common
     for name, value in runs[0].options.items():
         common[name] = " ".join(str(value).split())
+
     for recorded, run in zip(planner.runs, runs, strict=True):
         recorded["graph states INTEGER"], recorded["graph motions INTEGER"] = map(str, run.sizes)
+
     planner.progressPropertyNames = list(PROGRESS)
     planner.runsProgressData = [_rows(run, seconds) for run in runs]
 
@@ -88,9 +93,11 @@ def _rows(run: _Run, seconds: float) -> list[dict[str, str]]:
     """The best cost of a run, when it fell and at even moments: Planner Arena fits curves to many points."""
     if not run.progress:
         return []
+
     times, costs = np.array(run.progress).T
     moments = np.union1d(times, np.linspace(0.0, max(seconds, times[-1]), MOMENTS))
     moments = moments[moments >= times[0]]
     best = costs[np.searchsorted(times, moments, side="right") - 1]
+
     rows = {f"{at:.6g}": f"{cost:.9g}" for at, cost in zip(moments, best, strict=True)}  # a time stands once
     return [dict(zip(PROGRESS, (cost, at), strict=True)) for at, cost in rows.items()]

@@ -54,14 +54,22 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
             raise InputError(f"most: expected a whole number from 1 to {LARGEST}, got {most!r}")
         if si is None:
             si = space_information(problem, problem.start[None], ValidityCallback(problem.world))
-        io, robot = StateIO(si), problem.world.robot
+
+        io = StateIO(si)
+        robot = problem.world.robot
         if io.dof != robot.dof:
             raise InputError(
                 f"state space: it has {io.dof} coordinates, but robot '{robot.name}' has {robot.dof} joints"
             )
+
         super().__init__(si)
-        self._problem, self._io, self._most, self._given, self._seen = problem, io, most, 0, 0
+        self._problem = problem
+        self._io = io
+        self._most = most
+        self._given = 0
+        self._seen = 0
         self._rows: Matrix = frozen(np.zeros((0, robot.dof)))
+
         self._search = GoalSearch(problem, np.random.default_rng(whole_number(seed, "seed")))
         self._search.first()
 
@@ -99,7 +107,8 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         More than one are not for PRM, PRMstar and BFMT outside :func:`rrtik_ompl.simple_setup`; see the class.
         """
         si = self.getSpaceInformation()
-        states, state = ob.GoalStates(si), si.allocState()
+        states = ob.GoalStates(si)
+        state = si.allocState()
         for row in self.rows[:most]:
             self._io.write(state, row)
             states.addState(state)
@@ -123,7 +132,9 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
 
     def distanceGoal(self, state: ob.State) -> float:
         """0 at the goal, else its distance [m; rad or m for a goal in joint values]; called by OMPL."""
-        robot, goal, q = self._problem.world.robot, self._problem.goal, self._io.read(state)[None]
+        robot = self._problem.world.robot
+        goal = self._problem.goal
+        q = self._io.read(state)[None]
         return 0.0 if goal.satisfied(robot, q)[0] else float(goal.distance(robot, q)[0])
 
     def _usable(self, rows: Matrix) -> Mask:
@@ -131,8 +142,10 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         si = self.getSpaceInformation()
         lower, upper = space_bounds(si)
         usable: Mask = np.all(self._io.turning | ((rows >= lower) & (rows <= upper)), axis=1)
+
         if si.getStateValidityChecker() is None:
             return usable
+
         state = si.allocState()
         for k in np.flatnonzero(usable):
             self._io.write(state, rows[k])

@@ -70,7 +70,8 @@ class SpaceChecker:
             si.setup()
         self._si = si
         self._io = StateIO(si)
-        self._a, self._b = si.allocState(), si.allocState()
+        self._a = si.allocState()
+        self._b = si.allocState()
         self.checked_states = 0
         self.checked_motions = 0
 

@@ -95,7 +95,8 @@ class _Objective(ob.OptimizationObjective):  # type: ignore[misc]  # OMPL has no
 class _Clearance(_Objective):
     def __init__(self, si: ob.SpaceInformation, world: World, weight: float) -> None:
         super().__init__(si, world.robot.dof)
-        self._world, self._weight = world, weight
+        self._world = world
+        self._weight = weight
 
     def cost(self, a: Vector, b: Vector) -> float:
         middles = a + (np.arange(STEPS)[:, None] + 0.5) / STEPS * (b - a)
@@ -111,7 +112,8 @@ class _Moves(_Objective):
 class _TipTravel(_Objective):
     def __init__(self, si: ob.SpaceInformation, robot: Robot, frame: str | None) -> None:
         super().__init__(si, robot.dof)
-        self._robot, self._frame = robot, frame
+        self._robot = robot
+        self._frame = frame
         robot.fk_batch(np.zeros((1, robot.dof)), frame)  # refuses an unknown frame here, not inside OMPL
 
     def cost(self, a: Vector, b: Vector) -> float:

@@ -41,10 +41,12 @@ def foreign_code(planner: ob.Planner, definition: ob.ProblemDefinition) -> Itera
     if not is_plain(type(planner)):
         yield
         return
+
     states = borrowed_states(definition)
     silent = not faulthandler.is_enabled()
     if silent:
         faulthandler.enable(STANDARD_ERROR)
+
     try:
         yield
     finally:
@@ -60,9 +62,11 @@ def borrowed_states(definition: ob.ProblemDefinition) -> list[ob.State]:
     states = []
     while inputs.haveMoreStartStates():
         states.append(inputs.nextStart())
+
     goal = definition.getGoal()
     if isinstance(goal, ob.GoalStates):
         states += [goal.getState(k) for k in range(goal.getStateCount())]
     elif isinstance(goal, ob.GoalState):
         states.append(goal.getState())
+
     return states

@@ -47,6 +47,7 @@ def planner_of_file(name: str) -> PlannerFactory:
     path = Path(file)
     if not os.path.isfile(path):
         raise InputError(f"planner '{name}': there is no file {file}")
+
     module = _module(path.resolve())
     found: Any = getattr(module, wanted, None)
     if found is None:
@@ -67,11 +68,14 @@ def _module(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise InputError(f"planner in {path}: not a Python file")
+
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
+
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise InputError(f"planner in {path}: the file cannot be run: {type(error).__name__}: {error}") from error
+
     return module

@@ -32,15 +32,18 @@ def starts_and_goals(
     """
     _refuse_other_spaces(definition, io.dof)
     inputs.restart()
-    starts, goals = _starts(inputs, io), []
+    starts = _starts(inputs, io)
     if not starts:
         raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
+
+    goals: list[Vector] = []
     if not aimless:
         goal = definition.getGoal()
         if goal is not None and not isinstance(goal, ob.GoalSampleableRegion):
             text = "the goal cannot be sampled; use a GoalState, GoalStates or a GoalSampleableRegion"
             raise IllPosed(ob.PlannerStatus.UNRECOGNIZED_GOAL_TYPE, text)
         goals = _goals(inputs, io, goal, stop)
+
     return np.array(starts), np.array(goals).reshape(-1, io.dof)
 
 
@@ -67,13 +70,19 @@ def _goals(inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, stop: Stop
 
     Of a :class:`GoalSampler` those that it has.
     """
-    limit = max(GOAL_SAMPLES, goal.getStateCount() if isinstance(goal, ob.GoalStates) else 0)
-    limit = len(goal.rows) if isinstance(goal, GoalSampler) else limit
+    limit = GOAL_SAMPLES
+    if isinstance(goal, GoalSampler):
+        limit = len(goal.rows)
+    elif isinstance(goal, ob.GoalStates):
+        limit = max(limit, goal.getStateCount())
     lazy = isinstance(goal, ob.GoalLazySamples)
+
     rows: list[Vector] = []
     sampled = 0
+
     if stop():
         raise IllPosed(ob.PlannerStatus.TIMEOUT, "the time was up before a goal configuration was asked for")
+
     while (sampled < limit or not rows) and not stop():
         if inputs.haveMoreGoalStates():
             sampled += 1
@@ -85,6 +94,7 @@ def _goals(inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, stop: Stop
             time.sleep(WAIT_FOR_GOAL)  # lets the thread of the goal have the interpreter
         else:
             break
+
     return _different(rows)
 
 

@@ -66,6 +66,7 @@ def find_planner(name: str) -> PlannerFactory:
     """
     if is_planner_file(name):
         return planner_of_file(name)
+
     bare = name.removeprefix(_OMPL_PREFIX).removesuffix(_MOVEIT_SUFFIX).lower()
     if bare in _wheel():
         return _wheel()[bare]

@@ -33,6 +33,22 @@ def planner_options(factory: PlannerFactory) -> tuple[str, ...]:
     return tuple(sorted(map(_snake, setters)))
 
 
+def check_options(factory: PlannerFactory, name: str, keys: Iterable[str]) -> None:
+    """Refuse options that a planner does not have.
+
+    Raises:
+        UnknownNameError: It names the option.
+    """
+    options = planner_options(factory)
+    for key in keys:
+        if key not in options:
+            raise UnknownNameError(f"parameter of planner {name}", key, options)
+
+
+def _snake(setter: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", setter.removeprefix("set")).lower()
+
+
 def safe_planner(
     factory: type[SafePlanner],
     name: str,
@@ -49,10 +65,12 @@ def safe_planner(
     """
     if options:
         check_options(factory, name, options)
+
     taken = keyword_parameters(factory)
     goal: dict[str, Any] = {"goal": problem.goal} if "goal" in taken else {}
     if "joint_costs" in taken:
         options = weights_as_costs(problem.robot) | dict(options)
+
     try:
         return factory(si, world=problem.world, seed=seed, **goal, **options)
     except TypeError as error:
@@ -82,6 +100,7 @@ def other_planner(
         planner = factory(si)
     except TypeError as error:
         raise InputError(f"planner {name}: {_why_not_made(factory, error)}") from None
+
     require(planner, ob.Planner, f"what planner '{name}' makes of a SpaceInformation")
     try:
         for key, value in options.items():
@@ -92,6 +111,7 @@ def other_planner(
         with suppress(RuntimeError):  # which may refuse as much
             planner.setup()
         raise
+
     return planner
 
 
@@ -102,29 +122,14 @@ def _why_not_made(factory: PlannerFactory, error: TypeError) -> str:
     return f"it cannot be made from an ompl.base.SpaceInformation: {str(error).splitlines()[0]}"
 
 
-def check_options(factory: PlannerFactory, name: str, keys: Iterable[str]) -> None:
-    """Refuse options that a planner does not have.
-
-    Raises:
-        UnknownNameError: It names the option.
-    """
-    options = planner_options(factory)
-    for key in keys:
-        if key not in options:
-            raise UnknownNameError(f"parameter of planner {name}", key, options)
-
-
 def _set(planner: ob.Planner, name: str, key: str, value: object) -> None:
     setter = next(s for s in dir(planner) if s.startswith("set") and _snake(s) == key)
     if isinstance(value, float):
         finite_array(value, (), f"planner {name}: parameter {key}")
+
     try:
         getattr(planner, setter)(value)
     except TypeError:
         raise InputError(f"planner {name}: parameter {key} cannot be {value!r}") from None
     except (RuntimeError, ValueError, OverflowError) as error:  # what its C++ says of a number out of range
         raise InputError(f"planner {name}: parameter {key} cannot be {value!r}: {error}") from None
-
-
-def _snake(setter: str) -> str:
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", setter.removeprefix("set")).lower()

@@ -35,8 +35,10 @@ class RegionConstraint(ob.Constraint):  # type: ignore[misc]  # OMPL has no type
         held = problem.world.constraints
         if held is None:
             raise InputError("problem: it has no path constraints")
+
         super().__init__(problem.robot.dof, equation_count(held), 1.0)
-        self._robot, self._held = problem.robot, held
+        self._robot = problem.robot
+        self._held = held
 
     def function(self, x: Vector, out: Vector) -> None:
         """Write the values of the equations at x, shape (dof,)."""
@@ -55,23 +57,32 @@ class ProjectedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no
 
     def __init__(self, si: ob.SpaceInformation, problem: Problem, constraint: RegionConstraint) -> None:
         super().__init__(si)
-        self._held, self._free = problem.world, problem.world.unheld
-        self._constraint, self._states = constraint, StateIO(si)
+        self._held = problem.world
+        self._free = problem.world.unheld
+        self._constraint = constraint
+        self._states = StateIO(si)
 
     def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
         """Whether the motion between two states keeps to the constraint, is free, and arrives; called by OMPL."""
-        at, end = self._states.read(first), self._states.read(second)
+        at = self._states.read(first)
+        end = self._states.read(second)
         left = whole = float(np.linalg.norm(end - at))
         gone = 0.0
+
         while left > STEP:
             new = at + STEP / left * (end - at)
             if not self._constraint.project(new):
                 return False
-            step, nearer = float(np.linalg.norm(new - at)), float(np.linalg.norm(end - new))
+
+            step = float(np.linalg.norm(new - at))
+            nearer = float(np.linalg.norm(end - new))
             gone += step
             if max(step / STEP, gone / whole) > DETOUR or nearer >= left or not self._checked(at, new):
                 return False
-            at, left = new, nearer
+
+            at = new
+            left = nearer
+
         return self._checked(at, end)
 
     def _checked(self, a: Vector, b: Vector) -> bool:
@@ -89,6 +100,7 @@ def projected_space(problem: Problem, lower: Vector, upper: Vector) -> ob.Constr
     constraint = RegionConstraint(problem)
     space = ob.ProjectedStateSpace(bounded_space(lower, upper).getStateSpace(), constraint)
     space.setDelta(STEP)
+
     si = ob.ConstrainedSpaceInformation(space)
     si.setMotionValidator(ProjectedMotions(si, problem, constraint))
     return si

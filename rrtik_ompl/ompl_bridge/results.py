@@ -52,7 +52,8 @@ class IllPosed(Exception):
 
     def __init__(self, status: ob.PlannerStatus, reason: str) -> None:
         super().__init__(reason)
-        self.status, self.reason = status, reason
+        self.status = status
+        self.reason = reason
 
 
 def failure_of(error: BaseException) -> Failure:
@@ -76,10 +77,12 @@ def explained(error: BaseException) -> str:
     """
     known = isinstance(error, RrtikError)
     text = str(error) if known else "".join(traceback.format_exception(error)).strip() + _hint(error)
+
     link: BaseException | None = error
     while link is not None:
         link.__traceback__ = None
         link = link.__context__
+
     return text
 
 

@@ -203,7 +203,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Returns:
             The status, and the path, shape (k, n), if there is an exact one.
         """
-        self._bounds, self.graph_wanted = bounds, False
+        self._bounds = bounds
+        self.graph_wanted = False
         status, found = self._searched(lambda: self._between(starts, goals, stop, known_free=checked))
         exact = found is not None and found.difference <= 0.0
         return ob.PlannerStatus(status), found.path if found is not None and exact else None
@@ -216,6 +217,13 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
         """Which starts and goals, shape (m, n), are free, shape (m,). For subclasses that know a faster way to tell."""
         return checker.valid_batch(rows)
+
+    def stands(self, rows: Matrix, checker: MotionChecker) -> bool:
+        """Whether a path, shape (k, n), is free, to the second check of a world too. For subclasses that improve one.
+
+        `plan()` makes that check itself, of the last path.
+        """
+        return bool(checker.motion_valid_batch(rows[:-1], rows[1:]).all()) and not _refusal(self._judge, rows)
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds, shapes (n,), read-only, as they were when ``solve`` was last called.
@@ -247,36 +255,51 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
                 self.error = refused.reason
             return refused.status, None
         except Exception as error:
-            self.failure, self.error = failure_of(error), explained(error)
+            self.failure = failure_of(error)
+            self.error = explained(error)
             return ob.PlannerStatus.CRASH, None
         return status_of(found), found
 
     def _forget(self) -> None:
-        self.statistics, self.error, self.failure, self.reason = {}, None, None, ""
-        self.progress, self._graph = (), None
+        self.statistics = {}
+        self.error = None
+        self.failure = None
+        self.reason = ""
+        self.progress = ()
+        self._graph = None
 
     def _in_ompl(self, ptc: Stop) -> SearchResult:
         """Search between the starts and goals of the problem definition, and hand the path to it."""
-        si, pdef = self.getSpaceInformation(), self.getProblemDefinition()
+        si = self.getSpaceInformation()
+        pdef = self.getProblemDefinition()
         if pdef is None:
             raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
+
         self._bounds = self._io.bounds()  # refuses missing ones in clearer words than OMPL
         if self._world is None and not si.isSetup():
             si.setup()  # before it, checkMotion looks at the end point alone
-        inputs, aimless, begun = self.getPlannerInputStates(), not self.needs_goals(), time.perf_counter()
+
+        inputs = self.getPlannerInputStates()
+        aimless = not self.needs_goals()
+        begun = time.perf_counter()
         ends = starts_and_goals(inputs, pdef, self._io, ptc, aimless=aimless)
+
         line = Unrolled(*ends, self._io.turning) if self._io.turns else None
         if line is not None:
-            ends, self._bounds = (line.starts, line.goals), line.bounds(*self._bounds)
+            ends = (line.starts, line.goals)
+            self._bounds = line.bounds(*self._bounds)
+
         found = self._judged_search(*ends, ptc, line)
         if found.path is None and isinstance(pdef.getGoal(), GoalSampler):
             pdef.getGoal().more()  # for the next attempt
         found = self._kept(found, ends[1], time.perf_counter() - begun)
+
         if found.difference > 0.0 and _refusal(self._world, found.path, line):
             found = replace(found, path=None)
         if found.path is not None:
             path = self._io.path(si, found.path if line is None else line.path(found.path))
             pdef.addSolutionPath(path, found.difference > 0.0, float(found.difference), self.getName())
+
         return found
 
     def _judged_search(self, starts: Matrix, goals: Matrix, stop: Stop, line: Unrolled | None) -> SearchResult:
@@ -287,6 +310,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         world = self._world
         if not isinstance(world, World):  # the space information has the last word
             return self._between(starts, goals, stop)
+
         dense = world.with_resolution(verification_resolution(world))
         self._judge = world
         try:
@@ -297,18 +321,14 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
                 if not refusal or stop():
                     break
         finally:
-            self._world, self._judge = world, None
+            self._world = world
+            self._judge = None
+
         if not refusal:
             return found
+
         self.reason = f"no path stood: {refusal}"
         return replace(found, path=None, difference=0.0, reason=self.reason)
-
-    def stands(self, rows: Matrix, checker: MotionChecker) -> bool:
-        """Whether a path, shape (k, n), is free, to the second check of a world too. For subclasses that improve one.
-
-        `plan()` makes that check itself, of the last path.
-        """
-        return bool(checker.motion_valid_batch(rows[:-1], rows[1:]).all()) and not _refusal(self._judge, rows)
 
     def _kept(self, found: SearchResult, goals: Matrix, seconds: float) -> SearchResult:
         """What was found, or the nearest approach to it; graph and progress are kept."""
@@ -316,6 +336,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             self._graph = found.graph
             near = None if found.graph is None or len(goals) == 0 else nearest_approach(found.graph, goals)
             return found if near is None else replace(found, path=near[0], difference=near[1])
+
         self._graph = found.graph or graph_of_path(found.path)
         if found.difference <= 0.0:
             self.progress = found.progress or ((seconds, route_length(found.path)),)
@@ -326,9 +347,11 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         checker = SpaceChecker(self.getSpaceInformation()) if self._world is None else WorldChecker(self._world)
         given = known_free and len(goals) > 0 and self.needs_goals()
         ends = (starts, goals) if given else self._free_ends(starts, goals, checker)
+
         found = self.search(*ends, checker, stop)
         checked = {"checked_states": checker.checked_states, "checked_motions": checker.checked_motions}
-        self.statistics, self.reason = {**found.statistics, **checked}, found.reason
+        self.statistics = {**found.statistics, **checked}
+        self.reason = found.reason
         return found
 
     def _free_ends(self, starts: Matrix, goals: Matrix, checker: MotionChecker) -> tuple[Matrix, Matrix]:

@@ -54,21 +54,19 @@ class ValidityCallback:
             if self.stop is not None:
                 self.stop()
             return False
+
         free = self._checked(self.world.motion_valid, a, b)
         self.free_motions += free
         return free
 
     def counts(self) -> dict[str, int]:
         """Numbers of checks, and of the motions that were found free."""
-        return {
-            "checked_states": self.states,
-            "checked_motions": self.motions,
-            "free_motions": self.free_motions,
-        }
+        return {"checked_states": self.states, "checked_motions": self.motions, "free_motions": self.free_motions}
 
     def _checked(self, check: Callable[..., bool], *arguments: Vector) -> bool:
         if self.error is not None or self.late:
             return False
+
         try:
             return bool(check(*arguments))
         except Exception as error:  # an exception that leaves a callback ends the process under some planners
@@ -83,11 +81,13 @@ class CheckedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no t
 
     def __init__(self, si: ob.SpaceInformation, motion_valid: MotionFree) -> None:
         super().__init__(si)
-        self._motion_valid, self._states = motion_valid, StateIO(si)
+        self._motion_valid = motion_valid
+        self._states = StateIO(si)
 
     def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
         """Whether the motion between two states is free; angles of SO(2) turn the short way."""
-        a, b = self._states.read(first), self._states.read(second)
+        a = self._states.read(first)
+        b = self._states.read(second)
         return self._motion_valid(a, near_image(b, a, self._states.turning) if self._states.turns else b)
 
 
@@ -96,6 +96,7 @@ def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
     robot = problem.world.robot
     if np.isfinite(robot.lower).all() and np.isfinite(robot.upper).all():
         return robot.lower, robot.upper
+
     ends = np.vstack([problem.start, goals])
     lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
     upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
@@ -112,15 +113,30 @@ def space_information(problem: Problem, goals: Matrix, validity: ValidityCallbac
     return si
 
 
-def unchecked_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
-    """As :func:`space_information`, but nothing is checked: for planners that use the world themselves.
+def problem_definition(problem: Problem, goals: Matrix, si: ob.SpaceInformation) -> ob.ProblemDefinition:
+    """``ompl.base.ProblemDefinition`` with the start of the problem and goal configurations, shape (k, n)."""
+    states = StateIO(si)
+    state = si.allocState()
+    definition = ob.ProblemDefinition(si)
 
-    OMPL checks each start and goal that it hands out, and a call of Python costs more than some searches.
-    """
-    si = bounded_space(lower, upper)
-    si.setStateValidityChecker(ob.AllValidStateValidityChecker(si))
-    si.setup()
-    return si
+    states.write(state, problem.start)
+    definition.addStartState(state)
+
+    goal = ob.GoalStates(si)
+    for row in goals:
+        states.write(state, row)
+        goal.addState(state)
+    definition.setGoal(goal)
+
+    return definition
+
+
+def exact_path(definition: ob.ProblemDefinition, si: ob.SpaceInformation) -> Matrix | None:
+    """The best exact solution of a problem definition as rows, shape (k, n), or None."""
+    if not definition.hasExactSolution():
+        return None
+    found = definition.getSolutionPath()  # shared ownership: safe to keep while it is copied
+    return StateIO(si).rows(found)
 
 
 def shared_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
@@ -134,6 +150,17 @@ def _kept_space(lower: bytes, upper: bytes) -> ob.SpaceInformation:
 
 
 atexit.register(_kept_space.cache_clear)  # the bindings complain of objects that outlive the interpreter
+
+
+def unchecked_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
+    """As :func:`space_information`, but nothing is checked: for planners that use the world themselves.
+
+    OMPL checks each start and goal that it hands out, and a call of Python costs more than some searches.
+    """
+    si = bounded_space(lower, upper)
+    si.setStateValidityChecker(ob.AllValidStateValidityChecker(si))
+    si.setup()
+    return si
 
 
 class PythonsStates(ob.SpaceInformation):  # type: ignore[misc]  # OMPL has no types
@@ -156,7 +183,8 @@ def circular_space(lower: Vector, upper: Vector, turning: Mask) -> ob.SpaceInfor
         upper: Upper bounds, shape (n,), likewise.
         turning: Shape (n,).
     """
-    space, begin = ob.CompoundStateSpace(), 0
+    space = ob.CompoundStateSpace()
+    begin = 0
     for turns, run in groupby(turning.tolist()):
         end = begin + len(list(run))
         parts = (
@@ -171,30 +199,10 @@ def circular_space(lower: Vector, upper: Vector, turning: Mask) -> ob.SpaceInfor
 
 
 def _real_space(lower: Vector, upper: Vector) -> ob.RealVectorStateSpace:
-    space, bounds = ob.RealVectorStateSpace(len(lower)), ob.RealVectorBounds(len(lower))
+    space = ob.RealVectorStateSpace(len(lower))
+    bounds = ob.RealVectorBounds(len(lower))
     for k in range(len(lower)):
         bounds.setLow(k, float(lower[k]))
         bounds.setHigh(k, float(upper[k]))
     space.setBounds(bounds)
     return space
-
-
-def problem_definition(problem: Problem, goals: Matrix, si: ob.SpaceInformation) -> ob.ProblemDefinition:
-    """``ompl.base.ProblemDefinition`` with the start of the problem and goal configurations, shape (k, n)."""
-    states, state, definition = StateIO(si), si.allocState(), ob.ProblemDefinition(si)
-    states.write(state, problem.start)
-    definition.addStartState(state)
-    goal = ob.GoalStates(si)
-    for row in goals:
-        states.write(state, row)
-        goal.addState(state)
-    definition.setGoal(goal)
-    return definition
-
-
-def exact_path(definition: ob.ProblemDefinition, si: ob.SpaceInformation) -> Matrix | None:
-    """The best exact solution of a problem definition as rows, shape (k, n), or None."""
-    if not definition.hasExactSolution():
-        return None
-    found = definition.getSolutionPath()  # shared ownership: safe to keep while it is copied
-    return StateIO(si).rows(found)

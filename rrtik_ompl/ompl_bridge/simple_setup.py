@@ -40,7 +40,8 @@ class WorldValidity(ob.StateValidityChecker):  # type: ignore[misc]  # OMPL has 
 
     def __init__(self, si: ob.SpaceInformation, world: World) -> None:
         super().__init__(si)
-        self._world, self._states = world, StateIO(si)
+        self._world = world
+        self._states = StateIO(si)
 
     def isValid(self, state: ob.State) -> bool:
         """Whether a state is inside the limits and free; called by OMPL."""
@@ -61,7 +62,8 @@ class TipProjection(ob.ProjectionEvaluator):  # type: ignore[misc]  # OMPL has n
 
     def __init__(self, space: ob.StateSpace, robot: Robot, coordinates: Coordinates) -> None:
         super().__init__(space)
-        self._robot, self._coordinates = robot, coordinates
+        self._robot = robot
+        self._coordinates = coordinates
 
     def getDimension(self) -> int:
         """Three; called by OMPL."""
@@ -86,9 +88,11 @@ class ProblemSetup(og.SimpleSetup):  # type: ignore[misc]  # OMPL has no types
             InputError: If PRM is to minimise an objective that is written in Python, for which it would wait as well.
         """
         self.setup()  # which makes the planner if nobody has
-        planner, definition = self.getPlanner(), self.getProblemDefinition()
+        planner = self.getPlanner()
+        definition = self.getProblemDefinition()
         if isinstance(planner, og.PRM):
             _refuse_python(planner.getName(), definition.getOptimizationObjective())
+
         one_goal = OMPL_TRAITS.get(type(planner), PlannerTraits()).one_goal
         aim = first_goal_alone(definition) if one_goal else nullcontext()
         with aim, foreign_code(planner, definition):
@@ -106,17 +110,20 @@ def _refuse_python(name: str, objective: ob.OptimizationObjective | None) -> Non
 @contextmanager
 def first_goal_alone(definition: ob.ProblemDefinition) -> Iterator[None]:
     """The goal of a problem is its first configuration, meanwhile; as it is where it cannot be sampled."""
-    goal, si = definition.getGoal(), definition.getSpaceInformation()
+    goal = definition.getGoal()
+    si = definition.getSpaceInformation()
     inputs = ob.PlannerInputStates()
     inputs.use(definition)
     state = inputs.nextGoal() if isinstance(goal, ob.GoalSampleableRegion) else None
     if state is None:
         yield
         return
+
     first = ob.GoalStates(si)
     first.addState(state)  # copied
     del state
     definition.setGoal(first)
+
     try:
         yield
     finally:
@@ -152,9 +159,11 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
         return _information(world_or_problem, *world_or_problem.robot.finite_range(), so2)
     if not isinstance(world_or_problem, Problem):
         raise InputError(f"space_information: expected a World or a Problem, got {type(world_or_problem).__name__}")
+
     q = world_or_problem.goal.q
     ends = world_or_problem.start[None] if q is None else q[None]
     bounds = planning_bounds(world_or_problem, ends)
+
     if not world_or_problem.constraints:
         return _information(world_or_problem.world, *bounds, so2)
     if so2:
@@ -184,10 +193,15 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
     """
     if not isinstance(problem, Problem):
         raise InputError(f"simple_setup: expected a Problem, got {type(problem).__name__}")
+
     si = space_information(problem, so2=so2)
-    setup, states, state = ProblemSetup(si), StateIO(si), si.allocState()
+    setup = ProblemSetup(si)
+    states = StateIO(si)
+    state = si.allocState()
+
     states.write(state, problem.start)
     setup.addStartState(state)
+
     goal: ob.Goal
     if problem.goal.q is not None:
         goal = ob.GoalState(si)
@@ -195,6 +209,7 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
         goal.setState(state)
     else:
         goal = GoalSampler(problem, si, seed=seed)
+
     setup.setGoal(goal)
     return setup
 
@@ -212,10 +227,12 @@ def _judged(si: ob.SpaceInformation, world: World) -> ob.SpaceInformation:
     space = si.getStateSpace()
     if isinstance(si, ob.ConstrainedSpaceInformation):
         si.setup()  # after which alone its space keeps a projection
+
     tip = TipProjection(space, world.robot, coordinates_of(si, constrained=True))
     space.registerProjection(TIP_PROJECTION, tip)
     if space.isCompound():  # has none of its own, and KPIECE1 and its kin need one
         space.registerDefaultProjection(tip)
+
     if not si.isSetup():
         si.setup()
     return si

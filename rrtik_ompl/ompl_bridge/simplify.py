@@ -6,12 +6,11 @@ import time
 
 from ompl import base as ob
 from ompl import geometric as og
-from ompl import util as ou
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import PlannerError
-from rrtik_ompl.ompl_bridge.attempt import in_short, interrupt_ends, quiet
+from rrtik_ompl.ompl_bridge.attempt import in_short, interrupt_ends, quiet, seed_ompl
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.world.problem import Problem
@@ -30,17 +29,20 @@ def simplified(problem: Problem, route: Matrix, budget: Budget) -> tuple[Matrix,
         KeyboardInterrupt: After it has stopped in good order.
     """
     with quiet():
-        ou.RNG.setSeed(1 + budget.seed % (2**31 - 2))  # before any object that draws from it; OMPL does not take 0
+        seed_ompl(budget.seed)
         validity = ValidityCallback(problem.world)
         si = space_information(problem, route, validity)
+
         seconds = 0.0 if budget.over() else min(budget.left, MAX_SECONDS)
         validity.deadline = time.monotonic() + seconds
         condition = ob.timedPlannerTerminationCondition(seconds)
         validity.stop = condition.terminate
+
         states = StateIO(si)
         path = states.path(si, route)
         with interrupt_ends(condition):
             og.PathSimplifier(si).simplify(path, condition, True)
+
         if validity.error is not None:
             raise PlannerError(f"PathSimplifier broke: {in_short(validity.error)}")
         return states.rows(path), validity.motions

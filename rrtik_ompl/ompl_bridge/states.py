@@ -25,7 +25,8 @@ def space_bounds(si: ob.SpaceInformation) -> tuple[Vector, Vector]:
 
 
 def _checked_bounds(low: list[float], high: list[float]) -> tuple[Vector, Vector]:
-    lower, upper = frozen(low), frozen(high)
+    lower = frozen(low)
+    upper = frozen(high)
     bad = np.flatnonzero(~(np.isfinite(lower) & np.isfinite(upper) & (lower < upper)))
     if len(bad):
         i = int(bad[0])
@@ -33,6 +34,7 @@ def _checked_bounds(low: list[float], high: list[float]) -> tuple[Vector, Vector
             f"state space: coordinate {i} has the bounds [{lower[i]:g}, {upper[i]:g}]; "
             "set finite bounds, lower below upper, with space.setBounds()"
         )
+
     return lower, upper
 
 
@@ -56,9 +58,11 @@ class StateIO:
     def __init__(self, si: ob.SpaceInformation) -> None:
         self._coordinates = coordinates_of(si, constrained=True)
         self._space = si.getStateSpace()
-        self.dof, self.turning = self._coordinates.size, self._coordinates.turning
+        self.dof = self._coordinates.size
+        self.turning = self._coordinates.turning
         self.turns = bool(self.turning.any())
         self._bounds: tuple[object, tuple[Vector, Vector]] | None = None
+
         self._buffer = np.zeros(self.dof)
         self._capsule = _capsule(self._buffer)
         self.fast = self._capsule is not None and self._capsule_works(si)
@@ -88,7 +92,8 @@ class StateIO:
 
     def path(self, si: ob.SpaceInformation, rows: Matrix) -> og.PathGeometric:
         """Rows, shape (k, n), as an ``ompl.geometric.PathGeometric``."""
-        path, state = og.PathGeometric(si), si.allocState()
+        path = og.PathGeometric(si)
+        state = si.allocState()
         append = path.append  # copies
         for row in rows:
             self.write(state, row)
@@ -100,9 +105,11 @@ class StateIO:
         return np.array([self.read(path.getState(k)) for k in range(path.getStateCount())])
 
     def _capsule_works(self, si: ob.SpaceInformation) -> bool:
-        state, probe = si.allocState(), np.arange(1.0, self.dof + 1.0)
+        state = si.allocState()
+        probe = np.arange(1.0, self.dof + 1.0)
         if self._space.getSerializationLength() != self._buffer.nbytes:
             return False
+
         try:
             self._buffer[:] = probe
             self._space.deserialize(state, self._capsule)
@@ -111,6 +118,7 @@ class StateIO:
             self._space.serialize(self._capsule, state)
         except (TypeError, RuntimeError):
             return False
+
         return written and bool((self._buffer == -probe).all())
 
 
@@ -120,6 +128,7 @@ def _capsule(buffer: Vector) -> object:
         new: Callable[..., object] = ctypes.pythonapi.PyCapsule_New
     except AttributeError:
         return None
+
     new.restype = ctypes.py_object  # type: ignore[attr-defined]
     new.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]  # type: ignore[attr-defined]
     return new(buffer.ctypes.data, b"nb_handle", None)

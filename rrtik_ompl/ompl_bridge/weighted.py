@@ -28,8 +28,10 @@ class WeightedProblem:
     def __init__(self, problem: Problem, motions: MotionQueries | None = None) -> None:
         self._scale = weights_of(problem.robot)
         self._start = problem.start
+
         asked: Any = problem.world if motions is None else motions  # which has what it needs of a world
         weighted = WeightedMotions(asked, self._scale)
+
         settings = changed(problem.settings, robot=weighted.robot)
         start = frozen(problem.start * self._scale)
         self.problem = changed(problem, settings=settings, start=start, world=weighted)

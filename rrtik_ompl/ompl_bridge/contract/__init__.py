@@ -54,8 +54,12 @@ def solves_and_ends_exactly(factory: Factory) -> None:
     """A plain SimpleSetup is solved: EXACT_SOLUTION, from the start to the goal to the bit, every edge free."""
     setup, rows, _ = solved(factory)
     require(np.array_equal(rows[0], START) and np.array_equal(rows[-1], GOAL), "the path does not end exactly", rows)
+
     si = setup.getSpaceInformation()
-    io, a, b = StateIO(si), si.allocState(), si.allocState()
+    io = StateIO(si)
+    a = si.allocState()
+    b = si.allocState()
+
     for one, two in pairwise(rows):
         io.write(a, one)
         io.write(b, two)
@@ -93,6 +97,7 @@ def takes_seconds(factory: Factory) -> None:
     planner = factory(setup.getSpaceInformation())
     setup.setPlanner(planner)
     setup.setup()
+
     status = planner.solve(SHORT)
     require(str(status) in ("Timeout", "Approximate solution"), "a problem without solution", status)
     require(planner.error is None, "running out of time is no error", planner.error)
@@ -115,6 +120,7 @@ def takes_several_starts_and_goals(factory: Factory) -> None:
     goals = (INSIDE_OBSTACLE, OUTSIDE_BOUNDS, GOAL, (1.5, 0.0, 0.0))
     setup, status, _ = attempt(factory, starts=starts, goals=goals)
     require_status(status, "Exact solution", "several starts and goals")
+
     rows = solution_rows(setup)
     ends = None if rows is None else (tuple(rows[0].tolist()), tuple(rows[-1].tolist()))
     require(ends is not None and ends[0] in starts[1:] and ends[1] in goals[2:], "the path has other ends", ends)
@@ -122,7 +128,8 @@ def takes_several_starts_and_goals(factory: Factory) -> None:
 
 def survives_a_broken_checker(factory: Factory) -> None:
     """An exception in the validity checker gives CRASH with its text in ``error``; the planner is usable again."""
-    calls, broken = [0], [True]
+    calls = [0]
+    broken = [True]
 
     def valid(state: ob.State) -> bool:
         calls[0] += 1
@@ -133,6 +140,7 @@ def survives_a_broken_checker(factory: Factory) -> None:
     setup, status, planner = attempt(factory, valid=valid)
     require_status(status, "Crash", "an exception in the validity checker")
     require("ValueError: the checker broke" in (planner.error or ""), "the error is not kept", planner.error)
+
     broken[0] = False
     setup.clear()
     require_status(setup.solve(SECONDS), "Exact solution", "the solve after a crash")
@@ -171,9 +179,11 @@ def runs_in_benchmark(factory: Factory) -> None:
     benchmark = ot.Benchmark(setup, "contract")
     benchmark.addPlanner(factory(setup.getSpaceInformation()))
     benchmark.addPlannerAllocator(lambda si: factory(si))
+
     benchmark.benchmark(ot.Request(SECONDS, 4096.0, 2, 0.05, False, False, False))
     planners = benchmark.getRecordedExperimentData().planners
     solved = [run["solved BOOLEAN"] for planner in planners for run in planner.runs]
+
     require(solved == ["1"] * 4, "not every benchmark run is solved", solved)
 
 

@@ -54,20 +54,27 @@ def box_problem(
         goals: Configurations, shape (n,) each.
         dof: Number of coordinates, n.
     """
-    space, bounds = ob.RealVectorStateSpace(dof), ob.RealVectorBounds(dof)
+    space = ob.RealVectorStateSpace(dof)
+    bounds = ob.RealVectorBounds(dof)
     bounds.setLow(-extent)
     bounds.setHigh(extent)
     space.setBounds(bounds)
+
     setup = og.SimpleSetup(space)
     setup.setStateValidityChecker(valid)
     si = setup.getSpaceInformation()
-    io, state, goal = StateIO(si), si.allocState(), ob.GoalStates(si)
+
+    io = StateIO(si)
+    state = si.allocState()
+    goal = ob.GoalStates(si)
+
     for start in starts:
         io.write(state, np.asarray(start, dtype=np.float64))
         setup.addStartState(state)
     for end in goals:
         io.write(state, np.asarray(end, dtype=np.float64))
         goal.addState(state)
+
     setup.setGoal(goal)
     return setup
 
@@ -103,6 +110,7 @@ def solved(factory: Factory, *, seed: int = 1) -> tuple[og.SimpleSetup, Matrix, 
     """A solve that must succeed: the setup, the path, the planner."""
     setup, status, planner = attempt(factory, seed=seed)
     require_status(status, "Exact solution", "the small problem")
+
     rows = solution_rows(setup)
     if rows is None:
         raise PlannerError("check_planner: EXACT_SOLUTION without a path")

@@ -42,6 +42,7 @@ def asks_for_every_edge(factory: Factory) -> None:
         setup = box_problem(2.0, _between_discs, [(-2.0, -2.0)], [(2.0, 2.0)], dof=2)
         setup.getSpaceInformation().setStateValidityCheckingResolution(COARSE)
         setup.setPlanner(factory(setup.getSpaceInformation(), seed=seed))
+
         if str(setup.solve(BRIEF)) == "Exact solution":
             require(bool(setup.getSolutionPath().check()), f"seed {seed}: an edge of an exact path is not valid", seed)
         elif time.monotonic() > begun + SECONDS:
@@ -59,6 +60,7 @@ def does_not_depend_on_the_unit(factory: Factory) -> None:
             ends = (-0.5 * extent, -0.5 * extent), (0.5 * extent, -0.5 * extent)
             setup = box_problem(extent, valid, ends[:1], ends[1:], dof=2)
             setup.setPlanner(factory(setup.getSpaceInformation(), seed=seed))
+
             what = f"a space from {-extent:g} to {extent:g}, seed {seed}"
             require_status(str(setup.solve(SECONDS)), "Exact solution", what)
             require(bool(setup.getSolutionPath().check()), f"{what}: the path is not valid", seed)
@@ -71,6 +73,7 @@ def works_in_any_dimension(factory: Factory) -> None:
         setup = box_problem(1.0, lambda _: True, [np.full(dof, -0.8)], [np.full(dof, 0.8)], dof=dof)
         planner = factory(setup.getSpaceInformation(), seed=1)
         setup.setPlanner(planner)
+
         status = str(setup.solve(seconds))
         require(getattr(planner, "error", None) is None, f"{dof} coordinates", getattr(planner, "error", None))
         if dof <= ALWAYS_SOLVED:
@@ -94,6 +97,7 @@ def says_when_there_was_no_time(factory: Factory) -> None:
     planner = factory(setup.getSpaceInformation(), seed=1)
     setup.setPlanner(planner)
     setup.setup()
+
     require_status(str(planner.solve(0.0)), "Timeout", "a solve without time")
     begun = time.monotonic()
     status = str(planner.solve(lambda: time.monotonic() > begun + SECONDS, 0.01))
@@ -105,16 +109,21 @@ def turns_either_way(factory: Factory) -> None:
     for space, write in ((_plane(), _write_plane), (_arm(), _write_arm)):
         setup = og.SimpleSetup(space)
         setup.setStateValidityChecker(_past_half_a_turn)
+
         si = setup.getSpaceInformation()
         ends = si.allocState(), si.allocState()
         for state, q in zip(ends, TURNED, strict=True):
             write(state, q)
         setup.setStartAndGoalStates(*ends)
+
         planner = factory(si, seed=1)
         setup.setPlanner(planner)
-        status, what = str(setup.solve(SECONDS)), f"a {type(space).__name__} with an angle"
+
+        status = str(setup.solve(SECONDS))
+        what = f"a {type(space).__name__} with an angle"
         require(getattr(planner, "error", None) is None, what, getattr(planner, "error", None))
         require_status(status, "Exact solution", what)
+
         path = setup.getSolutionPath()
         require(bool(path.check()), f"{what}: the path is not valid", status)
         for state, k in zip(ends, (0, path.getStateCount() - 1), strict=True):
@@ -132,7 +141,8 @@ SPACES: tuple[Clause, ...] = (
 
 
 def _between_discs(state: ob.State) -> bool:
-    x, y = (3.0 * state[0]) % 1.0 - 0.5, (3.0 * state[1]) % 1.0 - 0.5
+    x = (3.0 * state[0]) % 1.0 - 0.5
+    y = (3.0 * state[1]) % 1.0 - 0.5
     return bool(x * x + y * y > 0.09)
 
 
@@ -143,7 +153,8 @@ def _plane() -> ob.StateSpace:
 
 
 def _arm() -> ob.StateSpace:
-    space, sliding = ob.CompoundStateSpace(), ob.RealVectorStateSpace(2)
+    space = ob.CompoundStateSpace()
+    sliding = ob.RealVectorStateSpace(2)
     sliding.setBounds(_square())
     space.addSubspace(ob.SO2StateSpace(), 1.0)
     space.addSubspace(sliding, 0.5)
@@ -163,7 +174,8 @@ def _write_plane(state: ob.State, q: tuple[float, float, float]) -> None:
 
 
 def _write_arm(state: ob.State, q: tuple[float, float, float]) -> None:
-    state[0].value, state[1][0:2] = q[2], list(q[:2])
+    state[0].value = q[2]
+    state[1][0:2] = list(q[:2])
 
 
 def _past_half_a_turn(state: ob.State) -> bool:

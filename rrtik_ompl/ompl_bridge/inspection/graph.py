@@ -55,9 +55,13 @@ class PlannerGraph:
         Args:
             si: Of the planner.
         """
-        io, data = StateIO(si), ob.PlannerData(si)
+        io = StateIO(si)
+        data = ob.PlannerData(si)
         states = [si.allocState() for _ in self.vertices]  # the data hold only their addresses until they are decoupled
-        starts, goals = set(self.starts.tolist()), set(self.goals.tolist())
+
+        starts = set(self.starts.tolist())
+        goals = set(self.goals.tolist())
+
         for number, (one, row) in enumerate(zip(states, self.vertices, strict=True)):
             io.write(one, row)
             vertex = ob.PlannerDataVertex(one)
@@ -67,8 +71,10 @@ class PlannerGraph:
                 data.addGoalVertex(vertex)
             else:
                 data.addVertex(vertex)
+
         for first, second in self.edges.tolist():
             data.addEdge(first, second)
+
         data.decoupleFromPlanner()
         return data
 
@@ -90,16 +96,21 @@ def graph_of(vertices: Matrix, edges: ArrayLike, starts: ArrayLike = (), goals: 
 
 def graph_of_trees(starts: Tree, goals: Tree | None = None) -> PlannerGraph:
     """A graph of a tree that grows from starts and, if there is one, a tree that grows from goals."""
-    rows, edges, roots = [], [], []
+    rows = []
+    edges = []
+    roots = []
     count = 0
+
     for tree in (starts, goals):
         vertices = np.empty((0, starts[0].shape[1])) if tree is None else np.asarray(tree[0])
         parents = np.empty(0, dtype=np.int64) if tree is None else np.asarray(tree[1], dtype=np.int64)
         grown = np.flatnonzero(parents >= 0)
+
         rows.append(vertices)
         edges.append(np.stack([parents[grown], grown], axis=1) + count)
         roots.append(np.flatnonzero(parents < 0) + count)
         count += len(vertices)
+
     return graph_of(np.concatenate(rows), np.concatenate(edges), *roots)
 
 
@@ -111,12 +122,16 @@ def graph_of_path(path: Matrix) -> PlannerGraph:
 
 def without(rows: Matrix, parents: NDArray[np.integer], kept: NDArray[np.bool_]) -> Tree:
     """A tree without the vertices that are not kept and those below them."""
-    sound, above = kept.copy(), np.where(parents < 0, 0, parents)
+    sound = kept.copy()
+    above = np.where(parents < 0, 0, parents)
+
+    # A round drops the children of those that the one before it dropped.
     while True:
         left = sound & ((parents < 0) | sound[above])
         if (left == sound).all():
             break
         sound = left
+
     numbers = np.cumsum(sound) - 1
     return rows[sound], np.where(parents < 0, -1, numbers[above])[sound]
 
@@ -134,11 +149,14 @@ def nearest_approach(graph: PlannerGraph, goals: Matrix) -> tuple[Matrix, float]
     came = _reached(graph)
     if not came:
         return None
+
     numbers = np.fromiter(came, dtype=np.int64)
     gaps = np.linalg.norm(graph.vertices[numbers][:, None] - goals[None], axis=2).min(axis=1)
-    vertex, away = int(numbers[gaps.argmin()]), float(gaps.min())
+    vertex = int(numbers[gaps.argmin()])
+    away = float(gaps.min())
     if came[vertex] < 0 or away == 0.0:
         return None
+
     way = [vertex]
     while came[way[-1]] >= 0:
         way.append(came[way[-1]])
@@ -150,8 +168,10 @@ def _reached(graph: PlannerGraph) -> dict[int, int]:
     leaving: dict[int, list[int]] = {}
     for first, second in graph.edges.tolist():
         leaving.setdefault(first, []).append(second)
+
     came = dict.fromkeys(graph.starts.tolist(), -1)
     waiting = deque(came)
+
     while waiting:
         vertex = waiting.popleft()
         for head in leaving.get(vertex, ()):
@@ -168,6 +188,7 @@ def _graph_ml(graph: PlannerGraph) -> Iterator[str]:
     yield '  <key id="role" for="node" attr.name="role" attr.type="string"/>'
     yield '  <key id="weight" for="edge" attr.name="weight" attr.type="double"/>'
     yield '  <graph id="graph" edgedefault="directed">'
+
     roles = dict.fromkeys(graph.goals.tolist(), "goal") | dict.fromkeys(graph.starts.tolist(), "start")
     for number, row in enumerate(graph.vertices.tolist()):
         role = f'<data key="role">{roles[number]}</data>' if number in roles else ""
@@ -175,5 +196,6 @@ def _graph_ml(graph: PlannerGraph) -> Iterator[str]:
         yield f'    <node id="n{number}"><data key="coords">{coords}</data>{role}</node>'
     for (first, second), cost in zip(graph.edges.tolist(), graph.costs.tolist(), strict=True):
         yield f'    <edge source="n{first}" target="n{second}"><data key="weight">{cost!r}</data></edge>'
+
     yield "  </graph>"
     yield "</graphml>"

@@ -20,7 +20,7 @@ GIVEN = "_given"  # the attribute that keeps the arguments of a planner's constr
 
 def keyword_parameters(planner: Callable[..., Any]) -> Mapping[str, Any]:
     """The parameters of a planner's class but the first one, which is the space information, and their defaults."""
-    return _parameters(planner)
+    return _parameters(planner)  # apart, as lru_cache asks for Hashable, which classes are not to mypy
 
 
 def remembering(constructor: Callable[..., None]) -> Callable[..., None]:
@@ -51,11 +51,14 @@ def change(planner: ob.Planner, name: str, value: object) -> None:
     options = options_of(planner)
     if name not in options:
         raise UnknownNameError(f"parameter of planner {planner.getName()}", name, tuple(options))
+
     given = {**planner.__dict__[GIVEN], name: _read(value)}
     try:
         made = type(planner)(planner.getSpaceInformation(), **{**given, "seed": planner.seed})
     except TypeError as error:
         raise InputError(f"planner {planner.getName()}: {name}: {error}") from None
+
+    # All that depends on options, but neither how far its numbers are drawn nor what hangs on its space.
     settings = {key: each for key, each in vars(made).items() if key not in ("rng", "_states")}
     planner.__dict__.update(settings)
     planner.__dict__[GIVEN] = given
@@ -67,6 +70,7 @@ def _read(value: object) -> object:
     words = {"none": None, "true": True, "false": False}
     if value.strip().lower() in words:
         return words[value.strip().lower()]
+
     try:
         return json.loads(value)
     except ValueError:

@@ -73,6 +73,7 @@ class Coordinates:
             return [-np.pi], [np.pi]
         if self.kind is ob.ConstrainedStateSpace:
             return self.parts[0].bounds(space.getSpace())
+
         of_parts = [part.bounds(space.getSubspace(k)) for k, part in enumerate(self.parts)]
         lower, upper = ([number for each in of_parts for number in each[side]] for side in (0, 1))
         return lower, upper
@@ -90,10 +91,12 @@ def coordinates_of(si: ob.SpaceInformation, *, constrained: bool = False) -> Coo
     """
     if not isinstance(si, ob.SpaceInformation):
         raise InputError(f"planner: expected an ompl.base.SpaceInformation, got {type(si).__name__}")
+
     space = si.getStateSpace()
     if constrained and isinstance(space, ob.ConstrainedStateSpace):
         ambient = _coordinates(space.getSpace(), " that is constrained")
         return Coordinates(ob.ConstrainedStateSpace, ambient.size, (ambient,))
+
     found = _coordinates(space, "")
     if found.size == 0:
         raise InputError("planner: needs a space of at least one coordinate, got none")
@@ -108,5 +111,6 @@ def _coordinates(space: ob.StateSpace, inside: str) -> Coordinates:
         return Coordinates(kind, 1)
     if kind not in (ob.CompoundStateSpace, ob.SE2StateSpace):
         raise InputError(f"planner: {WANTED}, got a {type(space).__name__}{inside}")
+
     parts = tuple(_coordinates(space.getSubspace(k), " in a compound") for k in range(space.getSubspaceCount()))
     return Coordinates(kind, sum(part.size for part in parts), parts)

@@ -34,6 +34,7 @@ def pieces(a: Vector, b: Vector, turning: Mask) -> Matrix:
     count = int(np.ceil(np.abs(b - a)[turning].max(initial=0.0) / LONGEST))
     if count < 2:
         return np.stack([a, b])
+
     points = a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)
     points[-1] = b
     return points
@@ -54,12 +55,15 @@ class Unrolled:
 
     def __init__(self, starts: Matrix, goals: Matrix, turning: Mask) -> None:
         base = starts[0]
-        self._turning, self._base = turning, base
+        self._turning = turning
+        self._base = base
         self._given: dict[bytes, Vector] = {}
+
         self.starts = np.array([self._known(self._near(row), row) for row in starts])
         each = max(1, MOST_GOALS // max(len(goals), 1))
         images = [[self._known(row, goal) for row in self._images(goal)[:each]] for goal in goals]
         rows = [row for of_goal in images for row in of_goal[:1]] + [row for of_goal in images for row in of_goal[1:]]
+
         self.goals = np.array(rows).reshape(-1, len(base))
 
     def bounds(self, lower: Vector, upper: Vector) -> tuple[Vector, Vector]:
@@ -92,13 +96,16 @@ class Unrolled:
         near = self._near(row)
         other = np.where(near > self._base, -TAU, TAU)
         axes = np.flatnonzero(self._turning)
+
         if 2 ** len(axes) <= MOST_GOALS:
             chosen = [np.array(flips) for flips in product((False, True), repeat=len(axes))]
         else:
             chosen = [np.zeros(len(axes), dtype=bool), *np.eye(len(axes), dtype=bool)]
+
         images = []
         for flips in chosen:
             image = near.copy()
             image[axes[flips]] += other[axes[flips]]
             images.append(image)
+
         return sorted(images, key=lambda image: float(np.linalg.norm(image - self._base)))
