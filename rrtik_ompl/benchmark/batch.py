@@ -72,8 +72,10 @@ def plan_batch(
     for k, each in enumerate(problems):
         require(each, str | os.PathLike, f"problems[{k}]", "give a name or a file; save_problem() writes one")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
+
     named = [file_source(os.fspath(each), Path.cwd()) for each in problems]
     limit = positive(seconds, "seconds")
+
     suite = Suite(
         name="batch",
         title="batch",
@@ -85,11 +87,25 @@ def plan_batch(
         memory_mb=positive(memory_mb, "memory_mb"),
         seed=whole_number(seed, "seed"),
     )
+
     left = all_jobs(suite)
     count = whole_number(jobs, "jobs", 1)
     finished = spread.local(left, count, _beside) if scheduler is None else spread.cluster(left, scheduler)
     records = {int(record["problem"]): record for record in finished}
     return [{**records[k], "problem": source.name} for k, source in enumerate(named)]
+
+
+def _entrant(planner: str | None, parameters: dict[str, Any], shorten: SuiteShortening) -> Entrant:
+    label = planner or AUTO
+    options = options_of(label)
+
+    if is_auto(label):
+        refuse_options(parameters)
+    for key in parameters:
+        if key not in options:
+            raise UnknownNameError(f"parameter of planner {label}", key, options)
+
+    return Entrant(label, planner, parameters, one_of(SHORTENINGS, shorten, "shortening method"))
 
 
 def _beside(job: Mapping[str, Any]) -> bool:
@@ -101,14 +117,3 @@ def _beside(job: Mapping[str, Any]) -> bool:
         return is_auto(name) or is_safe(find_planner(name))
     except (RrtikError, MemoryError):  # a process will say what is wrong with the problem
         return False
-
-
-def _entrant(planner: str | None, parameters: dict[str, Any], shorten: SuiteShortening) -> Entrant:
-    label = planner or AUTO
-    options = options_of(label)
-    if is_auto(label):
-        refuse_options(parameters)
-    for key in parameters:
-        if key not in options:
-            raise UnknownNameError(f"parameter of planner {label}", key, options)
-    return Entrant(label, planner, parameters, one_of(SHORTENINGS, shorten, "shortening method"))

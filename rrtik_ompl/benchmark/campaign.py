@@ -62,12 +62,15 @@ def run_campaign(
     about = machine(jobs, scheduler)
     done = _held(file, suite, about, resume)
     total = suite.total
+
     left = (job for job in all_jobs(suite) if records.key_of(job["run"]) not in done)
     on_run(Progress(len(done), total), None)
+
     with records.RecordFile(file, {"version": 1, "suite": suite.plain(), "machine": about}) as out:
         if len(done) == total:
             return file
         finished = spread.local(left, jobs) if scheduler is None else spread.cluster(left, scheduler)
+
         try:
             for number, record in enumerate(finished, start=len(done) + 1):
                 out.append(record)
@@ -132,17 +135,20 @@ def _held(file: Path, suite: Suite, about: Mapping[str, Any], resume: bool) -> s
     """Which runs are done already."""
     if not os.path.isfile(file) or file.stat().st_size == 0:
         return set()
+
     head = records.read_head(file)
     done = {records.key_of(record) for record in records.read_records(file)}
     if not done:  # it never began, as where a scheduler did not answer
         return done
     if not resume:
         raise InputError(f"{file}: holds {len(done)} runs already; continue with --resume, or choose another --out")
+
     before = head["suite"]
     now = records.json_like(suite.plain())
     changed = [key for key in now if before.get(key) != now[key] and key not in ("runs", "title")]
     if changed:
         raise InputError(f"{file}: was begun with another suite ({', '.join(changed)} differ); choose another --out")
+
     if len(done) < suite.total:
         _warn_of_change(file, head["machine"], about)
     return done

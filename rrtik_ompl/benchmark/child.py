@@ -35,8 +35,10 @@ def guarded(job: dict[str, Any]) -> dict[str, Any]:
     _alarm(BUILDING)
     prepare(job)
     _alarm(job["patience"])
+
     limits = resource.getrlimit(resource.RLIMIT_DATA)
     held = _data_bytes()
+
     try:
         if held is not None:
             resource.setrlimit(resource.RLIMIT_DATA, (held + int(job["memory_mb"] * MEGABYTE), limits[1]))
@@ -44,6 +46,7 @@ def guarded(job: dict[str, Any]) -> dict[str, Any]:
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, limits)
         _alarm(0.0)
+
     return record | {"memory_mb": _resident()}
 
 

@@ -48,8 +48,10 @@ class Guard:
         process = self._started()
         self._forget_words()
         answer = _asked(process, json.dumps(job) + "\n")
+
         if self._closed:
             raise Closed("the guard was closed")
+
         if answer.endswith("\n"):
             record: dict[str, Any] = json.loads(answer)
             if record["status"] == OUT_OF_MEMORY:  # what is left of it may be spoilt
@@ -82,13 +84,16 @@ class Guard:
     def _lost(self, process: subprocess.Popen[str], job: Mapping[str, Any]) -> dict[str, Any]:
         code = self._end(process)
         said = self._last_words()
+
         if code == -signal.SIGALRM:
             return {"status": HANG, "reason": f"killed after {job['patience']:g} s"}
         if any(word in said for word in MEMORY_WORDS):
             return {"status": OUT_OF_MEMORY, "reason": f"more than {job['memory_mb']:g} MB"}
+
         ended = f"exit code {code}" if code >= 0 else signal.Signals(-code).name
         if code < 0 and (why := _why_plain_planners_crash(job["planner"], said)):
             return {"status": CRASH, "reason": f"{ended}: {why}"}
+
         last = next((line.strip() for line in reversed(said.splitlines()) if line.strip()), "")
         return {"status": CRASH, "reason": f"{ended}: {last}".rstrip(": ")}
 
@@ -133,12 +138,15 @@ def _why_plain_planners_crash(name: str | None, said: str) -> str:
     """
     if name is None or is_auto(name):
         return ""
+
     try:
         planner = find_planner(name)
     except RrtikError:
         return ""
+
     if not is_plain(planner):
         return ""
+
     places = [(Path(file), line) for file, line in LINES_OF_CODE.findall(said)]  # the innermost first
     own = next((place for place in places if place[0] == Path(inspect.getfile(planner))), None)
     where = "" if own is None else f" ({own[0].name}, line {own[1]})"
@@ -162,6 +170,7 @@ class Guards:
                     raise Closed("the guards were closed")
                 self._mine.guard = Guard()
                 self._all.append(self._mine.guard)
+
         record: dict[str, Any] = self._mine.guard.run(job)
         return record
 

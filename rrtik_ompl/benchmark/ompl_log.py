@@ -19,7 +19,7 @@ from rrtik_ompl.files.text import make_folder, write_text
 DATABASE = "benchmark.db"
 OMPL_STATUSES = ("Unknown status", "Invalid start", "Invalid goal", "Unrecognized goal type", "Timeout",
                  "Approximate solution", "Exact solution", "Crash")  # fmt: skip
-TIMEOUT, EXACT, CRASH = 4, 6, 7
+TIMEOUT, EXACT, CRASH = 4, 6, 7  # places in OMPL_STATUSES
 # OMPL's name and type of each run property, and where it comes from.
 PROPERTIES = {
     "time REAL": "plan_seconds",
@@ -74,6 +74,7 @@ def write_logs(found: Sequence[Result], head: Mapping[str, Any], folder: Path) -
         file = folder / f"{name}.log"
         files.append(folder / f"{name}-{len(files)}.log" if file in files else file)
         write_text(files[-1], log_text(results, head))
+
     return files
 
 
@@ -113,6 +114,7 @@ def log_text(results: Sequence[Result], head: Mapping[str, Any]) -> str:
     first = results[0]
     scaled = [f"{first.axis} REAL = {first.value:g}"] if first.axis else []
     seconds = sum(measured(run, "total_seconds") or 0.0 for result in results for run in result.runs)
+
     lines = [
         f"OMPL version {machine['ompl']}",
         f"Experiment {_word(first.group if first.axis else first.label)}",
@@ -132,21 +134,26 @@ def log_text(results: Sequence[Result], head: Mapping[str, Any]) -> str:
         "|".join(("outcome", *STATUSES)),
         f"{len(results)} planners",
     ]
+
     settings = {entrant["label"]: entrant for entrant in suite["entrants"]}
     for result in results:
         lines += _planner(result, settings.get(result.planner, {}))
+
     return "\n".join([*lines, ""])
 
 
 def _planner(result: Result, entrant: Mapping[str, Any]) -> list[str]:
     common = {"planner": entrant.get("name", result.planner), "shorten": entrant.get("shorten", "")}
     common |= entrant.get("parameters", {})
+
     taken = (*PROPERTIES.values(),)
     counts = sorted({key for run in result.runs for key in run.get("counts", {}) if key not in taken})
     extra = {f"{_column(key)} REAL": key for key in counts}
+
     heads = (*FLAGS, *PROPERTIES, *extra)
     rows = [[*_flags(run), *(_number(measured(run, key)) for key in (*PROPERTIES.values(), *counts))]
             for run in result.runs]  # fmt: skip
+
     return [
         f"geometric_{_word(result.planner)}",
         f"{len(common)} common properties",
@@ -165,6 +172,7 @@ def _flags(run: Mapping[str, Any]) -> list[str]:
     found = run["status"] in (SOLVED, INVALID)
     valid = run["status"] == SOLVED
     strict = (run.get("initial_strict", False), valid and run.get("strict", False))
+
     outcome = (int(found), status, STATUSES.index(run["status"]))
     solution = (0, 0, 1, int(strict[0]), int(valid), int(strict[1])) if found else ("",) * 6
     return [*map(str, (*outcome, *solution))]

@@ -40,6 +40,7 @@ def shortest_runs(records: Iterable[Mapping[str, Any]], most: int) -> list[dict[
         rival = best.get(record["group"])
         if rival is None or (record["length"], record["run"]) < (rival["length"], rival["run"]):
             best[record["group"]] = dict(record)
+
     return list(best.values())
 
 
@@ -53,15 +54,18 @@ def draw_views(chosen: Iterable[Mapping[str, Any]], head: Mapping[str, Any], fol
 
     sources = {source["name"]: source for source in head["suite"]["sources"]}
     found = {}
+
     for record in chosen:
         try:
             problem = build(from_plain(sources[record["problem"]]))
         except RrtikError:
             continue
+
         make_folder(folder)
         file = folder / f"{record['problem'].replace('/', '_')}.html"
         view(problem, JointPath.of(problem.world.robot, record["waypoints"]), html=file)
         found[f"{record['problem']} by {record['planner']}, run {record['run']}, length {record['length']:.2f}"] = file
+
     return found
 
 
@@ -78,20 +82,24 @@ def html(
     """
     title = escape(head["suite"]["title"])
     said = escape(conditions(results, head)).replace("`", "")
-    parts = [f"<h1>{title}</h1>", f"<p>{said}</p>", _table(OVERVIEW, overview(results))]
-    parts += [f"<p>{escape(remark(results, head))}</p>"]
+    table = _table(OVERVIEW, overview(results))
+    parts = [f"<h1>{title}</h1>", f"<p>{said}</p>", table, f"<p>{escape(remark(results, head))}</p>"]
+
     broken = failures(results)
     if broken:
         parts += ["<h2>Runs that broke</h2>", _table(("problem", "planner", "runs", "why"), broken)]
+
     if views:
         links = ((escape(f"{file.parent.name}/{file.name}"), escape(text)) for text, file in views.items())
         items = "".join(f'<li><a href="{link}">{text}</a></li>' for link, text in links)
         parts += ["<h2>3-D views of the shortest paths</h2>", f"<ul>{items}</ul>"]
+
     for file in pictures:
         if file.suffix == ".svg":
             name = escape(TITLES.get(file.stem, file.stem))
             data = base64.b64encode(file.read_bytes()).decode()
             parts += [f"<h2>{name}</h2>", f'<img alt="{name}" src="data:image/svg+xml;base64,{data}">']
+
     head_part = f'<meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
     body = "\n".join(parts)
     return f'<!doctype html>\n<html lang="en"><head>{head_part}</head><body>\n{body}\n</body></html>\n'

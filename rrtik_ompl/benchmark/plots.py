@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+Draw = Callable[[Any, Sequence[Result], Mapping[str, Any]], None]  # of a panel, results and the lines' styles
+
 PANELS = 24  # in a picture at most; tables hold the rest
 ACROSS = 3
 LEGENDS = 2  # names beside each other above a panel
@@ -34,6 +36,7 @@ def draw_all(results: Sequence[Result], folder: Path) -> list[Path]:
     for result in results:
         if result.axis:
             families.setdefault(result.group, []).append(result)
+
     planners = list(dict.fromkeys(result.planner for result in results))
     figures = {"solved": _panels(plain, planners, _solved, "planning time [s]", "runs with a valid path [%]")}
     for quantity in BOXES:
@@ -41,16 +44,14 @@ def draw_all(results: Sequence[Result], folder: Path) -> list[Path]:
         draw = _boxes(quantity)
         figures[f"box_{quantity}"] = _panels(plain, planners, draw, "", f"{name} [{unit}]" if unit else name)
     figures["scaling"] = _panels(families, planners, _scaling, None, "planning time, median and quartiles [s]")
+
     files = []
     for name, figure in figures.items():
         if figure is not None:
-            files += [folder / f"{name}.png", folder / f"{name}.svg"]
-            save_figure(figure, files[-2])
-            save_figure(figure, files[-1])
+            for ending in (".png", ".svg"):
+                files.append(folder / f"{name}{ending}")
+                save_figure(figure, files[-1])
     return files
-
-
-Draw = Callable[[Any, Sequence[Result], Mapping[str, Any]], None]
 
 
 def _panels(
@@ -59,6 +60,7 @@ def _panels(
     """A panel for each group, with one legend; None without groups."""
     if not groups:
         return None
+
     from matplotlib.figure import Figure
 
     shown = list(groups.items())[:PANELS]
@@ -66,10 +68,12 @@ def _panels(
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(4.2 * columns, 0.8 + 3.0 * rows), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
+
     styles = {
         name: {"color": COLORS[k % len(COLORS)], "linestyle": DASHES[k // len(COLORS) % len(DASHES)]}
         for k, name in enumerate(planners)
     }
+
     for panel, (title, results) in zip(panels, shown, strict=False):
         draw(panel, results, styles)
         panel.set_title(title, fontsize=9)
@@ -77,12 +81,14 @@ def _panels(
         tidy(panel)
     for panel in panels[len(shown) :]:
         panel.set_visible(False)
+
     figure.supylabel(upward, fontsize=10)
     lines = {line.get_label(): line for panel in panels for line in panel.get_lines()}
     known = [name for name in planners if name in lines]
     if known:
         beside = min(len(known), LEGENDS * columns)
         figure.legend([lines[name] for name in known], known, loc="outside upper center", ncols=beside, frameon=False)
+
     if len(groups) > len(shown):
         figure.suptitle(f"the first {len(shown)} of {len(groups)}", fontsize=9)
     return figure
@@ -95,6 +101,7 @@ def _solved(panel: Axes, results: Sequence[Result], styles: Mapping[str, Any]) -
         share = 100.0 * np.arange(len(times) + 1) / result.total
         ends = np.concatenate([[LEAST], np.maximum(times, LEAST), [latest]])
         panel.step(ends, [*share, share[-1]], where="post", label=result.planner, **styles[result.planner])
+
     panel.set_xscale("log")
     panel.set_ylim(-3.0, 103.0)
 
@@ -107,6 +114,7 @@ def _boxes(quantity: str) -> Draw:
             patch.set(facecolor=styles[result.planner]["color"], alpha=0.35)
             median.set(color="#1d2733")
             median.set_label("")
+
         names = [result.planner for result in results]
         panel.set_xticks(range(1, len(names) + 1), names, rotation=35, ha="right", fontsize=7)
         if quantity.endswith("seconds") and any(values):
@@ -121,10 +129,12 @@ def _scaling(panel: Axes, results: Sequence[Result], styles: Mapping[str, Any]) 
         spread = result.spread("plan_seconds")
         if spread is not None:
             lines.setdefault(result.planner, []).append((result.value, spread.median, spread.q25, spread.q75))
+
     for planner, points in lines.items():
         value, median, low, high = np.array(sorted(points)).T
         panel.plot(value, median, marker="o", markersize=3, label=planner, **styles[planner])
         panel.fill_between(value, low, high, color=styles[planner]["color"], alpha=0.12, linewidth=0.0)
+
     panel.set_xscale("log")
     panel.set_yscale("log")
     values = sorted({result.value for result in results})

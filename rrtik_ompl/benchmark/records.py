@@ -77,80 +77,16 @@ def _fault(data: Record) -> str:
     for name in (*NEEDED, *(OF_A_PATH if status == SOLVED else ())):
         if name not in data:
             return f"{name} is missing"
+
     if status not in STATUSES:
         return f"status {status!r} is none of {', '.join(STATUSES)}"
     for name, value in data.items():
         kind: Any = NO_NUMBERS.get(name, (*NUMBER, type(None)))
         if not isinstance(value, kind):
             return f"{name} cannot be {value!r:.40}"
+
     counts = data.get("counts", {})
     return next((f"count {key} cannot be {n!r:.40}" for key, n in counts.items() if not isinstance(n, NUMBER)), "")
-
-
-class RecordFile:
-    """A file of records that is open for appending.
-
-    Args:
-        file: The file; it is made, with its folder, unless it is there.
-        head: Its first line.
-
-    Raises:
-        InputError: If it cannot be written, or another process is writing it.
-    """
-
-    def __init__(self, file: Path, head: Mapping[str, Any]) -> None:
-        self._name = file
-        make_folder(file.parent)
-        try:
-            self._file = open(file, "ab", buffering=0)  # noqa: SIM115 - closed by __exit__
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._cut_half_line()
-        except BlockingIOError:
-            self._file.close()
-            raise InputError(
-                f"{file}: another campaign is writing it; wait for its end, or choose another --out"
-            ) from None
-        except OSError as error:
-            raise self._failed(error) from error
-        if self._end == 0:
-            self.append(head)
-
-    def append(self, record: Mapping[str, Any]) -> None:
-        """Write a record through to the disk's care; if there is no room, what was there before stays whole.
-
-        Raises:
-            InputError: If it cannot be written.
-        """
-        line = (json.dumps(record) + "\n").encode()
-        written = 0
-        try:
-            while written < len(line):
-                written += self._file.write(line[written:])
-        except OSError as error:
-            os.truncate(self._name, self._end)
-            raise self._failed(error) from error
-        self._end += len(line)
-
-    def __enter__(self) -> RecordFile:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._file.close()
-
-    def _cut_half_line(self) -> None:
-        """What is not whole goes; so does a head without runs, for that of this campaign takes its place."""
-        data = self._name.read_bytes()
-        self._end = data.rfind(b"\n") + 1 if data.count(b"\n") > 1 else 0
-        if self._end < len(data):
-            os.truncate(self._name, self._end)
-
-    def _failed(self, error: OSError) -> InputError:
-        return InputError(
-            f"{self._name}: cannot be written: {error.strerror or error}; all runs before are kept: "
-            f"make room, then continue with --resume"
-        )
 
 
 def _lines(file: Path) -> Iterator[tuple[int, Record]]:
@@ -177,6 +113,75 @@ def _decoded(file: Path, number: int, line: bytes) -> Record:
 
 def _corrupt(file: Path, number: int, why: str) -> InputError:
     return InputError(f"{file}:{number}: not a record of a run ({why}); delete this line to have its run done again")
+
+
+class RecordFile:
+    """A file of records that is open for appending.
+
+    Args:
+        file: The file; it is made, with its folder, unless it is there.
+        head: Its first line.
+
+    Raises:
+        InputError: If it cannot be written, or another process is writing it.
+    """
+
+    def __init__(self, file: Path, head: Mapping[str, Any]) -> None:
+        self._name = file
+        make_folder(file.parent)
+
+        try:
+            self._file = open(file, "ab", buffering=0)  # noqa: SIM115 - closed by __exit__
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._cut_half_line()
+        except BlockingIOError:
+            self._file.close()
+            raise InputError(
+                f"{file}: another campaign is writing it; wait for its end, or choose another --out"
+            ) from None
+        except OSError as error:
+            raise self._failed(error) from error
+
+        if self._end == 0:
+            self.append(head)
+
+    def append(self, record: Mapping[str, Any]) -> None:
+        """Write a record through to the disk's care; if there is no room, what was there before stays whole.
+
+        Raises:
+            InputError: If it cannot be written.
+        """
+        line = (json.dumps(record) + "\n").encode()
+        written = 0
+        try:
+            while written < len(line):
+                written += self._file.write(line[written:])
+        except OSError as error:
+            os.truncate(self._name, self._end)
+            raise self._failed(error) from error
+
+        self._end += len(line)
+
+    def __enter__(self) -> RecordFile:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    def _cut_half_line(self) -> None:
+        """What is not whole goes; so does a head without runs, for that of this campaign takes its place."""
+        data = self._name.read_bytes()
+        self._end = data.rfind(b"\n") + 1 if data.count(b"\n") > 1 else 0
+        if self._end < len(data):
+            os.truncate(self._name, self._end)
+
+    def _failed(self, error: OSError) -> InputError:
+        return InputError(
+            f"{self._name}: cannot be written: {error.strerror or error}; all runs before are kept: "
+            f"make room, then continue with --resume"
+        )
 
 
 def json_like(data: Mapping[str, Any]) -> Record:

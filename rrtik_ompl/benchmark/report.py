@@ -27,14 +27,18 @@ def write_report(file: Path, *, views: int = VIEWS) -> tuple[list[Result], list[
     """
     folder = file.parent
     head, found = read_campaign(file)
+
     total = sum(result.total for result in found)
     ompl_log.write_database(ompl_log.write_logs(found, head, folder / "logs"), folder / ompl_log.DATABASE, total)
+
     write_text(folder / "summary.md", tables.markdown(found, head))
     write_text(folder / "summary.csv", tables.csv_text(found))
+
     pictures = plots.draw_all(found, folder)
     chosen = page.shortest_runs(records.read_records(file), views)
     shown = page.draw_views(chosen, head, folder / "views")
     write_text(folder / "index.html", page.html(found, head, pictures, shown))
+
     return found, [folder / name for name in ("index.html", "summary.md", "summary.csv", ompl_log.DATABASE)]
 
 
@@ -57,9 +61,11 @@ def _in_order(file: Path, found: list[Result], head: records.Record) -> list[Res
     labels = list(dict.fromkeys(s["name"] if s["axis"] else s["group"] for s in suite["sources"]))
     planners = [entrant["label"] for entrant in suite["entrants"]]
     names = {source["name"] for source in suite["sources"]}
+
     for result in found:
         strange = next((run["problem"] for run in result.runs if run["problem"] not in names), None)
         if strange is not None or result.label not in labels or result.planner not in planners:
             which = f"'{result.planner}' on '{strange or result.label}'"
             raise InputError(f"{file}: holds runs of {which}, of which its first line says nothing; delete their lines")
+
     return sorted(found, key=lambda result: (labels.index(result.label), planners.index(result.planner)))

@@ -62,15 +62,19 @@ def _measured(job: Mapping[str, Any], problem: Problem) -> dict[str, Any]:
         "plan_seconds": found.seconds,
         "counts": dict(found.statistics),
     }
+
     if found.path is None:
         return record
+
     begin = time.perf_counter()
     path = _shortened(found.path, problem, job["shorten"], found.seed)
     record |= {"shorten_seconds": time.perf_counter() - begin}
+
     faults = () if path is found.path else path.violations(problem.world)  # plan() has checked what it returns
     if faults or not problem.reached(path.end) or not (path.start == problem.start).all():
         reason = faults[0].reason if faults else "the path does not lead from the start to the goal"
         record |= {"status": INVALID, "reason": reason}
+
     final = _sizes(path, problem.world)
     initial = final if path is found.path else _sizes(found.path, problem.world)
     record |= {f"initial_{key}": value for key, value in initial.items()}
@@ -115,9 +119,11 @@ def smoothness(path: JointPath) -> float:
     before = sides[:-1]
     after = sides[1:]
     across = np.linalg.norm(rows[2:] - rows[:-2], axis=1)
+
     some = (before > 0.0) & (after > 0.0)
     before = before[some]
     after = after[some]
     across = across[some]
+
     cosines = np.clip((before**2 + after**2 - across**2) / (2.0 * before * after), -1.0, 1.0)
     return float((((np.pi - np.arccos(cosines)) * 2.0 / (before + after)) ** 2).sum())

@@ -71,6 +71,7 @@ def file_source(name: str, folder: Path) -> Source:
     if not path.suffix and len(path.parts) == 1:
         find_problem(name)
         return Source("file", name, name, (name, None))  # which other machines keep in other folders
+
     file = (folder / path).resolve()
     if not os.path.isfile(file):
         raise InputError(f"no such problem file '{name}' as seen from {folder}; check the path")
@@ -89,17 +90,21 @@ def folder_sources(folder: Path, robot: str | None) -> list[Source]:
     """
     if not os.path.isdir(folder):
         raise InputError(f"--problems {folder}: no such folder; check the path")
+
     found = sorted(file for ending in ("yaml", "yml") for file in folder.rglob(f"*.{ending}"))
     found = [file for file in found if not file.name.startswith("request")]
     pairs = {file.parent for file in found if file.name.startswith("scene")}
     found = [file for file in found if file.parent not in pairs or file.name.startswith("scene")]
+
     if not found:
         raise InputError(f"{folder}: holds no problem files (.yaml) and no pairs sceneN.yaml, requestN.yaml")
+
     sources = []
     whole = folder.resolve()
     for file in map(Path.resolve, found):
         group = (Path(whole.name) / file.parent.relative_to(whole)).as_posix()
         sources.append(Source("file", f"{group}/{file.stem}", group, (str(file), robot)))
+
     return sources
 
 

@@ -61,6 +61,7 @@ def cluster(jobs: Iterable[Job], address: str) -> Generator[Done, None, None]:
         import distributed
     except ImportError:
         raise InputError("--scheduler needs Dask, which is not installed: pip install 'rrtik-ompl[cluster]'") from None
+
     from joblib import Parallel, delayed, parallel_config
 
     try:
@@ -68,31 +69,27 @@ def cluster(jobs: Iterable[Job], address: str) -> Generator[Done, None, None]:
     except (OSError, ValueError, TypeError) as error:
         said = str(error) or type(error).__name__
         raise InputError(f"--scheduler {address}: no Dask scheduler answers: {said}") from None
+
     with client, _one_line(address):
         _check_workers(client, address)
         with parallel_config(backend="dask", client=client):
             yield from Parallel(return_as="generator_unordered", batch_size=1)(delayed(_remote)(job) for job in jobs)
 
 
-def _remote(job: Job) -> Done:
-    return {**job["run"], **_here.run(job)}
+def _check_workers(client: Client, address: str) -> None:
+    here = _version()
+    versions = client.run(_version)
+    if not versions:
+        raise InputError(f"--scheduler {address}: the scheduler has no workers; start some with: dask worker {address}")
+    for worker, version in versions.items():
+        if version != here:
+            raise InputError(f"--scheduler {address}: worker {worker} has rrtik-ompl {version}, here is {here}")
 
 
 def _version() -> str:
     from rrtik_ompl.base.version import __version__
 
     return __version__
-
-
-def _check_workers(client: Client, address: str) -> None:
-    from rrtik_ompl.base.version import __version__
-
-    versions = client.run(_version)
-    if not versions:
-        raise InputError(f"--scheduler {address}: the scheduler has no workers; start some with: dask worker {address}")
-    for worker, version in versions.items():
-        if version != __version__:
-            raise InputError(f"--scheduler {address}: worker {worker} has rrtik-ompl {version}, here is {__version__}")
 
 
 @contextmanager
@@ -104,3 +101,7 @@ def _one_line(address: str) -> Iterator[None]:
         raise
     except Exception as error:
         raise InputError(f"--scheduler {address}: {type(error).__name__}: {error}") from error
+
+
+def _remote(job: Job) -> Done:
+    return {**job["run"], **_here.run(job)}

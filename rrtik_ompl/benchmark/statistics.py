@@ -94,10 +94,12 @@ def measured(record: Mapping[str, Any], quantity: str) -> float | None:
     """A quantity of a record, None if it was not counted."""
     if quantity == "total_seconds":
         return float(record["plan_seconds"] + record.get("shorten_seconds", 0.0)) if "plan_seconds" in record else None
+
     counts = record.get("counts", {})
     if quantity == "free_share":
         motions = counts.get("checked_motions", 0)
         return float(counts["free_motions"] / motions) if motions and "free_motions" in counts else None
+
     value = record.get(quantity, counts.get(quantity))
     return None if value is None else float(value)
 
@@ -118,8 +120,10 @@ def results(records: Iterable[Mapping[str, Any]]) -> list[Result]:
         place = Result(label, record["planner"], record["group"], record["axis"], record["value"])
         light = {key: value for key, value in record.items() if key not in HEAVY}
         found.setdefault((label, record["planner"]), place).runs.append(light)
+
     for result in found.values():
         result.runs.sort(key=lambda run: (run["problem"], run["run"]))
+
     return list(found.values())
 
 

@@ -95,16 +95,21 @@ def load_suite(name_or_file: str | os.PathLike[str], *, folder: Path | None = No
     path = file_name(name_or_file)
     if not path.suffix and len(path.parts) == 1 and not os.path.isfile(path):
         path = find_suite(str(name_or_file))
+
     document = read_yaml(path)
     entry = parse(document, SuiteFile)
+
     sources = [each for k, item in enumerate(entry.problems) for each in _sources(document, ("problems", k), item)]
     sources = [replace(s, arguments=(s.arguments[0], entry.robot)) if s.kind == "file" else s for s in sources]
     sources += [] if folder is None else folder_sources(folder, entry.robot)
+
     if not sources:
         raise document.error(("problems",), "no problems; list some, or give a folder of them with --problems FOLDER")
+
     entrants = [_entrant(document, ("planners", k), item, entry.shorten) for k, item in enumerate(entry.planners)]
     _refuse_twins(document, "problems", [source.name for source in sources])
     _refuse_twins(document, "planners", [entrant.label for entrant in entrants])
+
     patience = entry.patience or 3.0 * entry.seconds + 30.0
     return Suite(
         path.stem, entry.title, tuple(sources), tuple(entrants), runs or entry.runs, entry.seconds, patience,
@@ -118,18 +123,22 @@ def _sources(
     with document.at(place):
         if isinstance(item, str):
             return [file_source(item, document.path.parent)]
+
         if isinstance(item, Generated):
             given = item.generated
             load_robot(given.robot)
             if given.family not in FAMILIES:
                 raise UnknownNameError("family of generated problems", given.family, FAMILIES)
             return generated_sources(given.robot, given.family, given.first, given.count)
+
         if isinstance(item, Obstacles):
             load_robot(item.obstacles.robot)
             arguments = (item.obstacles.robot, item.obstacles.seed)
             return scaling_sources("obstacles", item.obstacles.counts, *arguments, group=f"{arguments[0]}/obstacles")
+
         if isinstance(item, Joints):
             return scaling_sources("joints", item.joints.counts, item.joints.seed, group="planar/joints")
+
         base = file_source(item.resolution.problem, document.path.parent)
         group = f"{base.name}/resolution"
         return scaling_sources("resolution", item.resolution.metres, base.arguments[0], group=group)
@@ -139,14 +148,18 @@ def _entrant(document: YamlDocument, place: Location, item: str | PlannerGroup, 
     group = PlannerGroup.model_validate({"name": item}) if isinstance(item, str) else item
     at = place if isinstance(item, str) else (*place, "name")
     name = planner_in_folder(group.name, document.path.parent) if is_planner_file(group.name) else group.name
+
     with document.at(at):
         options = _options(name)
+
     for key in group.parameters:
         with document.at((*place, "parameters", key)):
             if key not in options:
                 raise UnknownNameError(f"parameter of planner {group.name}", key, options)
+
     with document.at((*place, "shorten") if group.shorten else ("shorten",)):
         method = one_of(SHORTENINGS, group.shorten or shorten, "shortening method")
+
     return Entrant(group.label or label_of(group.name), name, dict(group.parameters), method)
 
 

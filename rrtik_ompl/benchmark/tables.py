@@ -56,14 +56,17 @@ def markdown(results: Sequence[Result], head: Mapping[str, Any]) -> str:
     suite = head["suite"]
     lines = [f"# {suite['title']}", "", conditions(results, head), "", *markdown_table(OVERVIEW, overview(results))]
     lines += ["", remark(results, head)]
+
     broken = failures(results)
     if broken:
         lines += ["", "## Runs that broke", "", *markdown_table(("problem", "planner", "runs", "why"), broken)]
+
     for quantity, (name, unit) in QUANTITIES.items():
         rows = [(r.label, r.planner, *map(figure, s)) for r in results if (s := r.spread(quantity)) is not None]
         if rows:
             title = f"## {name}{f' [{unit}]' if unit else ''}"
             lines += ["", title, "", *markdown_table(("problem", "planner", *OF_A_SPREAD), rows)]
+
     return "\n".join([*lines, ""])
 
 
@@ -73,8 +76,10 @@ def conditions(results: Iterable[Result], head: Mapping[str, Any]) -> str:
     machine = head["machine"]
     runs = 1 + max(run["run"] for result in results for run in result.runs)
     spread = "--scheduler ADDRESS" if machine["at a time"] == "a cluster" else f"--jobs {machine['at a time']}"
+
     command = f"rrtik bench {suite['name']} --runs {runs} {spread}"
     versions = ", ".join(f"{name} {machine[name]}" for name in ("rrtik-ompl", "ompl", "pin", "coal", "numpy", "python"))
+
     return (
         f"Written by `{command}`: {runs} runs of each planner on each problem, "
         f"{suite['seconds']:g} s each, {suite['memory_mb']:g} MB, seed {suite['seed']}. {machine['processor']}, "
@@ -87,6 +92,7 @@ def remark(results: Iterable[Result], head: Mapping[str, Any]) -> str:
     """What the figures are of, and how many paths came after the time limit."""
     limit = head["suite"]["seconds"]
     late = sum(seconds > limit for result in results for seconds in result.values("plan_seconds"))
+
     text = "Figures are over the runs with a valid path; single figures are medians."
     if late:
         text += f" {late} path(s) came after the limit of {limit:g} s: the last check of a path is not cut short."
@@ -108,12 +114,14 @@ def csv_text(results: Iterable[Result]) -> str:
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("problem", "planner", "solved", "valid", "total", "quantity", "unit", *Spread._fields))
+
     for result in results:
         counts = (result.label, result.planner, result.solved, result.valid, result.total)
         for quantity, (_, unit) in QUANTITIES.items():
             spread = result.spread(quantity)
             if spread is not None:
                 writer.writerow((*counts, quantity, unit, *spread))
+
     return text.getvalue()
 
 
