@@ -91,6 +91,7 @@ def check(
         return code
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
+
     from rrtik_ompl import load_path, load_problem
     from rrtik_ompl.cli.plan_report import faults_of_motion, faults_of_path, how_proven, path_lines
     from rrtik_ompl.cli.run_report import is_record, judged
@@ -100,26 +101,32 @@ def check(
 
     question = load_problem(problem)
     world = question.world
+
     if path is not None and proof is not None:
         return _certified(question, load_path(path, world.robot), load_certificate(proof), f"{proof}")
     if is_record(path):
         return _said(path, *judged(question, path))
+
     route = None if path is None else load_motion_or_path(path, world.robot)  # a bad file is refused at once
     kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
     _say_ends(question, kept)
+
     if path is None or route is None:
         suggest(command("plan", problem), command("show", problem))
         return FOUND
+
     faults = faults_of_motion(question, route) if isinstance(route, Trajectory) else faults_of_path(question, route)
     if faults:
         say(*(f"{path}: {fault}" for fault in faults))
         suggest(f"look at it: {command('show', problem, path)}")
         return NOT_FOUND
+
     see = f"see it: {command('show', problem, path)}"
     if isinstance(route, Trajectory):
         say(f"{path}: valid, {how_proven(question, route)}; {len(route.times)} points, {route.duration:.3f} s")
         suggest(see)
         return FOUND
+
     say(*(f"{path}: {line}" for line in path_lines(question, route, kept)))
     code = _beside(question, route, path)
     suggest(see, f"time it: {command('time', problem, path)}")
@@ -171,6 +178,7 @@ def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if le
         Kind.suites: list_suites,
         Kind.tasks: list_tasks,
     }
+
     for each in Kind if kind is None else (kind,):
         if kind is None:
             say(f"{each.value}:")
@@ -195,6 +203,7 @@ def convert(
     else:
         check_target(target, (".yaml", ".yml"))
         save_problem(load_problem(source, robot=robot), target)
+
     say(f"wrote {target}")
     return FOUND
 
@@ -241,9 +250,11 @@ MARKERS = "markers"  # a group of commands
 def command_line(given: list[str]) -> typer.Typer:
     """The command line, with no more than the command that is called: to read what each of them takes takes long."""
     called = given[:1] if given and given[0] in {*COMMANDS, MARKERS} else [*COMMANDS, MARKERS]
+
     # rrtik --install-completion, for bash, zsh and fish
     app = typer.Typer(help=HELP, add_completion=True, rich_markup_mode=None, pretty_exceptions_enable=False)
     app.callback()(_options)
+
     for name in called:
         if name == MARKERS:
             app.add_typer(markers, name=name)
@@ -261,6 +272,7 @@ def run(arguments: list[str] | None = None) -> int:
     """Run the command line with ``arguments`` (the process's own if None) and return the exit code."""
     prepare_terminal()
     given = sys.argv[1:] if arguments is None else arguments
+
     try:
         if not given and COMPLETING in os.environ:
             return _complete()
@@ -268,6 +280,7 @@ def run(arguments: list[str] | None = None) -> int:
             with redirect_stdout(sys.stderr):
                 command_line(given)(args=["--help"], prog_name="rrtik", standalone_mode=False)
             return BAD_INPUT
+
         with stoppable():
             code = command_line(given)(args=given, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()

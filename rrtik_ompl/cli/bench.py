@@ -44,6 +44,7 @@ def bench(
     folder = Path(f"bench-{campaign.name}") if out is None else out
     if scheduler is None:
         warm_up(lambda _: None)  # once, before processes that work side by side would all compile
+
     total = campaign.total
     outcomes: Counter[str] = Counter()
     so_far = Progress(0, total)
@@ -60,8 +61,10 @@ def bench(
         except KeyboardInterrupt:
             note(f"{so_far.done} of {total} runs are kept in {folder}; continue with --resume")
             raise
+
     with progress("reports"):
         results, files = write_report(file, views=views)
+
     if as_json:
         print(json.dumps({"runs": total, "outcomes": dict(outcomes), "files": [str(each) for each in files]}))
     else:

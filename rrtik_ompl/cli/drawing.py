@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.base.errors import InputError, ProblemError
-from rrtik_ompl.cli.terminal import ProblemName, note, progress, say, shown_names, suggest
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, note, progress, say, shown_names, suggest
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
@@ -52,8 +52,9 @@ def show(
 
     A robot is shown alone, or in a scene. Where the start is in collision, the bodies are red, and the exit code is 1.
     """
-    check_target(html, (".html", ".htm"))
+    check_target(html, PAGE_FORMATS)
     check_target(film, (".gif", ".mp4", ".png"))
+
     from rrtik_ompl import load_path
     from rrtik_ompl.motion.trajectory.load import load_motion_or_path
     from rrtik_ompl.viewer import view
@@ -62,6 +63,7 @@ def show(
     route = None if path is None else load_motion_or_path(path, robot)
     earlier = None if before is None else load_path(before, robot)
     title = fault or None
+
     if film is not None:
         from rrtik_ompl.viewer.film import film as write_film
 
@@ -69,6 +71,7 @@ def show(
             write_film(question, route, film, seconds=seconds)
     if html is not None:
         view(question, route, html=html, before=earlier, still=still, title=title)
+
     written = [file for file in (film, html) if file is not None]
     if written:
         say(*(f"wrote {file}" for file in written))
@@ -99,6 +102,7 @@ def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
         return question, question.robot, ""
     except ProblemError as error:
         fault = str(error)
+
     settings, start, goal = load_unchecked(name)
     note(fault)
     touching = contacts_along(World.of(settings), start[None])
@@ -146,6 +150,7 @@ def overlay(
     check_target(out, ENDINGS)
     if source.isdecimal() and not frames:
         raise InputError(f"camera {source} has no last picture; say --frames N")
+
     from rrtik_ompl import load_path, load_problem
     from rrtik_ompl.pilot.overlay.film import ArmInPictures, rate_of, write_film
     from rrtik_ompl.sensing.camera_file import load_camera
@@ -158,6 +163,7 @@ def overlay(
     sensor = Sensor(load_camera(camera), load_marker_map(marker_map))
     arm = ArmInPictures(task.robot, sensor, rows, seconds=seconds, ghosts=ghosts)
     rate, pictures = rate_of(islice(pictures_from(source), frames or None))
+
     with progress("drawing"):
         drawn = _drawn(arm, pictures, lambda: sensor.why_nothing(source))
         if out.suffix.lower() in ENDINGS[2:]:
@@ -165,6 +171,7 @@ def overlay(
             write_picture(last, out)
         else:
             write_film(out, drawn, rate)
+
     missing = f"; the first {arm.without_base} show no base and are unchanged" if arm.without_base else ""
     say(f"wrote {out}: {arm.count} pictures, {rate:g} a second{missing}")
     return 0

@@ -17,6 +17,7 @@ def main() -> None:
     usual = signal.getsignal(signal.SIGINT)
     if usual is signal.default_int_handler:  # not in a shell's background, where Ctrl-C is ignored
         signal.signal(signal.SIGINT, _leave)
+
     from rrtik_ompl.cli.app import INTERRUPTED, run
 
     signal.signal(signal.SIGINT, usual)
@@ -35,6 +36,7 @@ def _end(code: int, *, everything_else: bool) -> None:
         if watched or any(not t.daemon and t is not threading.main_thread() for t in threading.enumerate()):
             sys.exit(code)
         atexit._run_exitfuncs()  # noqa: SLF001 - as the interpreter would at its end
+
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):  # the reader may have gone
             stream.flush()

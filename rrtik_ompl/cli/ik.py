@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.cli.ik_rows import count, each, followed, milliseconds, point, refuse_orientation
-from rrtik_ompl.cli.terminal import note, progress, say, suggest
+from rrtik_ompl.cli.ik_rows import each, followed, milliseconds, point, refuse_orientation
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, note, plural, progress, say, suggest
 from rrtik_ompl.files.text import check_target, comma_numbers
 
 if TYPE_CHECKING:
@@ -98,14 +98,18 @@ def inverse_kinematics(
         raise InputError("--trajectory follows the rows of a file: give --poses FILE too")
     if poses is not None and (position or quaternion or rpy_deg or everything):
         raise InputError("--poses brings its own poses, one answer each: leave out --position, orientation and --all")
-    check_target(html, (".html", ".htm"))
+
+    check_target(html, PAGE_FORMATS)
     given = _setting(robot, problem, scene, near, near_deg)
     output = Output(as_json, as_csv, html)
+
     tolerances = _tolerances(tolerance_mm, tolerance_deg)
     common: dict[str, Any] = {"method": method, "near": given.near, "world": given.world, "seed": seed}
     common |= {} if seconds is None else {"seconds": seconds}
+
     if poses is not None:
         return _many(given, poses, trajectory, tolerances, common, output)
+
     goal = _goal(given, position, quaternion, rpy_deg, tolerances)
     return _one(given, goal, everything, common, output)
 
@@ -117,6 +121,7 @@ def _setting(
 
     if (robot is None) == (problem is None):
         raise InputError("give a robot, or --problem NAME, which brings its own: one of the two")
+
     if problem is not None:
         if scene is not None:
             raise InputError("--problem brings its own scene: leave out --scene")
@@ -125,6 +130,7 @@ def _setting(
     else:
         arm = load_robot(str(robot))
         given = Setting(arm, None if scene is None else World(arm, load_scene(scene)), None, None)
+
     return given._replace(near=_posture(given, near, near_deg))
 
 
@@ -135,6 +141,7 @@ def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, f
     for option, value in (("--tolerance-mm", millimetres), ("--tolerance-deg", degrees)):
         if value is not None:
             positive(value, option)
+
     found = {} if millimetres is None else {"position_tolerance": 1e-3 * millimetres}
     return found if degrees is None else {**found, "orientation_tolerance": math.radians(degrees)}
 
@@ -165,6 +172,7 @@ def _goal(
 
     if quaternion and rpy_deg:
         raise InputError("give one of --quaternion and --rpy-deg, not both")
+
     if position is None:
         if quaternion or rpy_deg or given.goal is None:
             raise InputError("where to? give --position X Y Z, --problem NAME with a goal, or --poses FILE")
@@ -175,6 +183,7 @@ def _goal(
         if tolerances:
             raise InputError("the goal of --problem has tolerances of its own: leave out --tolerance-mm and -deg")
         return given.goal
+
     if quaternion:
         return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
     if rpy_deg:
@@ -188,9 +197,11 @@ def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any]
 
     robot = given.robot
     world = given.world
+
     with progress(f"inverse kinematics of {robot.name}"):
         result, turns = ik_report.fold_full_turns(robot, solve_ik(robot, goal, all=everything, **common), given.near)
     names = ik_report.branch_names(robot, goal, result.solutions)
+
     if output.as_json:
         print(json.dumps(ik_report.document(robot, result, names, turns)))
     elif output.as_csv:
@@ -201,9 +212,10 @@ def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any]
         checked = world if world is not None and world.scene.obstacles else None
         clearances = [] if checked is None else [checked.clearance(q) for q in result.solutions]
         more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
-        say(f"{robot.name}, {result.method}: {count(len(result.solutions), 'solution')}{more}, {milliseconds(result)}")
+        say(f"{robot.name}, {result.method}: {plural(len(result.solutions), 'solution')}{more}, {milliseconds(result)}")
         say(ik_report.solutions_table(robot, result, names, turns, clearances, MAX_ROWS))
         say(*_more(len(result.solutions)))
+
     if not result.found and not output.as_json:
         tell = note if output.as_csv else say
         tell(f"{robot.name}, {result.method}: no solution, {result.reason}: {result.detail}")
@@ -229,11 +241,14 @@ def _many(
     rows = load_poses(file)
     if rows.ndim == 2:
         refuse_orientation(tolerances, "leave it out")
-    with progress(f"inverse kinematics of {count(len(rows), 'pose')}"):
+
+    with progress(f"inverse kinematics of {plural(len(rows), 'pose')}"):
         solve = followed if trajectory else each
         q, residuals, reasons, details, notes, line = solve(robot, rows, tolerances, common)
+
     found = sum(not reason for reason in reasons)
     line += next((f"; no. {k + 1}: {detail}" for k, detail in enumerate(details) if detail), "")
+
     if output.as_json:
         more = {"jumps": [k for k, note in enumerate(notes) if "jump" in note]} if trajectory else {}
         print(json.dumps({**ik_report.rows_document(robot, q, residuals, reasons, details), **more}))
@@ -241,9 +256,10 @@ def _many(
         print(ik_report.rows_csv(robot, q, residuals, reasons, notes), end="")
     else:
         shown = slice(MAX_ROWS)
-        say(f"{robot.name}: {found} of {count(len(rows), 'pose')} solved{line}")
+        say(f"{robot.name}: {found} of {plural(len(rows), 'pose')} solved{line}")
         say(ik_report.rows_table(robot, q[shown], residuals[shown], reasons[shown], notes[shown]))
         say(*_more(len(rows)))
+
     good = q[~np.isnan(q[:, 0])]
     if len(good):
         _draw(given, None, good, output, moving=trajectory)
@@ -256,6 +272,7 @@ def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, mo
         if not output.as_json and not output.as_csv:
             suggest("see it: --html ik.html", *(["every solution: --all"] if len(q) == 1 else []))
         return
+
     from rrtik_ompl import Scene
     from rrtik_ompl.viewer import view
     from rrtik_ompl.viewer.subject import Shown
@@ -263,13 +280,15 @@ def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, mo
     shown = Shown(given.robot, Scene() if given.world is None else given.world.scene, goal, q[0])
     name = given.robot.name
     question = None if moving and len(q) > 1 else _question(given, q)
+
     with progress("drawing"):
         if question is not None and len(q) == 1:
             view(question, html=output.html, title=f"{name}: drag the goal, the joints follow")
         elif moving and len(q) > 1:
-            view(shown, q, html=output.html, title=f"{name}: trajectory of {count(len(q), 'point')}")
+            view(shown, q, html=output.html, title=f"{name}: trajectory of {plural(len(q), 'point')}")
         else:
-            view(question or shown, ghosts=q, html=output.html, title=f"{name}: {count(len(q), 'solution')}")
+            view(question or shown, ghosts=q, html=output.html, title=f"{name}: {plural(len(q), 'solution')}")
+
     if not output.as_json and not output.as_csv:
         say(f"wrote {output.html}")
         suggest(f"open {output.html}")
@@ -283,11 +302,14 @@ def _question(given: Setting, q: Matrix) -> Problem | None:
 
     if not given.robot.collision.geometryObjects:
         return None
+
     world = World(given.robot) if given.world is None else given.world
     start = given.robot.clamp(np.zeros(given.robot.dof)) if given.near is None else given.near
+
     free = world.valid_batch(np.vstack([start, q]))
     if not free[1:].any():
         return None
+
     goal = q[np.argmax(free[1:])]
     return Problem(world, start if free[0] else goal, goal, name=given.robot.name)
 

@@ -36,10 +36,12 @@ def branch_names(robot: Robot, goal: TipGoal, Q: Matrix) -> list[str]:
     targets = _targets(robot, goal)
     if targets is None or len(Q) == 0:
         return [""] * len(Q)
+
     form = form_of(robot)
     found = solutions(robot, np.repeat(targets, len(Q), axis=0), near=Q, check=False)
     off = np.abs(joint_difference(robot, found.branches, Q[:, None])).max(axis=2)
     nearest = np.argmin(np.where(found.real, off, np.inf), axis=1)
+
     names = []
     for k, branch in enumerate(nearest):
         families = [name for bit, name in enumerate(form.families) if int(found.singular[k]) >> bit & 1]
@@ -66,12 +68,16 @@ def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tupl
     counted = whole & ~robot.continuous
     turned = result.solutions - TAU * np.round((result.solutions - posture) / TAU)
     Q = np.where(counted & (robot.lower <= turned) & (turned <= robot.upper), turned, result.solutions)
+
+    # Angles are the same where cosine and sine are.
     looks = np.hstack([np.where(whole, np.cos(Q), Q), np.where(whole, np.sin(Q), 0.0)])
     kept = different_rows(looks, np.linalg.norm(Q - posture, axis=1).argsort(kind="stable"))
     q = Q[kept][:, counted]
+
     lower = robot.lower[counted]
     upper = robot.upper[counted]
     fitting = 1.0 + np.floor((upper - q) / TAU) + np.floor((q - lower) / TAU)
+
     folded = replace(result, solutions=frozen(Q[kept]), residuals=frozen(result.residuals[kept]))
     return folded, [int(number) - 1 for number in fitting.prod(axis=1)]
 
@@ -110,8 +116,10 @@ def solutions_table(
     named = any(names)
     turned = any(turns)
     cleared = len(clearances) > 0
+
     heads = ["no.", *(["branch"] if named else []), *joint_heads(robot), "off [mm]", "off [deg]"]
     heads += ["by full turns"] * turned + ["clearance [mm]"] * cleared
+
     table = Table(*heads, right={*range(len(heads))} - ({1} if named else set()))
     for k, (q, residual) in enumerate(zip(result.solutions[:most], result.residuals[:most], strict=True)):
         cells = [str(k + 1), *([names[k]] if named else []), *_joint_cells(robot, q), *_residual_cells(residual)]
@@ -125,6 +133,7 @@ def rows_table(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str
     noted = any(notes)
     heads = ["no.", *joint_heads(robot), "off [mm]", "off [deg]", "no solution", *(["note"] if noted else [])]
     table = Table(*heads, right=range(robot.dof + 3))
+
     for k, (row, residual) in enumerate(zip(q, residuals, strict=True)):
         found = not reasons[k]
         cells = [*_joint_cells(robot, row), *_residual_cells(residual)] if found else [""] * (robot.dof + 2)
@@ -137,11 +146,13 @@ def rows_csv(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str],
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["number", *joint_heads(robot), "off [mm]", "off [deg]", "no solution", "note"])
+
     scale = np.where(robot.prismatic, 1.0, DEGREES)
     for k, (row, residual) in enumerate(zip(q * scale, residuals * [MILLIMETRES, DEGREES], strict=True)):
         found = not reasons[k]
         cells = [f"{value:.9g}" if found else "" for value in (*row, *residual)]
         writer.writerow([k + 1, *cells, reasons[k], notes[k]])
+
     return text.getvalue()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.cli.terminal import plural
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,10 +41,12 @@ def each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], 
     if rows.ndim == 3 and not tolerances:
         batch = solve_ik_batch(robot, rows, **common)
         return Solved(batch.q, batch.residuals, list(batch.reasons), list(batch.details), [""] * len(rows))
+
     q = np.full((len(rows), robot.dof), np.nan)
     residuals = np.full((len(rows), 2), np.nan)
     reasons = []
     details = []
+
     for k, row in enumerate(rows):
         goal = point(row, tolerances) if rows.ndim == 2 else PoseGoal(row, **tolerances)
         result = solve_ik(robot, goal, **{**common, "seed": common["seed"] + k})
@@ -52,6 +55,7 @@ def each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], 
         if result.found:
             q[k] = result.solutions[0]
             residuals[k] = result.residuals[0]
+
     return Solved(q, residuals, reasons, details, [""] * len(rows))
 
 
@@ -61,15 +65,18 @@ def followed(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, floa
 
     options: dict[str, Any] = dict(tolerances)
     done = solve_ik_trajectory(robot, rows, **common, **options)
+
     notes = [""] * len(rows)
     details = [""] * len(rows)
     for text, where in (("jump", done.jumps), ("collision on the way", done.blocked)):
         for k in where:
             notes[k] = f"{notes[k]}, {text}" if notes[k] else text
-    line = f", {count(len(done.jumps), 'jump')}, {done.method}, {milliseconds(done)}"
+
+    line = f", {plural(len(done.jumps), 'jump')}, {done.method}, {milliseconds(done)}"
     if done.detail:  # which names its point, counted from 0
         first = next(k for k, reason in enumerate(done.reasons) if reason)
         details[first] = done.detail.partition(": ")[2]
+
     return Solved(done.q, done.residuals, list(done.reasons), details, notes, line)
 
 
@@ -85,11 +92,6 @@ def refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
     """Refuse a tolerance of orientation where there is none."""
     if "orientation_tolerance" in tolerances:
         raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
-
-
-def count(number: int, noun: str) -> str:
-    """A number with its noun, in the plural if it is not 1."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def milliseconds(result: IkResult | IkTrajectory) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.cli.terminal import plural, progress, say
 from rrtik_ompl.cli.trust import with_trust
 from rrtik_ompl.files.text import check_target
 
@@ -70,7 +70,8 @@ def print_sheet(
         count = 1
     else:
         count = sheets.print_markers(out, _numbers(ids), side=1e-3 * side, dictionary=dictionary, paper=paper)
-    say(f"wrote {out}: {count} sheet{'s' if count > 1 else ''}; print at 100 % and measure the rule")
+
+    say(f"wrote {out}: {plural(count, 'sheet')}; print at 100 % and measure the rule")
     return 0
 
 
@@ -95,6 +96,7 @@ def calibrate_camera(
     one camera's photographs of the same moments in order, make a rig: its file, and one for each camera beside it.
     """
     check_target(out, SCENES)
+
     from rrtik_ompl.sensing.calibration import calibrate
     from rrtik_ompl.sensing.camera_file import save_camera
     from rrtik_ompl.sensing.cameras.pictures import pictures_from
@@ -107,10 +109,12 @@ def calibrate_camera(
         board = charuco_board(columns, rows, 1e-3 * square, 1e-3 * small, dictionary)
     if len(photographs) > 1:
         return _calibrate_rig(photographs, out, board)
+
     with progress("detecting the board"):
         taken = list(pictures_from(photographs[0]))
         found = calibrate([picture.pixels for picture in taken], board)
     save_camera(found, out)
+
     _tell(found, [picture.name for picture in taken])
     say(f"error {found.error:.3f} px over {sum(not r for r in found.unused)} photographs; wrote {out}")
     return 0
@@ -127,15 +131,18 @@ def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
     with progress("detecting the board"):
         moments = list(pictures_together([str(each) for each in photographs]))
         found = calibrate_rig([[each[k].pixels for each in moments] for k in range(len(photographs))], board)
+
     files = save_rig(found.rig, out)
     rig = found.rig
     for k, (each, file) in enumerate(zip(found.cameras, files, strict=True)):
         _tell(each, [f"{photographs[k].name}/{pictures[k].name}" for pictures in moments])
         say(f"camera {k + 1}: error {each.error:.3f} px; wrote {file}")
+
     for k, (T, count, error) in enumerate(zip(rig.poses[1:], found.moments, found.errors, strict=True), start=2):
         xyz = " ".join(f"{value:.4f}" for value in T.translation)
         rpy = " ".join(f"{value:.3f}" for value in np.degrees(matrixToRpy(T.rotation)))
         say(f"camera {k} in the frame of camera 1: xyz {xyz} m, rpy {rpy} deg, {error:.3f} px over {count} moments")
+
     turn = np.degrees(rig.rotation_sigma)
     say(f"+- {1e3 * rig.position_sigma:.2f} mm, +- {turn:.3f} deg; wrote {out}")
     return 0
@@ -145,9 +152,11 @@ def _tell(found: Calibration, names: list[str]) -> None:
     """What became of each photograph, and the numbers of the camera."""
     for name, error, unused in zip(names, found.view_errors, found.unused, strict=True):
         say(f"{name}: {unused or f'{error:.3f} px'}")
+
     values = found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
     heads = ("fx", "fy", "cx", "cy")
     say(", ".join(f"{n} {v:.2f} +- {s:.2f}" for n, v, s in zip(heads, values, found.sigmas, strict=True)))
+
     if found.camera.tone is not None:
         say(f"tone {found.camera.tone:.2f} (0: grey values are linear, 1: coded as sRGB)")
 
@@ -191,6 +200,7 @@ def sense(
     check_target(scene, SCENES)
     check_target(task, SCENES)
     check_target(picture, PICTURES)
+
     goal = _task_goal(task, problem, grasp)
     from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
     from rrtik_ompl.sensing.sensor import Sensor
@@ -198,9 +208,11 @@ def sense(
     alone = os.path.isdir(source[0]) if independent is None else independent
     eye = _camera_or_rig(source, camera, rig)
     sensor = Sensor(eye, load_marker_map(marker_map), smooth=not alone, sigmas=sigmas)
+
     view = None
     for view in _views(sensor, source, frames):
         say(json.dumps(view.document())) if as_json else say(*view.lines())
+
     if view is None or not view.seen:
         raise InputError(sensor.why_nothing(source[0]))
     if picture is not None:
@@ -223,6 +235,7 @@ def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tup
         raise InputError("--task FILE, --problem PROBLEM and --grasp OBJECT:TYPE:LEVEL go together; give all or none")
     if grasp is None:
         return "", "", 0
+
     name, _, rest = grasp.partition(":")
     kind, _, level = rest.partition(":")
     if not (name and kind and level.isdecimal()):
@@ -237,6 +250,7 @@ def _camera_or_rig(sources: list[str], camera: Path | None, rig: Path | None) ->
 
     if (camera is None) == (rig is None):
         raise InputError("give --camera FILE, or --rig FILE for several cameras that take pictures at the same time")
+
     if rig is not None:
         found = load_rig(rig)
         if len(sources) != len(found.cameras):
@@ -244,6 +258,7 @@ def _camera_or_rig(sources: list[str], camera: Path | None, rig: Path | None) ->
                 f"--rig {rig} has {len(found.cameras)} cameras and needs as many sources, got {len(sources)}"
             )
         return found
+
     if len(sources) > 1:
         raise InputError(f"{len(sources)} sources need --rig FILE, which says how their cameras stand to each other")
     return load_camera(str(camera))

@@ -48,9 +48,11 @@ def list_moves(
     if as_csv + as_json + spoken > 1:
         raise InputError("give one of --csv, --json and --spoken, not several")
     check_target(out, PATH_FORMATS)
+
     route = _path_of_moves(path, problem, shorten)
     if out is not None:
         route.save(out)
+
     from rrtik_ompl.cli import plan_report as report
     from rrtik_ompl.planning.moves import text as moves_text
 
@@ -90,14 +92,18 @@ def time_path(
     """
     check_target(out, TRAJECTORY_FORMATS)
     check_target(plot, PLOT_FORMATS)
+
     if rate is not None and out is None:
         raise InputError("--rate is that of the points in a file: give --out FILE too")
     if payload > 0.0 and not torque:
         raise InputError("--payload counts only for torques: give --torque too")
+
     texts = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
     given = {name: None if text is None else _rates(text, f"--{name}") for name, text in texts.items()}
+
     if not blend >= 0.0:
         raise InputError(f"--blend: expected 0 degrees or more, got {blend:g}")
+
     import numpy as np
 
     from rrtik_ompl import RateLimits, load_problem, plot_joints, time_parameterize
@@ -108,10 +114,12 @@ def time_path(
     task = load_problem(problem)
     robot = task.robot
     route = _valid_path(path, task)
+
     factors = np.where(robot.prismatic, 1.0, DEGREE)
     limits = RateLimits.of(
         robot, share=share, **{name: None if row is None else _scaled(row, factors) for name, row in given.items()}
     )
+
     with progress("timing"):
         found = time_parameterize(
             route,
@@ -123,10 +131,12 @@ def time_path(
             torque=torque or None,
             payload=payload,
         )
+
     if out is not None:
         found.save(out, rate=rate)
     if plot is not None:
         plot_joints(found, plot, limits=limits)
+
     if as_json:
         print(json.dumps(report.timing_document(task, found, limits)))
     else:
@@ -152,9 +162,11 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Join
         if not route.one_joint_at_a_time:
             raise InputError(f"{path}: moves several joints at once; give --problem NAME, and it is converted")
         return route
+
     task = load_problem(problem)
     route = _valid_path(path, task)
     _check_waypoints(path, route)
+
     with progress("converting"):
         if not route.one_joint_at_a_time:
             route = one_joint_moves(route, task)

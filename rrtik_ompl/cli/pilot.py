@@ -64,6 +64,7 @@ def pilot(
         raise InputError(f"one of {', '.join(SOURCES)} says where pictures come from; got {', '.join(named) or 'none'}")
     if replay is not None and (record is not None or arm is not None or master is not None):
         raise InputError("--replay shows what has happened: leave out --record, --arm and --master")
+
     from rrtik_ompl.pilot.setup import SessionOptions, open_session
     from rrtik_ompl.pilot.web.server import PilotServer
 
@@ -84,13 +85,16 @@ def pilot(
         seed=seed,
         sigmas=sigmas,
     )
+
     server = PilotServer(port, host, token, f"rrtik pilot · {problem}", certificate=certificate, key=key)
     with progress("preparing"):
         opened = open_session(options)
+
     try:
         _serve(server, opened, watch_only=replay is not None, browser=not no_browser)
     finally:
         opened.close()
+
     if opened.record.fault:
         raise InputError(opened.record.fault)
     if record is not None:
@@ -100,9 +104,9 @@ def pilot(
 
 def _second(given: str | None) -> int | Path | None:
     """A number of a camera, or a file."""
-    if given is None or not given.isdecimal():
-        return None if given is None else Path(given)
-    return int(given)
+    if given is None:
+        return None
+    return int(given) if given.isdecimal() else Path(given)
 
 
 def _serve(server: PilotServer, opened: OpenSession, *, watch_only: bool, browser: bool) -> None:
@@ -115,9 +119,11 @@ def _serve(server: PilotServer, opened: OpenSession, *, watch_only: bool, browse
             import webbrowser
 
             webbrowser.open(server.url)
+
         loop = Loop(opened.engine, server, watch_only=watch_only)
         reports = {"the page's server": lambda: server.reported, "the session": lambda: loop.reported, **opened.reports}
         watched = Watchdog(opened.engine.session.arm, reports, tell=note)
+
         with suppress(KeyboardInterrupt), watched as watchdog:
             loop.fault = lambda: watchdog.fault
             loop.run()

@@ -12,7 +12,7 @@ import typer
 
 from rrtik_ompl.base.choices import CommandShortening, Name, ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.cli.terminal import ProblemName, command, note, progress, say, suggest
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, command, note, progress, say, suggest
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.world.problem import Problem
 
 RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules
-
-
 SHORTEN: tuple[CommandShortening, ...] = get_args(CommandShortening)
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 
@@ -91,8 +89,9 @@ def plan(
     certificate was asked for and the path is not proven free.
     """
     check_target(out, PATH_FORMATS)
-    check_target(html, (".html", ".htm"))
+    check_target(html, PAGE_FORMATS)
     check_target(certificate, (".json",))
+
     from rrtik_ompl import load_problem
     from rrtik_ompl.cli import plan_report as report
     from rrtik_ompl.ompl_bridge.planner_names import AUTO, options_of
@@ -101,13 +100,24 @@ def plan(
     options_of(AUTO if planner is None else planner)
     options = _parameters(parameter or [])
     question = load_problem(problem)
+
     with progress(f"planning {question.name} with {planner or question.planner or AUTO}"):
-        limits: dict[str, Any] = {"seconds": seconds, "restarts": restarts, "proof": proof, "clearance": clearance}
-        limits["improve"] = improve
-        found = find_path(question, planner, seed=seed, parameters=options, **limits)
+        found = find_path(
+            question,
+            planner,
+            seconds=seconds,
+            seed=seed,
+            restarts=restarts,
+            parameters=options,
+            proof=proof,
+            clearance=clearance,
+            improve=improve,
+        )
+
     with progress("shortening"):
         rules = {name: value for name, value in options.items() if name in RULES}
         path, shorten_seconds = _shortened(found.path, question, shorten, found.seed, rules, clearance)
+
     lack = "" if path is None else _write(question, path, found.path, out, html, certificate, still=still)
     if as_json:
         print(json.dumps(report.document(question, found, path, shorten_seconds)))
@@ -115,6 +125,7 @@ def plan(
         say(*report.summary(question, found, path, shorten_seconds, named=planner))
         _say_path(path, (out, html, None if lack else certificate))
         suggest(*_next_steps(problem, path, out, html))
+
     if lack:
         note(lack)
     elif less := report.less_clearance(path, clearance):
@@ -161,6 +172,7 @@ def _write(
             view(problem, path, html=html, before=None if path is raw else raw, still=still)
     if certificate is None:
         return ""
+
     from rrtik_ompl.cli.plan_report import write_certificate
 
     return write_certificate(problem, path, certificate, beside=certificate == out)
@@ -180,9 +192,11 @@ def _shortened(
 
     if path is None or method == "none" or len(path.waypoints) < 2:
         return path, 0.0
+
     begin = time.perf_counter()
     kept = MoveRules.of_robot(problem.robot, **rules) if rules and path.one_joint_at_a_time else None
     limit = possible_clearance(problem.world, clearance, path.waypoints)
+
     shorter = shorten(path, problem, method=method, seed=seed, rules=kept, clearance=limit)
     return shorter, time.perf_counter() - begin
 
@@ -194,6 +208,7 @@ def _parameters(pairs: list[str]) -> dict[str, Any]:
         name, equals, value = pair.partition("=")
         if not equals or not name:
             raise InputError(f"--set {pair}: expected NAME=VALUE, for example --set range=0.5")
+
         try:
             found[name] = json.loads(value)
         except json.JSONDecodeError:

@@ -43,6 +43,7 @@ def waypoints_table(path: JointPath) -> Table:
     factors, units = zip(*map(shown_unit, path.prismatic), strict=True)
     heads = [f"{name} [{unit}]" for name, unit in zip(path.joint_names, units, strict=True)]
     table = Table("waypoint", *heads, right=range(len(heads) + 1))
+
     for number, row in enumerate(path.waypoints * factors, start=1):
         table.add_row(
             str(number),
@@ -58,10 +59,12 @@ def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     heads = [f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit")]
     numbers = range(1, len(heads) + 1)
     table = Table("joint", *heads, "unit", "switches/s", right=(*numbers, len(heads) + 2))
+
     often = motion_report(trajectory, limits).switches
     peaks = trajectory.peaks()
     words = ("jumps", "none")  # said of a peak, of a limit, that is infinite
     pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
+
     for k, name in enumerate(trajectory.joint_names):
         factor, unit = shown_unit(trajectory.prismatic[k])
         cells = (_rate(factor * float(row[k]), word) for pair in pairs for row, word in zip(pair, words, strict=True))
@@ -98,9 +101,11 @@ def summary(
     asked = named or problem.planner or AUTO
     why = "" if named == plan.planner else f" ({asked})" if is_auto(asked) else " (named by the problem)"
     planner = f"planner {plan.planner}{why}"
+
     lines = [f"problem {problem.name}, robot {problem.world.robot.name}, {planner}, seed {plan.seed}"]
     if plan.path is None or path is None:
         return [*lines, f"not found: {plan.reason}"]
+
     bound = fewest_moves(problem, plan)
     if path.one_joint_at_a_time:
         least = "" if bound is None else f" (no path can have fewer than {bound})"
@@ -111,12 +116,14 @@ def summary(
     else:
         size = f"{len(path.waypoints)} waypoints, length {path.length:.2f} {path.unit}"
         lines.append(f"{size}, several joints move at once")
+
     if "position_error" in plan.statistics:
         angle = np.degrees(plan.statistics["orientation_error"])
         turned = f" and {angle:.2g} deg" if problem.goal.oriented else ""
         lines.append(f"the tip ends {plan.statistics['position_error']:.2g} m{turned} from the goal")
     if plan.member is not None and len(problem.goal.parts) > 1:
         lines.append(f"it ends at goal {plan.member + 1} of {len(problem.goal.parts)}")
+
     checked = how_checked(problem.world, path.waypoints, path.proof)
     lines.append(f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; valid: {checked}")
     return lines
@@ -127,6 +134,7 @@ def less_clearance(path: JointPath | None, asked: float | None) -> str:
     proof = None if path is None else path.proof
     if proof is None or asked is None or not proof.proven or proof.clearance >= asked:
         return ""
+
     return (
         f"no path was found that keeps {1e3 * asked:g} mm from obstacles; this one keeps {1e3 * proof.clearance:g} mm"
     )
@@ -144,8 +152,10 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
         "seconds": {"plan": plan.seconds, "shorten": shorten_seconds},
         "statistics": dict(plan.statistics),
     }
+
     if path is None:
         return found
+
     proof = path.proof if path.proof is not None else problem.world.prove(path.waypoints)
     found |= {
         "length": path.length,
@@ -157,6 +167,7 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
         "joint_names": list(path.joint_names),
         "waypoints": path.waypoints.tolist(),
     }
+
     if path.one_joint_at_a_time:
         found["moves"] = moves_document(path)
     return found
@@ -196,6 +207,7 @@ def write_certificate(problem: Problem, path: JointPath, file: Path, *, beside: 
     proved = path if path.proven_in(problem.world) else path.proved(problem.world)
     if proved.proof is not None and proved.proof.unproven:
         return f"{file}: no certificate: the path is not proven free: {proved.proof.unproven[0]}"
+
     if beside:
         proved.save(file, proof=True)
     else:
@@ -219,6 +231,7 @@ def certified(problem: Problem, path: JointPath, found: Certificate) -> tuple[st
     faults = [verify_certificate(found, problem.world, path.waypoints), *wrong_ends(problem, path)]
     if any(faults):
         return f"does not hold: {next(filter(None, faults))}", False
+
     kept = f", {1e3 * found.clearance:g} mm kept from obstacles" if found.clearance else ""
     moves = len(found.motions)
     still = as_it_stands(problem.world.scene)
@@ -241,6 +254,7 @@ def _too_fast(robot: Robot, motion: Trajectory) -> list[str]:
     most = motion.peaks().velocity
     units = ["m/s" if slides else "rad/s" for slides in robot.prismatic]
     rows = zip(robot.joint_names, most.tolist(), robot.velocity.tolist(), units, strict=True)
+
     return [
         f"'{name}' goes at {rate:.4g} {unit}, its limit is {limit:.4g} {unit}"
         for name, rate, limit, unit in rows
@@ -252,8 +266,10 @@ def how_proven(problem: Problem, motion: Trajectory) -> str:
     """How much of a timed motion without faults is proven free, in a few words."""
     proof = motion.prove(problem.world)
     still = as_it_stands(problem.world.scene)
+
     if proof.proven:
         return f"proven free at every time{still}"
+
     proven = f"{proof.motions - len(proof.unproven)} of {proof.motions} pieces proven free"
     return f"{proven}, the others checked in steps{still}"
 
@@ -264,5 +280,6 @@ def path_lines(problem: Problem, route: JointPath, kept: str) -> list[str]:
     lines = []
     if any(body.kind == "obstacle" for body in world.bodies):
         lines.append(f"{clearance_along(world, route.waypoints)}{kept}")
+
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
     return [*lines, f"valid, {how_checked(world, route.waypoints)}; {size}"]

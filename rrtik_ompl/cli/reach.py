@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.cli.terminal import progress, say
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, progress, say
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.world.world import World
 
 
-MAP_FORMATS, PLOT_FORMATS, PAGE_FORMATS = (".npz", ".csv"), (".png", ".svg"), (".html", ".htm")
+MAP_FORMATS = (".npz", ".csv")
+PLOT_FORMATS = (".png", ".svg")
 LABELS = {
     "orientations": "share of 64 directions in which the tip was seen to point",
     "manipulability": "largest manipulability seen",
@@ -53,21 +54,26 @@ def reach(
     """Map where an arm can bring its tip."""
     for target, endings in ((out, MAP_FORMATS), (plot, PLOT_FORMATS), (html, PAGE_FORMATS)):
         check_target(target, endings)
+
     if effective:
         if out is not None or html is not None or as_json or scene is not None:
             raise InputError("--effective draws slices: give --plot FILE, and none of --out, --html, --json, --scene")
         return _effective(robot, plot)
+
     from rrtik_ompl import Scene, World, load_robot, load_scene
     from rrtik_ompl.ik.reach.sampling import reach_map
 
     arm = load_robot(robot)
     surroundings = load_scene(scene) if scene is not None else Scene() if free else None
     world = None if surroundings is None else World(arm, surroundings)
+
     with progress(f"sampling {samples} postures of {arm.name}"):
         found = reach_map(arm, measure=measure, cell=cell, samples=samples, world=world, axis=axis, seed=seed)
+
     if out is not None:
         found.save(out)
     _draw(arm if world is None else world, found, plot, html)
+
     if as_json:
         print(json.dumps(_document(found)))
     else:
@@ -81,6 +87,7 @@ def _effective(robot: str, plot: Path | None) -> int:
 
     with progress(f"effective workspace of {robot}"):
         slices = find_workspace(robot)()
+
     if plot is not None:
         plot_slices(slices, plot, title=f"{robot}: effective workspace", colors="Blues")
     say(*(f"{robot}, {each.title}" for each in slices), *([] if plot is None else [f"wrote {plot}"]))
@@ -93,6 +100,7 @@ def _draw(shown: Robot | World, found: ReachMap, plot: Path | None, html: Path |
         from rrtik_ompl.viewer.plots.reach import plot_slices
 
         plot_slices(found.slices(), plot, title=title, label=found.measure)
+
     if html is not None:
         from rrtik_ompl.viewer import view
         from rrtik_ompl.viewer.drawing.reach_marks import reach_marks
@@ -121,8 +129,10 @@ def _summary(found: ReachMap) -> list[str]:
     told = _document(found)
     if told["cells"] == 0:
         return [f"{found.robot}: no posture counted: all of them collide"]
+
     size = f"{found.area:.3g} m2" if found.flat else f"{found.volume:.3g} m3"
     place = ", ".join(f"{value:.2f}" for value in told["best"])
+
     return [
         f"{found.robot}: {told['cells']} cells of {1e3 * found.size:.0f} mm reached, {size}, "
         f"by {found.samples} samples",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.cli.terminal import note, progress, say
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, note, progress, say
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
@@ -54,8 +54,10 @@ def replan_scenario(
     """
     if predict is not None:
         raise InputError("--predict is now called --lookahead-ticks; use that")
-    check_target(html, (".html", ".htm"))
+
+    check_target(html, PAGE_FORMATS)
     check_target(record, (".json",))
+
     options: dict[str, Any] = {
         "planner": planner,
         "lookahead_ticks": lookahead_ticks,
@@ -65,10 +67,12 @@ def replan_scenario(
         "foreseen": foreseen or None,
     }
     given = {name: value for name, value in options.items() if value is not None}
+
     if replay is not None and given:
         raise InputError(
             f"--replay shows a run that is over: leave out --{next(iter(given)).replace('_', '-')}, or --replay"
         )
+
     from rrtik_ompl.replanning.scenario import load_scenario
 
     chosen = load_scenario(scenario)
@@ -81,11 +85,13 @@ def replan_scenario(
         run = made
     else:
         run = _recorded(replay, chosen.problem.name)
+
     if html is not None:
         from rrtik_ompl.viewer import view
 
         with progress("drawing"):
             view(chosen.problem, run=run, html=html)
+
     if as_json:
         print(json.dumps(run.figures()))
     else:
@@ -119,8 +125,10 @@ def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun 
         raise InputError(f"--foreseen: {others[0]} is for replanning; leave out one of them")
     if chosen.goal_feed is not None:
         raise InputError("--foreseen: the goal of this scenario moves; leave out --foreseen")
+
     changes = {name: given[name] for name in ("seconds", "clearance") if name in given}
     settings = replace(chosen.settings, **changes)  # checks them by the names that the options have
+
     with progress(f"{chosen.problem.name}, planned in time"):
         plan = plan_in_time(
             chosen.problem,
@@ -131,6 +139,7 @@ def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun 
             limits=settings.limits,
             seed=seed,
         )
+
     if plan.run is not None and "record" in given:
         plan.run.save(given["record"])
     return _in_options(plan.reason) if plan.run is None else plan.run

@@ -14,7 +14,7 @@ import typer
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.published.kept import Kept
 from rrtik_ompl.cli.published.page import HEADS, Row, Table, cells, counted, page, plain
-from rrtik_ompl.cli.terminal import note, progress, say
+from rrtik_ompl.cli.terminal import note, plural, progress, say
 from rrtik_ompl.files.text import check_target, write_text
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def reproduce(
     check_target(markdown, (".md",))
     offers = find_tables()
     known: dict[str, Table] = {table.name: table for offer in offers for table in offer.tables}
+
     if not known:
         raise InputError("no installed package offers published tables")
     if listed:
@@ -64,21 +65,27 @@ def reproduce(
         return 0
     if everything == bool(tables):
         raise InputError("which tables? give their names, or --all; `rrtik reproduce --list` shows them")
+
     also = {name: stem for offer in offers for name, stem in offer.also.items()}
     wanted = list(known.values()) if everything else chosen(known, tables or (), also)
+
     if plot is not None:
         return _draw(wanted, quick, plot)
-    note(f"{_count(len(wanted), 'table')}, about {_time(sum(_seconds(each, quick) for each in wanted))} on two cores")
+
+    note(f"{plural(len(wanted), 'table')}, about {_time(sum(_seconds(each, quick) for each in wanted))} on two cores")
     kept = Kept(markdown, quick)
+
     try:
         done = [(table, _rows(table, quick, kept, shown=not as_json)) for table in wanted]
     except KeyboardInterrupt:
         if kept.file is not None:
             note(f"what is done is kept in {kept.file}; the same command goes on from there")
         raise
+
     if markdown is not None:
         write_text(markdown, page(done, quick))
     kept.forget()
+
     if as_json:
         print(json.dumps({table.name: [plain(row) for row in rows] for table, rows in done}))
     else:
@@ -94,6 +101,7 @@ def _rows(table: Table, quick: bool, kept: Kept, *, shown: bool) -> Sequence[Row
     with progress(f"{table.name}: {table.title}, about {_time(_seconds(table, quick))}"):
         rows = table.run(quick) if known is None else known
     kept.add(table, rows)
+
     if shown:
         took = "kept from before" if known is not None else f"{time.perf_counter() - begin:.1f} s"
         say(f"{table.name}: {table.title} ({table.source}), {took}", *_fitted(table), _table(rows))
@@ -111,6 +119,7 @@ def _draw(tables: Iterable[Table], quick: bool, folder: Path) -> int:
     drawn = [(table, figure) for table in tables for figure in table.figures]
     if not drawn:
         raise InputError("--plot: none of these tables has a figure; `rrtik reproduce --list` marks those that have")
+
     make_folder(folder)
     for table, figure in drawn:
         file = folder / f"{figure.name}.png"
@@ -163,6 +172,7 @@ def _table(rows: Sequence[Row]) -> RichTable:
 
     shown = Table(*HEADS, box=box.SIMPLE_HEAD, pad_edge=False)
     shown.columns[-1].max_width = WIDTH
+
     for row in rows:
         shown.add_row(*cells(row))
     return shown
@@ -170,7 +180,3 @@ def _table(rows: Sequence[Row]) -> RichTable:
 
 def _time(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

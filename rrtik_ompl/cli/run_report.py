@@ -34,11 +34,14 @@ def judged(problem: Problem, file: Path) -> tuple[list[str], bool]:
             found = run.violations(problem)
         except InputError as error:
             raise in_file(file, error) from None
+
     moves, proven = run.moves
     if not found:
         return [f"{len(run.ticks)} ticks, nothing touches; {proven} of {moves} moves proven"], True
+
     lines = [str(violation) for violation in found[:MOST_LINES]]
     lines += [f"and {len(found) - MOST_LINES} more"] if len(found) > MOST_LINES else []
+
     touching = len({each.tick for each in found if each.touches})
     lines.append(f"{touching} of {len(run.ticks)} ticks touch something; {proven} of {moves} moves are called proven")
     return lines, False

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, command, progress, say, suggest
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, TRAJECTORY_FORMATS, command, progress, say, suggest
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -40,8 +40,10 @@ def straight(
     """
     if (by is None) == (to is None):
         raise typer.BadParameter("give the end of the line: '--by DX DY DZ' or '--to X Y Z', and only one of them.")
+
     check_target(out, PATH_FORMATS)
-    check_target(html, (".html", ".htm"))
+    check_target(html, PAGE_FORMATS)
+
     import numpy as np
 
     from rrtik_ompl import arc, load_problem
@@ -54,11 +56,13 @@ def straight(
     place = tip.translation + np.array(by) if by is not None else np.array(to)
     goal: Any = place if rpy_deg is None else pose_from_rpy(place, np.radians(rpy_deg))
     kept: dict[str, Any] = {"deviation": deviation, "clearance": clearance}
+
     with progress(f"following a line in {question.name}"):
         if through is None:
             made = follow(question.world, question.start, goal, **kept)
         else:
             made = arc(question.world, question.start, goal, through, **kept)
+
     written: list[Path] = []
     if made.path is not None and out is not None:
         made.path.save(out)
@@ -68,6 +72,7 @@ def straight(
 
         view(question.world, made.path, html=html, title=f"{question.name}: {100.0 * made.fraction:.4g} % of the line")
         written.append(html)
+
     waypoints = 0 if made.path is None else len(made.path.waypoints)
     if as_json:
         print(json.dumps({"fraction": made.fraction, "reason": made.reason, "waypoints": waypoints}))
@@ -103,21 +108,25 @@ def task(
     """
     check_target(out, (".json",))
     check_target(trajectory, TRAJECTORY_FORMATS)
-    check_target(html, (".html", ".htm"))
+    check_target(html, PAGE_FORMATS)
+
     from rrtik_ompl.tasks.plan_file import save_task_plan
     from rrtik_ompl.tasks.task_file import load_task
 
     loaded = load_task(task)
     with progress(f"planning {loaded.name}"):
         plan = loaded.task.plan(loaded.world, loaded.start, seconds=seconds, seed=seed)
+
     if plan.found and out is not None:
         save_task_plan(plan, out)
     duration = None if trajectory is None or not plan.found else _timed(plan, trajectory, share, pause)
+
     if plan.found and html is not None:
         from rrtik_ompl.viewer import view
 
         with progress("drawing"):
             view(loaded.world, plan, html=html, title=f"{loaded.name}: {len(plan.paths)} motions")
+
     if as_json:
         print(json.dumps({**_document(plan), "seed": seed, "duration": duration}))
     elif plan.found:
@@ -146,12 +155,15 @@ def task_plan_checked(name: str, *, beside: bool) -> int | None:
         return None
     if beside:
         raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--proof' out.")
+
     plan = load_task_plan(name)
     faults = plan.faults()
+
     paths = tuple(
         path.proved(world_of_motion(path, world, stage))
         for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True)
     )
+
     wrong = frozenset(number for number, motion in enumerate(faults) if motion)
     say(*_lines(name, replace(plan, paths=paths, notes=()), wrong))
     for number, world in enumerate(plan.worlds):
@@ -175,6 +187,7 @@ def _lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -> li
 
     chosen = f", alternatives {', '.join(str(k + 1) for k in plan.chosen)}" if plan.chosen else ""
     lines = [f"{name}: {len(plan.paths)} motions{chosen}{as_it_stands(plan.worlds[0].scene)}"]
+
     for number, (stage, path, world) in enumerate(zip(plan.stages, plan.paths, plan.worlds, strict=True)):
         names = ", ".join(item.name for item in world.scene.attached)
         proven = "not valid" if number in wrong else "proven free" if path.proven else "checked in steps"
@@ -189,5 +202,6 @@ def _timed(plan: TaskPlan, file: Path, share: float, pause: float) -> float:
 
     with progress("timing"):
         timed = time_task(plan, RateLimits.of(plan.worlds[0].robot, share=share), pause=pause)
+
     timed.trajectory.save(file)
     return timed.trajectory.duration

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rich.status import Status
 
 TRAJECTORY_FORMATS = (".json", ".csv", ".yaml", ".mcap")
+PAGE_FORMATS = (".html", ".htm")
 SPINNER_AFTER = 0.3  # [s]; what takes no longer is done before anybody has read what it is
 GAP = "   "  # between two columns
 AGAIN_SECONDS = 0.02  # until a Ctrl-C that was lost comes once more
@@ -124,8 +125,10 @@ def stoppable() -> Iterator[None]:
     if usual is not signal.default_int_handler or current_thread() is not main_thread():
         yield
         return
+
     signal.signal(signal.SIGINT, interrupted)
     sys.unraisablehook = lost
+
     try:
         yield
     except Exception as error:
@@ -143,10 +146,12 @@ def say(*items: Any) -> None:
         for item in items:
             print(item)
         return
+
     from rich.console import Console
 
     # Wider than any table: where there is less room lines are broken, but no number is cut.
     console = Console(highlight=False, soft_wrap=True, markup=False, width=1000)
+
     with console.capture() as captured:
         for item in items:
             console.print(item)
@@ -157,6 +162,11 @@ def suggest(*steps: str) -> None:
     """Say in a last line what may come next, where a person reads it: on a terminal, not in a file or a pipe."""
     if steps and sys.stdout.isatty():
         say(f"next: {'; '.join(steps)}")
+
+
+def plural(number: int, noun: str) -> str:
+    """A number with its noun: "1 pose", "2 poses"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def command(*words: object) -> str:
@@ -170,6 +180,7 @@ def progress(message: str) -> Iterator[None]:
     if not sys.stderr.isatty():
         yield
         return
+
     shown: list[Status] = []
 
     def show() -> None:
@@ -181,6 +192,7 @@ def progress(message: str) -> Iterator[None]:
     timer = Timer(SPINNER_AFTER, show)
     timer.daemon = True  # nobody waits for it if the program is to end
     timer.start()
+
     try:
         yield
     finally:
@@ -196,6 +208,7 @@ def counter(message: str, total: int) -> Iterator[Callable[[int], object]]:
     if not sys.stderr.isatty():
         yield lambda _: None
         return
+
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

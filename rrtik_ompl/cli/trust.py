@@ -25,6 +25,7 @@ def with_trust(command: Callable[..., int]) -> Callable[..., int]:
             return command(**given)
 
     option = inspect.Parameter("trust_xacro", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=TrustXacro)
+
     signature = inspect.signature(command, eval_str=True)  # typer looks names up where the wrapper is, not the command
     shown = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values()]
     run.__signature__ = signature.replace(parameters=[*shown, option])  # type: ignore[attr-defined]

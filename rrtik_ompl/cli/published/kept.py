@@ -47,6 +47,7 @@ class Kept:
         self.file = None if markdown is None else markdown.with_suffix(".parts.jsonl")
         self._round = f"{__version__} {'quick' if quick else 'full'}"
         self._lines: dict[str, str] = {}
+
         if self.file is not None and self.file.is_file():
             for line in read_text(self.file).splitlines():
                 self._lines[json.loads(line)["table"]] = line

@@ -112,11 +112,14 @@ def page(done: Done, quick: bool) -> str:
     command = f"rrtik reproduce {'--all' if len(done) > 1 else done[0][0].name}{' --quick' if quick else ''}"
     lines = ["# Published and measured", "", f"Written by `{command}`, rrtik-ompl {__version__}, {platform.machine()}."]
     lines += ["", MEANINGS, "", f"In all: {counted(done)}.", ""]
+
     rows = [(f"`{table.name}`", table.title, counted([(table, rows)])) for table, rows in done]
     lines += markdown_table(("table", "what", "verdicts"), rows)
+
     for table, each in done:
         lines += ["", f"## {table.title}", "", f"`{table.name}`, {table.source}", ""]
         lines += [f"Fitted to the published figures: {table.fitted}.", ""] if table.fitted else []
         lines += [f"Bars: {table.bars}.", ""] if table.bars else []
         lines += markdown_table(HEADS, map(cells, each))
+
     return "\n".join([*lines, ""])
