@@ -62,13 +62,12 @@ class ArmCache:
             covers: See :meth:`covers_of`.
             share: Whether the arm's part may be that of the tables packed last, and these are kept for the next world.
         """
-        outer, inner = ([both[k] for both in covers] for k in (0, 1))
         tables = FastWorld(
             self._robot.chain,
             bodies,
             pairs,
-            outer=outer,
-            inner=inner,
+            outer=[around for around, _ in covers],
+            inner=[inside for _, inside in covers],
             solids=of_each((body.geometry for body in bodies), convex_solids),
             strokes=strokes(self._robot),
             like=self._latest if share else None,

@@ -89,6 +89,7 @@ class Arrangement:
         numbers = self.numbers()
         if name not in numbers.obstacles:
             raise UnknownNameError("obstacle", name, numbers.obstacles)
+
         place = numbers.obstacles[name]
         obstacle = changed(self.scene.obstacles[place], pose=rigid(pose, f"pose of '{name}'"))
         placements = numbers.placements(obstacle)
@@ -127,10 +128,12 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
     solids = link_bodies(robot, self_margin) + scene_bodies(robot, scene.at(0.0), self_margin)
     bodies = Items(with_contacts(robot, scene, solids))
     pairs = colliding_pairs(robot, scene, bodies.whole)
+
     moving, standing = by_motion(bodies, pairs)
     arrays = body_arrays(bodies.whole)
     in_contact = tuple(pair for pair in moving if pair in arrays.contacts) if arrays.contacts else ()
     checked = tuple(pair for pair in moving if pair not in arrays.contacts) if arrays.contacts else moving
+
     return Arrangement(
         robot,
         scene,
@@ -169,6 +172,7 @@ class Numbers:
         for pair in standing:
             for k in pair:
                 fixed.setdefault(k, []).append(pair)
+
         return cls({each.name: k for k, each in enumerate(obstacles)}, numbers, fixed)
 
     def placements(self, obstacle: Obstacle) -> dict[int, pin.SE3]:

@@ -60,24 +60,30 @@ def clearance_on(world: World, course: Course) -> ClearanceCurve:
     """
     proof = course.prove(None)
     unproven = tuple(gap.motion for gap in proof.unproven)
+
     kept, pairs = _kept_at(world, course.at(course.motions, course.shares))
     certain = kept[~np.isin(course.motions, unproven)]
+
     lacking = int(np.searchsorted(LEVELS, proof.clearance)) - 1  # the last level below what is to be kept, or -1
     gaps = [(gap, lacking) for gap in proof.unproven]
     gaps += _nearer(course, int(certain.min()), set(unproven)) if certain.size else []
     gaps = [(gap, level) for gap, level in gaps if np.isfinite(gap.share)]
+
     if gaps:
         motions = np.array([gap.motion for gap, _ in gaps])
         shares = np.array([gap.share for gap, _ in gaps])
         more, _ = _kept_at(world, course.at(motions, shares))
         kept = np.append(kept, np.minimum(more, [level for _, level in gaps]))
         pairs = (*pairs, *((gap.first, gap.second) for gap, _ in gaps))
+
         motions = np.append(course.motions, motions)
         shares = np.append(course.shares, shares)
+
         order = np.lexsort((shares, motions))
         kept = kept[order]
         pairs = tuple(pairs[k] for k in order)
         course = replace(course, motions=motions[order], shares=shares[order])
+
     distances = LEVELS[np.maximum(kept, 0)]
     return ClearanceCurve(course.motions, frozen(course.shares), frozen(distances), pairs, unproven)
 
@@ -94,6 +100,7 @@ def _nearer(course: Course, least: int, unproven: set[int]) -> list[tuple[Gap, i
     proven = 0
     refused = least + 1
     tried = least
+
     while refused - proven > 1:
         short = [gap for gap in course.prove(float(LEVELS[tried])).unproven if gap.motion not in unproven]
         if short:
@@ -102,6 +109,7 @@ def _nearer(course: Course, least: int, unproven: set[int]) -> list[tuple[Gap, i
         else:
             proven = tried
         tried = (proven + refused) // 2
+
     return [(gap, proven) for gap in gaps]
 
 
@@ -135,6 +143,7 @@ def _kept_at(world: World, places: Matrix) -> tuple[NDArray[np.int64], tuple[tup
     kept = np.full(len(places), -1)
     refused = np.full(len(places), len(LEVELS))
     pairs = [("", "")] * len(places)
+
     while (open_ := np.flatnonzero(refused - kept > 1)).size:
         tried = (kept[open_] + refused[open_]) // 2
         for level in np.unique(tried).tolist():
@@ -144,5 +153,7 @@ def _kept_at(world: World, places: Matrix) -> tuple[NDArray[np.int64], tuple[tup
             for gap in gaps:
                 far[gap.motion] = False
                 pairs[group[gap.motion]] = (gap.first, gap.second)
-            kept[group[far]], refused[group[~far]] = level, level
+            kept[group[far]] = level
+            refused[group[~far]] = level
+
     return kept, tuple(pairs)

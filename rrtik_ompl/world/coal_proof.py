@@ -48,7 +48,9 @@ class CoalProof:
     """
 
     def __init__(self, robot: Robot, bodies: Sequence[Body], packed: ProofPairs) -> None:
-        self._robot, self._bodies, self.packed = robot, bodies, packed
+        self._robot = robot
+        self._bodies = bodies
+        self.packed = packed
         own = [body.kind != "obstacle" for body in bodies]
         meshes = np.array([mine and is_mesh(body.geometry) for mine, body in zip(own, bodies, strict=True)], dtype=bool)
         hollow = np.array([mesh and not is_closed(bodies[k].geometry) for k, mesh in enumerate(meshes)], dtype=bool)
@@ -67,8 +69,12 @@ class CoalProof:
         Returns:
             The numbers of two links, level and number of an interval in whose middle they are measured, shape (n, 4).
         """
-        margins, bodies, sides = self.packed.table[layout.MARGINS], self.packed.bodies, self.packed.sides
-        kept, told = margins.copy(), list[list[int]]()
+        margins = self.packed.table[layout.MARGINS]
+        bodies = self.packed.bodies
+        sides = self.packed.sides
+
+        kept = margins.copy()
+        told = list[list[int]]()
         try:
             while pair[0] >= 0 and self.links[pair[0]]:
                 intervals = self._intervals(motion, int(pair[0]), float(place[0]))
@@ -79,6 +85,7 @@ class CoalProof:
                 again()
         finally:
             margins[:] = kept
+
         return np.array(told, dtype=np.int64).reshape(-1, 4)
 
     def logged(self, motion: Matrix, pair: Numbers, place: Vector, run: Callable[[], object]) -> Told:
@@ -90,7 +97,7 @@ class CoalProof:
     def _intervals(self, motion: Matrix, row: int, place: float) -> list[tuple[int, int]]:
         """Level and number of intervals that cover a motion, on each of which the bodies of a pair are apart.
 
-        None if they are not apart in all of it. Where kernels gave up is looked at first.
+        None of them if they are not apart in all of it. Where kernels gave up is looked at first.
         """
         pair = [self._bodies[k] for k in self.packed.bodies[row].tolist()]
         kept = float(self.packed.table[layout.MARGINS][row]) + DISTANCE_TOLERANCE
@@ -101,11 +108,15 @@ class CoalProof:
         def room(share: float) -> float:
             return _gap(self._robot, pair, motion[0] + share * (motion[1] - motion[0])) - kept
 
-        open_, told, looks = [(0, 0)], list[tuple[int, int]](), 0
         if room(place) <= 0.0:
             return []
+
+        told = list[tuple[int, int]]()
+        open_ = [(0, 0)]
+        looks = 0
         while open_ and looks < MOST:
-            (level, number), looks = open_.pop(), looks + 1
+            level, number = open_.pop()
+            looks += 1
             width = 0.5**level
             spare = room((number + 0.5) * width)
             if spare <= 0.0 or (spare <= 0.5 * way * width and level == DEEPEST):
@@ -114,6 +125,7 @@ class CoalProof:
                 told.append((level, number))
             else:
                 open_ += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
+
         return [] if open_ else told
 
 

@@ -27,6 +27,7 @@ def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, end
     ways = packed.table[layout.WAYS].reshape(-1, 3)
     bases = packed.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_BASE]
     known: dict[tuple[int, int], tuple[int, Vector]] = {}
+
     for row in packed.touching:
         one, other = packed.sides[row, ::2].tolist()
         if (one, other) not in known:
@@ -39,12 +40,20 @@ def _normal(pair: tuple[Body, Body], frames: Matrix) -> tuple[int, Vector]:
     """Where two bodies are nearer to each other, 0 or 1, and there the unit vector from the first to the second."""
     if any(isinstance(body.geometry, CloudSolid) for body in pair):
         return 0, np.zeros(3)  # kernels look for their own
-    nearest, where, normal = np.inf, 0, np.zeros(3)
+
+    nearest = np.inf
+    where = 0
+    normal = np.zeros(3)
+
     for end in range(len(frames)):
         poses = (pin.SE3(frames[end, body.joint]) * body.placement for body in pair)
         first, second = (coal.Transform3s(pose.rotation, pose.translation) for pose in poses)
         ends = around(pair[0].geometry), first, around(pair[1].geometry), second
+
         result = coal.DistanceResult()
         if coal.distance(*ends, coal.DistanceRequest(), result) < nearest:
-            nearest, where, normal = result.min_distance, end, np.array(result.normal)
+            nearest = result.min_distance
+            where = end
+            normal = np.array(result.normal)
+
     return where, normal

@@ -46,6 +46,7 @@ def with_detours(
     """
     known = world.prover.route(rows, clearance=clearance) if proof is None else proof
     open_ = [gap.motion for gap in known.unproven]
+
     for _ in range(MOST_REPAIRS):
         if not open_:
             return rows
@@ -55,8 +56,10 @@ def with_detours(
             found = _repaired(world, rows, open_[0], clearance, rng)
         if found is None:
             return None
+
         grown = len(found.rows) - len(rows)
-        rows, open_ = found.rows, [motion + grown for motion in open_ if motion >= found.last]
+        rows = found.rows
+        open_ = [motion + grown for motion in open_ if motion >= found.last]
     return None
 
 
@@ -70,7 +73,8 @@ class Repair(NamedTuple):
 def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np.random.Generator) -> Repair | None:
     """The route with a detour around one of its motions, or around a stretch with that in the middle."""
     for more in range(WIDER):
-        first, last = max(motion - more, 0), min(motion + 1 + more, len(rows) - 1)
+        first = max(motion - more, 0)
+        last = min(motion + 1 + more, len(rows) - 1)
         via = _via(world, rows[first : last + 1], clearance, rng)
         if via is not None:
             return Repair(np.vstack([rows[: first + 1], via, rows[last:]]), last)
@@ -79,16 +83,20 @@ def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np
 
 def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> Repair | None:
     """The route with one of its moves made beside its place: another joint moves away before and back afterwards."""
-    a, b = rows[motion], rows[motion + 1]
+    a = rows[motion]
+    b = rows[motion + 1]
     others = np.flatnonzero(a == b)
+
     sizes = np.array([sign * size for size in SIDESTEPS for sign in (1.0, -1.0)])
     tried = np.zeros((len(sizes), len(others), len(a)))
     tried[:, np.arange(len(others)), others] = sizes[:, None]
     steps: Matrix = tried.reshape(-1, len(a))
+
     proven = partial(world.prover.proven, clearance=clearance)
     steps = steps[proven(a + steps, b + steps)]  # beside the move
     steps = steps[proven(a + 0.0 * steps, a + steps)]  # out of its way
     steps = steps[proven(b + steps, b + 0.0 * steps)]  # and back to it
+
     if len(steps) == 0:
         return None
     return Repair(np.vstack([rows[: motion + 1], a + steps[0], b + steps[0], rows[motion + 1 :]]), motion + 1)
@@ -96,10 +104,12 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
 
 def _via(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
     """What to pass between the ends of a stretch, shape (0 or 1, dof), on proven motions; None if nothing is found."""
-    a, b = stretch[0], stretch[-1]
+    a = stretch[0]
+    b = stretch[-1]
     proven = partial(world.prover.proven, clearance=clearance)
     if len(stretch) > 2 and proven(a[None], b[None])[0]:
         return stretch[:0]
+
     length = length_of(stretch)
     for size in SIZES:
         points = _near(world, stretch, size * length, rng)

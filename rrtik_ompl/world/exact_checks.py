@@ -94,7 +94,8 @@ class ExactChecker:
                 return None
             tables = taken
 
-        motions, self.motions = self.motions, {}
+        motions = self.motions
+        self.motions = {}
         return replace(self, solids=solids, bodies=bodies, tables=tables, motions=motions)
 
     def _packed(self) -> FastWorld:
@@ -116,12 +117,14 @@ class ExactChecker:
         """
         answers = self.fast.classify(self._robot.chain.joint_values(rows))
         free: Mask = answers == FREE
+
         if exact and not free.all():
             undecided = rows[answers == UNDECIDED]
             doubtful = self.fast.undecided_pairs(self._robot.chain.joint_values(undecided))
             configurations = pinocchio_rows(self._robot, undecided)
             apart = [self._gaps(full, pairs) is not None for full, pairs in zip(configurations, doubtful, strict=True)]
             free[answers == UNDECIDED] = apart
+
         if self.solids.in_contact:
             free[free] = self._contacts.proven(rows[free], rows[free])
         return free
@@ -151,11 +154,13 @@ class ExactChecker:
         sides = self._robot.chain.joint_values(starts), self._robot.chain.joint_values(ends)
         answers = self.fast.classify_edges(*sides, steps)
         free: Mask = answers == FREE
+
         if exact and to_be_proven:
             free |= answers == UNDECIDED
         elif exact:
             for k in np.flatnonzero(answers == UNDECIDED):
                 free[k] = self._motion_free_by_coal(starts[k], ends[k], int(steps[k]))
+
         if self.solids.in_contact:
             free[free] = self._contacts.proven(starts[free], ends[free])
         return free
@@ -169,22 +174,27 @@ class ExactChecker:
         order = spread_order(steps)
         rows = (1.0 - order / steps)[:, None] * start + (order / steps)[:, None] * end
         undecided = self.fast.classify(self._robot.chain.joint_values(rows)) != FREE
-        rows, order = rows[undecided], order[undecided]
+        rows = rows[undecided]
+        order = order[undecided]
+
         doubtful = self.fast.undecided_pairs(self._robot.chain.joint_values(rows))
         travel = np.abs(end - start)
         cleared: dict[tuple[int, int], Mask] = {}
         configurations = pinocchio_rows(self._robot, rows)
+
         for place, full, pairs in zip(order.astype(int).tolist(), configurations, doubtful, strict=True):
             left = [pair for pair in pairs if pair not in cleared or not cleared[pair][place]]
             gaps = self._gaps(full, left) if left else []
             if gaps is None:
                 return False
+
             for pair, gap in zip(left, gaps, strict=True):
                 approach = float(self.solids.approaches()[pair] @ travel)  # [m] along the whole motion
                 certain = max(gap - DISTANCE_TOLERANCE, 0.0)
                 reach = int(min(steps * certain / approach, steps)) if approach > 0.0 else steps
                 mask = cleared.setdefault(pair, np.zeros(steps + 1, dtype=bool))
                 mask[max(place - reach, 0) : place + reach + 1] = True
+
         return True
 
     def _gaps(self, full: Vector, pairs: list[tuple[int, int]]) -> list[float] | None:
@@ -203,11 +213,13 @@ class ExactChecker:
             for k in (i, j):
                 if k not in transforms:
                     transforms[k] = self._transform(k)
+
             ends = (self.bodies[i].geometry, transforms[i], self.bodies[j].geometry, transforms[j])
             gap = distance(*ends, kept_apart(self.bodies[i], self.bodies[j]))
             if gap is None:
                 return None
             gaps.append(gap)
+
         return None if self.solids.containment.between(pairs, self._data.oMi) else gaps
 
     def _transform(self, number: int) -> coal.Transform3s:
@@ -232,6 +244,7 @@ def distance(
     ends, margin = solids_of((first, first_pose, second, second_pose), margin)
     if is_ours(ends):
         return own_gap(ends, margin)
+
     first, _, second, _ = ends
     result = coal.CollisionResult()
     hulls = around(first), around(second)
@@ -239,6 +252,7 @@ def distance(
         return float(result.distance_lower_bound)
     if hulls[0] is first and hulls[1] is second:
         return None
+
     result = coal.CollisionResult()
     if coal.collide(*ends, request(margin), result):
         return None

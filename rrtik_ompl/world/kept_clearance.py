@@ -59,6 +59,7 @@ def rooms_between(world: World, ends: NDArray[np.float64], clearance: float | No
         for k in open_[kept].tolist():
             found[k] = room
         open_ = open_[~kept]
+
     return found
 
 
@@ -101,7 +102,8 @@ def leaving_room(world: World, room: Room) -> World:
     No point of the arm moves between two of them farther than twice what is kept beyond ``room.kept``, so that what is
     thin is not stepped over: in between, too, obstacles are that far away [16].
     """
-    wider, step = keeping(world, room.searched), 2.0 * (room.searched - room.kept)
+    wider = keeping(world, room.searched)
+    step = 2.0 * (room.searched - room.kept)
     return form_of(wider, motion_resolution=step) if FINEST_RESOLUTION <= step < world.motion_resolution else wider
 
 
@@ -118,6 +120,7 @@ def check_clearance(world: World, clearance: float | None, ends: dict[str, Matri
     """
     if clearance is None:
         return
+
     wanted = not_negative(clearance, "clearance")
     for what, q in ends.items():
         gap = next(iter(world.prover.route(q[None], clearance=wanted).unproven), None)
@@ -165,7 +168,8 @@ def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPat
 
 def _most(world: World, q: Matrix, refused: float) -> float:
     """The largest clearance that a configuration keeps [m], below one that it does not."""
-    low, high = 0.0, refused
+    low = 0.0
+    high = refused
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         kept = world.prover.proven(q[None], q[None], clearance=middle).all()

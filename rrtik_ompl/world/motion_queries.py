@@ -196,14 +196,17 @@ class BatchedMotionQueries:
         while first < len(tails):
             if stop():
                 raise OutOfTime
+
             begin = time.thread_time()
             last = first + self._batch
             parts.append(self._motions_free(tails[first:last], heads[first:last]))
             first = last
+
             if time.thread_time() - begin > CALL_TARGET_SECONDS:
                 self._batch = max(self._batch // 2, 1)
             else:
                 self._batch = min(2 * self._batch, LARGEST_BATCH)
+
         self.asked += len(tails)
         return np.concatenate(parts)
 

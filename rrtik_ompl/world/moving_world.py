@@ -18,12 +18,14 @@ from rrtik_ompl.geometry.collision.bodies import Body, Pairs, far_apart
 from rrtik_ompl.geometry.collision.certificate import distance, fixed_contact
 from rrtik_ompl.geometry.collision.cloud_solid import cloud_solid
 from rrtik_ompl.kernels import FREE, FastWorld
+from rrtik_ompl.kernels.proof.moving import MovedObstacles
+from rrtik_ompl.kernels.proof.packing import ProofPairs
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, pairs_that_may_touch
 from rrtik_ompl.model.shapes import PointCloud, same_shape
 from rrtik_ompl.world.arm_cache import arm_cache
-from rrtik_ompl.world.moving_proof import MovingProver
+from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.world import World
 
 SAME_PLACE = 1e-6  # [m] and of directions: of what a link holds, by which two scenes may differ
@@ -64,11 +66,15 @@ class MovingWorld:
         require(world, World, "world of a moving world", "use World(robot, scene)")
         if world.constraints is not None:
             raise InputError("world of a moving world: it has path constraints, which are not kept there; use .unheld")
+
         self._proving = world.settings.proving
         self._room = world.settings.clearance
         self.robot: Robot = world.robot
-        self.weights, self.motion_resolution = world.weights, world.motion_resolution
-        self.scene, self.checked = world.scene, 0
+        self.weights = world.weights
+        self.motion_resolution = world.motion_resolution
+        self.scene = world.scene
+        self.checked = 0
+
         names = {o.name for o in self.scene.obstacles} if moving is None else set(moving)
         roomy = [self._roomy(body, body.margin) for body in world.bodies]
         self._bodies, pairs, self._copy = _with_copies(roomy, world.pairs, names, copies)
@@ -76,19 +82,22 @@ class MovingWorld:
         kept = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
         if not self_collision:
             kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
+
         arm = arm_cache(self.robot)
         self._fast = arm.pack(self._bodies, kept, arm.covers_of(self._bodies), share=self_collision)
         self._motions: dict[tuple[bool, float], FastMotions] = {}
         self._inflation = [0.0] * len(self._bodies)
+
         self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
+
         first = tuple(roomy)  # copies, which come behind them, are not there yet
         own = tuple(p for p in kept if max(p) < len(first))
         self._prover = MovingProver(self.robot, first, own, always_colliding=bool(self.blocked))
 
     @property
     def fast(self) -> FastWorld | None:
-        """See the class."""
+        """The tables, for searches in kernels; None where these must not be asked, see the class."""
         return self._fast if self._fast.address and self._proving is None and not self.blocked else None
 
     @property
@@ -114,7 +123,6 @@ class MovingWorld:
                 an inflation is not 0 or more.
             UnknownNameError: If an inflation is given for what is no obstacle.
         """
-        places = [{o.name: o for o in scene.obstacles} for scene in scenes]
         for scene in scenes:
             _check_obstacles(scene, self._known)
             check_held(scene, self.scene)
@@ -124,16 +132,20 @@ class MovingWorld:
             if name not in self._known:
                 raise UnknownNameError("obstacle", name, self._known, where="inflation")
             not_negative(metres, f"inflation: that of '{name}'")
+
+        places = [{o.name: o for o in scene.obstacles} for scene in scenes]
         for k, body in enumerate(self._bodies):
-            if body.kind == "obstacle":
-                now = places[min(self._copy[k], len(places) - 1)][body.name]
-                solid = cloud_solid(now.shape) if isinstance(now.shape, PointCloud) else body.geometry
-                place = now.pose * body.within
-                here = solid is body.geometry and np.array_equal(place.homogeneous, body.placement.homogeneous)
-                if not here or now.margin + self._room != body.margin:
-                    self._bodies[k] = self._roomy(replace(body, placement=place, geometry=solid), now.margin)
-                if inflation is not None and body.name in inflation:
-                    self._inflation[k] = float(inflation[body.name])
+            if body.kind != "obstacle":
+                continue
+            now = places[min(self._copy[k], len(places) - 1)][body.name]
+            solid = cloud_solid(now.shape) if isinstance(now.shape, PointCloud) else body.geometry
+            place = now.pose * body.within
+            stays = solid is body.geometry and np.array_equal(place.homogeneous, body.placement.homogeneous)
+            if not stays or now.margin + self._room != body.margin:
+                self._bodies[k] = self._roomy(replace(body, placement=place, geometry=solid), now.margin)
+            if inflation is not None and body.name in inflation:
+                self._inflation[k] = float(inflation[body.name])
+
         self.scene = scenes[0]
         self.blocked = self._contact_of_base()
         self._fast.update_obstacles(self._bodies, self._inflation)
@@ -207,6 +219,34 @@ class MovingWorld:
         return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
 
 
+class MovingProver(Prover):
+    """Proofs among obstacles that are moved, from where they are now: their table is packed once, and written to."""
+
+    _fixed = False
+    _room: Sequence[float] | None = None
+    _moved: MovedObstacles | None = None
+
+    def place(self, bodies: Sequence[Body], room: Sequence[float], *, always_colliding: bool) -> None:
+        """Put obstacles where they are now; it costs nothing until something is to be proven.
+
+        Args:
+            bodies: As at the beginning, obstacles with other placements and margins.
+            room: For each body what is to be kept from it beside its margin [m]; read for obstacles.
+            always_colliding: Whether an obstacle touches what never moves: then nothing is proven.
+        """
+        self.bodies = tuple(bodies)
+        self._room = room
+        self.always_colliding = always_colliding
+
+    def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
+        if self._moved is None:
+            self._moved = MovedObstacles(super()._packed_for(clearance, slack), self.bodies)
+        if self._room is not None:
+            self._moved.put(self.bodies, self._room)
+            self._room = None
+        return super()._packed_for(clearance, slack)
+
+
 def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
     """Raise unless a scene has the obstacles that are known: their names and shapes; clouds may have other points."""
     if {o.name for o in scene.obstacles} != known.keys():
@@ -224,10 +264,13 @@ def check_held(scene: Scene, before: Scene) -> None:
     Raises:
         InputError: It names what is held.
     """
-    now, held = ({a.name: a for a in each.attached} for each in (scene, before))
+    now = {item.name: item for item in scene.attached}
+    held = {item.name: item for item in before.attached}
     if now.keys() != held.keys():
-        given, wanted = (", ".join(sorted(names)) or "nothing" for names in (now, held))
+        given = ", ".join(sorted(now)) or "nothing"
+        wanted = ", ".join(sorted(held)) or "nothing"
         raise InputError(f"scene: the arm held {wanted}, and now {given}; give scenes with the same attached objects")
+
     for name, item in now.items():
         if not _held_alike(item, held[name]):
             raise InputError(
@@ -237,18 +280,20 @@ def check_held(scene: Scene, before: Scene) -> None:
 
 def _held_alike(first: AttachedObject, second: AttachedObject) -> bool:
     """Whether the arm holds the same in the same way."""
-    numbers = ((each.link, set(each.allow), each.padding, each.margin) for each in (first, second))
-    same = next(numbers) == next(numbers)
+    joined = first.link == second.link and set(first.allow) == set(second.allow)
+    kept = first.padding == second.padding and first.margin == second.margin
     placed = np.allclose(first.pose.homogeneous, second.pose.homogeneous, rtol=0.0, atol=SAME_PLACE)
-    return same and placed and same_shape(first.shape, second.shape)
+    return joined and kept and placed and same_shape(first.shape, second.shape)
 
 
 def _with_copies(
     first: Sequence[Body], known: Pairs, names: set[str], copies: int
 ) -> tuple[list[Body], list[tuple[int, int]], dict[int, int]]:
     """Bodies and pairs of a world with further copies of some obstacles, and which copy each body is."""
-    bodies, pairs = list(first), list(known)
+    bodies = list(first)
+    pairs = list(known)
     number = dict.fromkeys(range(len(bodies)), 0)
+
     for k, body in enumerate(first):
         if body.kind == "obstacle" and body.name in names:
             for copy in range(1, copies):

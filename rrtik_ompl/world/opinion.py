@@ -44,11 +44,13 @@ def opinion_on(world: World, start: ArrayLike, goal: ArrayLike, waypoints: Array
     """
     Problem(world, start, goal)
     path = JointPath.of(world.robot, waypoints)
+
     faults = path.violations(world)
     if faults:
         return Opinion("refused", f"refused: move {faults[0].edge + 1}: {faults[0].reason}")
     if (path.start != start).any() or (path.end != goal).any():
         return Opinion("refused", "refused: the path does not lead from the start to the goal")
+
     proof = world.prove(path.waypoints)
     text = how_checked(world, path.waypoints, proof)
     if world.scene.obstacles:

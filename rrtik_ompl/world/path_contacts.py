@@ -30,6 +30,7 @@ def contacts_at(world: World, at: Vector, places: Matrix) -> tuple[PathContact, 
     bad = np.flatnonzero(~world.valid_batch(places))
     touching = {int(k): found for k in bad if (found := world.contacts(places[k]))}
     names = {k: frozenset(name for c in found for name in (c.first, c.second)) for k, found in touching.items()}
+
     stretches = []
     for (_, together), run in groupby(enumerate(touching), lambda item: (item[1] - item[0], names[item[1]])):
         numbers = [k for _, k in run]

@@ -31,6 +31,7 @@ def judged_path(rows: Matrix, world: World) -> Judged:
     """The verdict on a path, waypoints of shape (k, dof); if it is a single one, on the posture."""
     course = course_along(world, rows)
     found, faults = judged_course(world, course, partial(_faults_of_path, world, rows))
+
     unproven = found.verdict.unproven
     text = doubt = ""
     if len(rows) == 1:
@@ -40,6 +41,7 @@ def judged_path(rows: Matrix, world: World) -> Judged:
         doubt = f"{len(unproven)} move{'s' * (len(unproven) != 1)} not proven free"
     else:
         text = "every move is proven free"
+
     where = [f"move {k + 1}: {reason}" for k, _, reason in faults or ()]
     said = Verdict(not unproven, text, unproven, doubt)
     return replace(found, verdict=with_reason(said, world, where, checked=faults is not None))
@@ -52,14 +54,17 @@ def judged_course(
     curve = clearance_on(world, course) if world.scene.obstacles else None
     unproven = tuple(gap.motion for gap in course.prove(None).unproven) if curve is None else curve.unproven
     verdict = Verdict(not unproven, "", unproven)
+
     if curve is not None and not any(first for first, _ in curve.pairs):
         curve = None
     if not unproven:
         return Judged(verdict, curve, ()), []
+
     try:
         faults: list[Fault] | None = faults_of()
     except InputError:
         faults = None
+
     looked = course if curve is None else curve
     at = np.append(looked.motions + looked.shares, [piece + share for piece, share, _ in faults or ()])
     at = _with_ends(world, course, np.unique(at))
@@ -70,13 +75,16 @@ def _with_ends(world: World, course: Course, at: Vector) -> Vector:
     """Places, shape (m,), and those at which what is not free begins or ends between them."""
     free = world.valid_batch(_configurations(course, at))
     turns = np.flatnonzero(free[:-1] != free[1:])
+
     inside = np.where(free[turns], at[turns + 1], at[turns])
     outside = np.where(free[turns], at[turns], at[turns + 1])
+
     for _ in range(BISECTIONS if len(turns) else 0):
         middle = 0.5 * (inside + outside)
         ok = world.valid_batch(_configurations(course, middle))
         inside = np.where(ok, inside, middle)
         outside = np.where(ok, middle, outside)
+
     return np.union1d(at, inside)
 
 

@@ -103,6 +103,7 @@ class Problem:
             raise InputError(
                 "goal region: frame, from_start and allowances are for path constraints; a goal is of the tip"
             )
+
         if wanted.frames:
             goal_regions(world.robot, world.scene, wanted)  # refuses links that do not exist
 
@@ -161,6 +162,7 @@ def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Prob
         "planner": None,
         "world": world,
     }
+
     return restored(Problem, known)
 
 
@@ -182,14 +184,17 @@ def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[s
         ProblemError: If one is in collision, within an obstacle's margin or outside the limits.
         InputError: If one has the wrong number of joints or is not finite.
     """
-    robot, found = world.robot, {}
+    robot = world.robot
+    found = {}
     for what, values in ends.items():
         q = robot.configuration(values, what)
         if fault := robot.limit_fault(q):
             raise ProblemError(f"{what}: {fault}", part=what)
         found[what] = robot.onto_limits(q)
+
     rows = np.array(list(found.values()))
     world = world.unheld
+
     # both opinions must agree, for the path through them will be certified by the second one
     for opinion in (world.checks.free, world.checks.certified):
         for (what, q), free in zip(found.items(), opinion(rows).tolist(), strict=True):
@@ -203,17 +208,20 @@ def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
     touching = world.contacts(q)
     if not touching:
         return _not_touching(world, q, what)
+
     pairs = [(c.first, c.second) for c in touching]
     still = {body.name for body in world.bodies if body.joint == 0}
     fixed = [c for c in touching if {c.first, c.second} <= still]
     if fixed:
         remedy = "no joint moves either; move the obstacle or the base, or allow the pair"
         return ProblemError(f"{what} is in collision: {fixed[0]}; {remedy}", pairs, part=what)
+
     if touching and all(c.distance > 0.0 for c in touching):
         thick = any(body.padding for body in world.bodies)
         lower = "lower the margin" + (" or the padding" if thick else "")
         remedy = f"move it or {lower}" + (", or allow the pair" if world.self_margin or thick else "")
         return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
+
     clouds = {each.name for each in world.scene.obstacles if each.shape.sensed}
     own = ", take the arm's own points out by without_robot()," if any(clouds & set(pair) for pair in pairs) else ""
     return ProblemError(f"{what} is in collision: {world.explain(q)}; move it{own} or allow the pair", pairs, part=what)

@@ -114,9 +114,12 @@ class Prover:
         if len(rows) == 0:
             raise InputError("waypoints of a proof: expected one configuration or more")
         rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
-        values, count = self._joint_values(rows), len(rows) - 1
+
+        values = self._joint_values(rows)
+        count = len(rows) - 1
         sound = self._sound(rows, values)
         between = None if sound is None else sound[:-1] & sound[1:]
+
         gaps = self._gaps((rows, rows[1:]), (values, values[1:]), between, (clearance, slack), seconds)
         places = [replace(gap, _measure=partial(self._distance, rows, gap)) for gap in gaps]
         if self.constraints is not None:
@@ -143,20 +146,28 @@ class Prover:
             raise InputError(
                 f"a certificate names planes of solids, and '{clouds[0]}' is a cloud; plan.proven says as much"
             )
+
         told = self.logged(np.vstack([rows, rows]) if len(rows) == 1 else rows, clearance=clearance)
         if told is None:
             return None
+
         digests = robot_digest(self.robot), scene_digest(tuple(self.bodies), self.pairs)
         motions = tuple(_entries(*each) for each in told)
         return Certificate(self.robot.name, *digests, clearance, self.self_margin, frozen(rows), motions)
 
     def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[Told] | None:
         """By what each motion between waypoints, shape (k, dof), is proven; None if one of them is not."""
-        values, kernels = self._joint_values(rows), library(PROOF_KERNELS)
+        values = self._joint_values(rows)
+        kernels = library(PROOF_KERNELS)
         if kernels is None or not self.route(rows, clearance=clearance).proven:
             return None
-        told, coal = list[Told](), CoalProof(self.robot, self.bodies, packed := self._packed_for(clearance, SPARE))
-        pair, place = np.zeros(1, dtype=np.int32), np.zeros(1)
+
+        packed = self._packed_for(clearance, SPARE)
+        coal = CoalProof(self.robot, self.bodies, packed)
+        told = list[Told]()
+        pair = np.zeros(1, dtype=np.int32)
+        place = np.zeros(1)
+
         for k in range(len(rows) - 1):
             at = (values[k].ctypes.data, values[k + 1].ctypes.data, 1, pair.ctypes.data, place.ctypes.data)
             run = partial(kernels.prove, ProofTable(packed.table.address), *at)
@@ -174,10 +185,12 @@ class Prover:
     def _proven(self, clearance: float, starts: Matrix, ends: Matrix) -> Mask:
         if len(mask := np.ones(len(starts), dtype=bool)) == 0:
             return mask
+
         rows = np.concatenate([starts, ends])
         values = self._joint_values(rows)
         sound = self._sound(rows, values)
         both = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
+
         gaps = self._gaps((starts, ends), (values, values[len(starts) :]), both, (clearance, 0.0), None)
         mask[[gap.motion for gap in gaps]] = False
         if self.constraints is not None:
@@ -238,33 +251,46 @@ class Prover:
         """
         tails, heads = values
         count, joints = heads.shape
-        begin, looked, open_, kernels = time.monotonic(), 0, 0, library(PROOF_KERNELS)
+        begin = time.monotonic()
+        kernels = library(PROOF_KERNELS)
         if kernels is None or self.always_colliding:
             return [Gap(k, float("nan"), "", "") for k in range(count)]
+
         packed = self._packed_for(*kept)
         coal = self._coal_proof(packed)
-        pairs, places = np.full(count, NOT_LOOKED_AT, dtype=np.int32), np.full(count, np.nan)
         table = ProofTable(packed.table.address)
-        at, found, where = (tails.ctypes.data, heads.ctypes.data), pairs.ctypes.data, places.ctypes.data
-        at_once = 1 if packed.touching else MOTIONS_AT_ONCE
+        pairs = np.full(count, NOT_LOOKED_AT, dtype=np.int32)
+        places = np.full(count, np.nan)
+        read = tails.ctypes.data, heads.ctypes.data
+        written = pairs.ctypes.data, places.ctypes.data
+
+        def prove(first: int, number: int) -> int:
+            """Let the kernels prove so many of the motions, and write the pairs and places; how many stay open."""
+            skipped = DOUBLE * joints * first
+            sinks = written[0] + INT * first, written[1] + DOUBLE * first
+            return int(kernels.prove(table, read[0] + skipped, read[1] + skipped, number, *sinks))
+
+        looked = 0
+        open_ = 0
+        at_once = 1 if packed.touching else MOTIONS_AT_ONCE  # planes of contacts are suggested for one motion
         for first in range(0, count, at_once):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
-            skipped = DOUBLE * joints * first
-            number = min(at_once, count - first)
             if packed.touching:
                 suggest_planes(self.robot, self.bodies, packed, np.stack([rows[0][first], rows[1][first]]))
-            sinks = (found + INT * first, where + DOUBLE * first)
-            open_ += kernels.prove(table, at[0] + skipped, at[1] + skipped, number, *sinks)
+            number = min(at_once, count - first)
+            open_ += prove(first, number)
             looked += number
+
         if sound is not None:
-            pairs[~sound], places[~sound] = NOT_LOOKED_AT, np.nan
+            pairs[~sound] = NOT_LOOKED_AT
+            places[~sound] = np.nan
         elif open_ == 0 and looked == count:
             return []
+
         for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if coal.links[pairs[k]]):
-            skipped, sinks = DOUBLE * joints * k, (found + INT * k, where + DOUBLE * k)
-            again = partial(kernels.prove, table, at[0] + skipped, at[1] + skipped, 1, *sinks)
-            coal.settle(np.stack([rows[0][k], rows[1][k]]), pairs[k : k + 1], places[k : k + 1], again)
+            motion = np.stack([rows[0][k], rows[1][k]])
+            coal.settle(motion, pairs[k : k + 1], places[k : k + 1], partial(prove, k, 1))
         return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
@@ -304,9 +330,12 @@ def _entries(told: ProofLog, measured: NDArray[np.int64]) -> MotionEntries:
     intervals = told.intervals.copy()
     if len(intervals) and (intervals == intervals[0]).all():  # one interval alone is all of the motion
         intervals[:] = 0
+
     links = (told.solids[:, None, ::2] == measured[None, :, :2]).all(axis=2).any(axis=1)
     needed = ((intervals[:, 0] > 0) | told.normals.any(axis=1)) & ~links
+
     whole = np.insert(measured[:, :2], [1, 2], -1, axis=1)
-    solids, intervals = np.vstack([told.solids[needed], whole]), np.vstack([intervals[needed], measured[:, 2:]])
+    solids = np.vstack([told.solids[needed], whole])
+    intervals = np.vstack([intervals[needed], measured[:, 2:]])
     normals = np.vstack([told.normals[needed], np.zeros((len(measured), 3))])
     return MotionEntries(frozen(solids, np.int64), frozen(intervals, np.int64), frozen(normals))

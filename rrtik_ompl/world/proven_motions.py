@@ -42,13 +42,16 @@ class ProvenMotions(MotionQueries):
     accuracy: Accuracy = "conservative"
 
     def __init__(self, world: World, clearance: float) -> None:
-        fast, kernels = world.fast, library(KERNELS)
+        fast = world.fast
+        kernels = library(KERNELS)
         if fast is None or kernels is None:
             raise InputError("proven motions: the world has no kernels")
+
         self.robot: Robot = world.robot
         self.weights: Vector = world.weights
         self.motion_resolution = world.motion_resolution
         self.fast: FastWorld = fast
+
         chain = world.robot.chain
         self.motions = FastMotions(
             fast,
@@ -62,7 +65,8 @@ class ProvenMotions(MotionQueries):
 
     def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
         """Which straight motions A[k] -> B[k], shapes (m, n), are proven free, shape (m,)."""
-        starts, ends = np.ascontiguousarray(A), np.ascontiguousarray(B)
+        starts = np.ascontiguousarray(A)
+        ends = np.ascontiguousarray(B)
         answers = np.zeros(len(starts), dtype=np.int32)
         self.motions.make_ready()
         at = starts.ctypes.data, ends.ctypes.data

@@ -53,10 +53,13 @@ def without_robot(
     require(robot, Robot, "robot", "use load_robot(name or file)")
     require(scene, Scene | None, "scene", "use Scene(obstacles, attached)")
     kept = not_negative(bounded_array(margin, (), "margin"), "margin")
+
     place = pin.SE3.Identity() if pose is None else rigid(pose, "pose of a cloud")
     frames = robot.joint_frames(robot.configuration(q)[None])[0]
+
     held = [] if scene is None else [body for body in scene_bodies(robot, scene) if body.kind == "attached"]
     bodies = (*link_bodies(robot), *held)
+
     outside = np.ones(len(cloud.points), dtype=bool)
     for body, (balls, _) in zip(bodies, arm_cache(robot).covers_of(bodies), strict=True):
         from_body = (pin.SE3(frames[body.joint]) * body.placement).actInv(place)
@@ -66,15 +69,18 @@ def without_robot(
 
 def _on_body(cloud: PointCloud, from_body: pin.SE3, body: Body, balls: Matrix, margin: float) -> Mask:
     """Which points of a cloud, whose pose is seen from a body, are on it, shape (n,)."""
-    found = np.zeros(len(cloud.points), dtype=bool)
-    box, reach = body.geometry.aabb_local, margin + cloud.radius
+    box = body.geometry.aabb_local
+    reach = margin + cloud.radius
     points = cloud.points.astype(np.float64) @ from_body.rotation.T + from_body.translation
     inside = (points >= np.array(box.min_) - reach) & (points <= np.array(box.max_) + reach)
     near = np.flatnonzero(inside.all(axis=1))
+
+    found = np.zeros(len(cloud.points), dtype=bool)
     found[near] = len(balls) == 0  # what stands still and has a formula has no cover
     for ball in balls:
         close = np.linalg.norm(points[near] - ball[:3], axis=1) <= ball[3] + reach
         found[near[close]] = True
+
     here = coal.Transform3s()
     for k in np.flatnonzero(found).tolist():
         one = cloud_solid(PointCloud(points[k : k + 1], cloud.radius))

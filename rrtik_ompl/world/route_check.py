@@ -58,11 +58,14 @@ def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
     proof = known
     if proof is None or not proof.proven or proof.clearance < world.settings.kept:
         proof = world.prover.route(rows, clearance=world.settings.kept)
+
     if proof.proven:
         margins = "its margins and " if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
         kept = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""
         return f"proven free at every configuration{kept}{as_it_stands(world.scene)}"
-    sampled, first = len(proof.unproven), proof.unproven[0]
+
+    sampled = len(proof.unproven)
+    first = proof.unproven[0]
     where = f", first motion {first.motion + 1}" + (f" ('{first.first}' and '{first.second}')" if first.second else "")
     step = f"checked every {1e3 * verification_resolution(world):g} mm"
     proven = f"{proof.motions - sampled} of {proof.motions} motions proven free"
@@ -86,12 +89,14 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
         edges = {violation.edge for violation in broken}
         found = [*broken, *(violation for violation in others if violation.edge not in edges)]
         return tuple(sorted(found, key=lambda violation: violation.edge))
+
     counts = _steps(world, rows, resolution)
     if counts.sum() > MAX_CHECKS:
         raise InputError(
             f"path: {counts.sum():.1e} checks are too many (at most {MAX_CHECKS:.0e}); "
             f"raise motion_resolution, or check whether the joint values are rad and m"
         )
+
     open_ = np.flatnonzero(~world.prover.proven(rows[:-1], rows[1:], clearance=world.settings.kept))
     found = []
     for run in np.split(open_, np.flatnonzero(np.diff(open_) > 1) + 1) if len(open_) else ():

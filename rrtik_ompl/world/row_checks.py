@@ -87,12 +87,15 @@ class RowChecks:
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
         robot = self.settings.robot
         mask = inside_limits(robot, starts) & inside_limits(robot, ends) & (not self.solids.always_colliding)
+
         A, B = one_way(starts[mask], ends[mask])
         counts = step_counts(A, B, self.solids.weights, self.settings.motion_resolution)
+
         clearance = self.settings.proving
         mask[mask] = free = self.checker.motions_free(
             A, B, counts, exact=self._exact, to_be_proven=clearance is not None
         )
+
         if clearance is not None:
             mask[mask] = self.prover.proven(A[free], B[free], clearance=clearance)
         elif self.constraints is not None:  # a prover says that too

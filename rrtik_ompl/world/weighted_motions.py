@@ -39,19 +39,25 @@ class WeightedMotions(MotionQueries):
 
     def __init__(self, world: World, weights: Vector) -> None:
         robot: Robot = world.robot
-        self._world, self._scale = world, weights
+        self._world = world
+        self._scale = weights
+
         chain = replace(robot.chain, gain=frozen(robot.chain.gain / weights))
-        lower, upper = frozen(robot.lower * weights), frozen(robot.upper * weights)
+        lower = frozen(robot.lower * weights)
+        upper = frozen(robot.upper * weights)
         self.robot = replace(robot, chain=chain, lower=lower, upper=upper, joint_weights=MappingProxyType({}))
+
         motions: FastMotions | None = getattr(world, "motions", None)
         self.motions = None if motions is None else motions.scaled(weights)
         self.fast: FastWorld | None = None if motions is None else kernel_tables(world)
+
         self.constraints: HeldRegions | None = None
         self.free_motions: FastMotions | None = None
         if keeps_constraints(world):
             self.constraints = world.constraints.of_robot(self.robot)
             free = world.free_motions
             self.free_motions = None if free is None else free.scaled(weights)
+
         self.weights: Vector = world.weights / weights
         self.motion_resolution = float(world.motion_resolution)
         self.accuracy: Accuracy = "conservative" if is_conservative(world) else "exact"

@@ -97,6 +97,9 @@ class World(Judge):
         UnknownNameError: If there is no such accuracy.
     """
 
+    checks: ThreadOwn[RowChecks] = ThreadOwn()
+    resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
+
     def __init__(
         self,
         robot: Robot,
@@ -138,21 +141,10 @@ class World(Judge):
         """A copy answers as the world does, and may be used in another thread or process."""
         return like, (self.settings,)
 
-    checks: ThreadOwn[RowChecks] = ThreadOwn()
-    resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
-
-    @property
-    def constraints(self) -> HeldRegions | None:
-        """What is held; None if nothing is."""
-        return self.checks.constraints
-
-    @property
-    def prover(self) -> Prover:
-        """Proves motions free; where there are path constraints, free and held."""
-        return self.checks.prover
-
     def __repr__(self) -> str:
         return f"World({self._settings.summary})"
+
+    _repr_html_ = in_notebook
 
     @property
     def settings(self) -> WorldSettings:
@@ -183,6 +175,16 @@ class World(Judge):
     def self_margin(self) -> float:
         """How far links, and what they hold, must stay from each other where they must not touch [m]."""
         return self._settings.self_margin
+
+    @property
+    def constraints(self) -> HeldRegions | None:
+        """What is held; None if nothing is."""
+        return self.checks.constraints
+
+    @property
+    def prover(self) -> Prover:
+        """Proves motions free; where there are path constraints, free and held."""
+        return self.checks.prover
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -275,7 +277,6 @@ class World(Judge):
         return self.with_settings(motion_resolution=motion_resolution)
 
     refined = Renamed("with_resolution")
-    _repr_html_ = in_notebook
 
     def with_clearance(self, clearance: float) -> World:
         """The same world, where a distance [m] is kept from obstacles on top of their margins.
@@ -332,6 +333,7 @@ class World(Judge):
         checker = checks.checker.moved(solids, numbers)
         if checker is not None:
             CHECKERS.keep(checker, solids, checker.room)
+
         return form_of(self, scene=solids.scene)
 
     def valid(self, q: ArrayLike) -> bool:
@@ -430,9 +432,6 @@ class World(Judge):
         """
         return judged_path(self._rows(waypoints, 2), self)
 
-    def _proven_clearance(self, asked: float | None) -> float:
-        return self._settings.kept if asked is None else not_negative(asked, "clearance")
-
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
         size = self.motion_resolution if resolution is None else positive(resolution, "resolution", "give metres")
@@ -444,6 +443,7 @@ class World(Judge):
         kept = self.checks.checker.contacts_of_meshes_kept(rows)
         pairs = tuple(pair for pair in self.pairs if pair not in kept) if kept else self.pairs
         found = list(measured(self.bodies, pairs, self.robot.chain.joint_frames(rows)[0], near_only=True))
+
         if not found:
             shared = not kept and self._settings.clearance == 0.0
             certificate = self.checks.certificate if shared else Certificate(self.robot, self.bodies, pairs)
@@ -495,6 +495,7 @@ class World(Judge):
             return f"{apart}, {wanted}{_and_more(near)}"
         if self.constraints is not None and (breach := self.constraints.explain(row)):
             return breach
+
         if self.checks.free(row[None])[0]:
             return ""
         nearest = self.closest(row, known_free=True)
@@ -504,8 +505,12 @@ class World(Judge):
         """A second opinion on rows of Q, (m, dof) -> (m,), not by the checks of planners: proofs first, then coal."""
         return self.checks.certified(self._rows(Q, 2))
 
+    def _proven_clearance(self, asked: float | None) -> float:
+        return self._settings.kept if asked is None else not_negative(asked, "clearance")
+
     def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:
-        starts, ends = self._rows(A, 2), self._rows(B, 2)
+        starts = self._rows(A, 2)
+        ends = self._rows(B, 2)
         if len(starts) != len(ends):
             raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
         return starts, ends
@@ -534,7 +539,8 @@ def _world_of(settings: WorldSettings) -> World:
 
 def _checks_of(settings: WorldSettings) -> RowChecks:
     """What answers in a world of these settings."""
-    robot, scene = settings.robot, settings.scene
+    robot = settings.robot
+    scene = settings.scene
     solids = ARRANGEMENTS.of(robot, scene, settings.self_margin)
     while solids.doubts:  # each is said once
         warnings.warn(solids.doubts.pop(0), MeshWarning, stacklevel=3)

@@ -31,5 +31,6 @@ def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayL
     """
     require(certificate, Certificate, "certificate")
     require(world, World, "world of a certificate")
-    rows, least = number_rows(waypoints, "waypoints of a certificate"), not_negative(clearance, "clearance")
+    rows = number_rows(waypoints, "waypoints of a certificate")
+    least = not_negative(clearance, "clearance")
     return verify.verify_certificate(certificate, world, rows, clearance=least)
