@@ -141,11 +141,11 @@ def replan_with(
     called(clock, "clock")
     if record is not None:
         check_target(file_name(record), (".json",))
+
     source = problem.world.scene if scene_feed is None else scene_feed
-    answer, silence = (
-        seconds if feed_patience is None else positive(feed_patience, "feed_patience")
-        for seconds in (PATIENCE_SECONDS, SILENCE_SECONDS)
-    )
+    answer = PATIENCE_SECONDS if feed_patience is None else positive(feed_patience, "feed_patience")
+    silence = SILENCE_SECONDS if feed_patience is None else answer
+
     with ExitStack() as open_feeds:
         if isinstance(source, Scene):
             watch: Watch = feed_of(source)
@@ -163,7 +163,8 @@ def _run(loop: Loop, settings: ReplanSettings, record: str | os.PathLike[str] | 
         for number in range(int(settings.seconds * settings.rate) + 1):
             if not loop.tick(number):
                 return loop.run
-        loop.run.outcome, loop.run.reason = "out of time", loop.run.ticks[-1].reason or "still on its way"
+        loop.run.outcome = "out of time"
+        loop.run.reason = loop.run.ticks[-1].reason or "still on its way"
         return loop.run
     finally:
         if record is not None and loop.run.ticks:

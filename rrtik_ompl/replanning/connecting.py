@@ -71,13 +71,16 @@ class KernelConnect:
         self, world: KernelWorld, lower: Vector, upper: Vector, max_edge: float, seed: int, iterations: int = ITERATIONS
     ) -> None:
         self._search = ConnectSearch(world.motions, lower, upper, range_=max_edge)
-        self._rng, self._iterations, self.samples = np.random.default_rng(seed), iterations, 0
+        self._rng = np.random.default_rng(seed)
+        self._iterations = iterations
+        self.samples = 0
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
     ) -> Joined | None:
         """See :class:`Connect`; conservative: what the kernel cannot prove counts as blocked."""
-        seed, most = int(self._rng.integers(2**63)), self._iterations
+        seed = int(self._rng.integers(2**63))
+        most = self._iterations
         bridge = self._search.solve(first, second, seed, stop=stop, max_iterations=most)
         self.samples += int(self._search.statistics()["iterations"])
         return None if bridge is None else joined(first, bridge, second, chain=chain)
@@ -91,8 +94,12 @@ class PythonConnect:
     """
 
     def __init__(self, lower: Vector, upper: Vector, max_edge: float, seed: int, iterations: int = ITERATIONS) -> None:
-        self._lower, self._upper, self._max_edge = lower, upper, max_edge
-        self._rng, self._iterations, self.samples = np.random.default_rng(seed), iterations, 0
+        self._lower = lower
+        self._upper = upper
+        self._max_edge = max_edge
+        self._rng = np.random.default_rng(seed)
+        self._iterations = iterations
+        self.samples = 0
         self.trees: tuple[ConfigurationTree, ConfigurationTree] | None = None
 
     def __call__(
@@ -101,7 +108,8 @@ class PythonConnect:
         """See :class:`Connect`."""
         rules = ConnectRules(self._lower, self._upper, self._max_edge, max_iterations=self._iterations)
         search = RrtConnect(first, second, rules, one_by_one(motions), self._rng)
-        bridge, self.trees = search.run(stop), search.trees
+        bridge = search.run(stop)
+        self.trees = search.trees
         self.samples += search.iterations
         return None if bridge is None else joined(first, bridge, second, chain=chain)
 
@@ -110,7 +118,8 @@ class KernelCuts:
     """Random shortcuts of a route in a kernel, a fixed number of them (:mod:`rrtik_ompl.kernels.search.shortcut`)."""
 
     def __init__(self, world: KernelWorld, seed: int) -> None:
-        self._world, self._rng = world, np.random.default_rng(seed)
+        self._world = world
+        self._rng = np.random.default_rng(seed)
 
     def __call__(self, route: Matrix) -> Matrix:
         """The route, shape (k, n), shortened; all its edges must be free."""

@@ -56,17 +56,22 @@ def check_contacts(
     Raises:
         InputError: If a cloud does not keep its points.
     """
-    ticks, seconds = run.ticks, 1.0 / run.rate
+    ticks = run.ticks
+    seconds = 1.0 / run.rate
     shares = np.arange(samples_per_tick) / samples_per_tick
     rows = [a.q + (b.q - a.q) * s for a, b in pairwise(ticks) for s in shares] + [ticks[-1].q]
     times = [t.time + s * seconds for t in ticks[:-1] for s in shares] + [ticks[-1].time]
+
     first = source if isinstance(source, Scene) else source(0.0)
     gaps, names = _gaps(robot, np.array(rows), first, _poses(source, times))
-    contacts, done = [], set()
+
+    contacts = []
+    done = set()
     for sample in np.flatnonzero((gaps <= 0.0).any(axis=1)):
         if (tick := sample // samples_per_tick) not in done:
             done.add(tick)
             contacts.append((times[sample], ticks[tick].event, *names[int(gaps[sample].argmin())]))
+
     return ContactReport(tuple(contacts), max(float(gaps.min(initial=MAX_DISTANCE)), 0.0), len(times))
 
 
@@ -74,6 +79,7 @@ def _poses(source: Scene | Feed, times: list[float]) -> dict[str, NDArray[np.flo
     """Where each obstacle is at the times, shape (m, 4, 4)."""
     if isinstance(source, Scene):
         return {o.name: np.array([_place(o, time).homogeneous for time in times]) for o in source.obstacles}
+
     scenes = [source(time) for time in times]
     names = [o.name for o in scenes[0].obstacles]
     for name in names:
@@ -96,16 +102,20 @@ def _gaps(
     allowed = {frozenset(pair) for pair in scene.allowed_collisions}
     moving = [b for b in placed if b.kind == "obstacle"]
     pairs = [(a, o) for a in arm for o in moving if frozenset((a.name, o.name)) not in allowed and a.joint > 0]
+
     frames = robot.joint_frames(rows)
     arm_poses = {id(a): frames[:, a.joint] @ a.placement.homogeneous for a in arm}
     back = {o.name: o.pose.inverse() for o in scene.obstacles}
     own_poses = {id(o): own[o.name] @ (back[o.name] * o.placement).homogeneous for o in moving}  # of each piece
+
     gaps = np.full((len(rows), len(pairs)), np.inf)
     for k, (a, o) in enumerate(pairs):
-        arm_pose, own_pose = arm_poses[id(a)], own_poses[id(o)]
+        arm_pose = arm_poses[id(a)]
+        own_pose = own_poses[id(o)]
         near = np.flatnonzero(_sphere_distances(a, arm_pose, o, own_pose) < MAX_DISTANCE)
         for sample in near:
             gaps[sample, k] = _distance(a.geometry, arm_pose[sample], o.geometry, own_pose[sample])
+
     return gaps, [(a.name, o.name) for a, o in pairs]
 
 
@@ -116,6 +126,7 @@ def _sphere_distances(
     solids = [body.geometry for body in (first, second)]
     if isinstance(solids[1], coal.Halfspace):
         return np.full(len(first_poses), -np.inf)
+
     centres = [
         poses[:, :3, :3] @ np.array(solid.aabb_center) + poses[:, :3, 3]
         for poses, solid in zip((first_poses, second_poses), solids, strict=True)

@@ -24,7 +24,6 @@ from rrtik_ompl.world.motion_queries import MotionQueries
 MAX_CUTS = 24  # shortcut ends that are tried from one point of a path
 STRAIGHT_TOLERANCE = 1e-9  # change of the unit direction
 
-
 Post = Callable[[Matrix], Matrix]  # a free route, shape (k, n), made shorter
 
 
@@ -51,9 +50,14 @@ class DrrtCon:
     repairs_in_kernels: ClassVar[bool] = True
 
     def __init__(self, connect: Connect, max_edge: float, *, post: Post | None = None) -> None:
-        self.connect, self.max_edge, self.post = connect, max_edge, post
+        self.connect = connect
+        self.max_edge = max_edge
+        self.post = post
         self.path: Matrix | None = None
-        self.free, self.repairs = False, 0
+        self.free = False
+        self.repairs = 0
+
+        # Of the last check: points along the path, and which motions between them are blocked.
         self._dense = np.zeros((0, 0))
         self._hits: Mask = np.zeros(0, dtype=bool)
 
@@ -73,9 +77,11 @@ class DrrtCon:
         """
         starts = np.atleast_2d(start)
         usable = motions.valid_batch(np.vstack([starts, goals]))
-        first, last = starts[usable[: len(starts)]], goals[usable[len(starts) :]]
+        first = starts[usable[: len(starts)]]
+        last = goals[usable[len(starts) :]]
         if len(first) == 0 or len(last) == 0:
             return False
+
         found = self.connect(first, last, motions, stop, chain=False)
         if found is not None:  # the other starts do not lead to the one where it begins
             found = Joined(found.path[found.begin :], 0, found.end - found.begin)
@@ -105,21 +111,24 @@ class DrrtCon:
         goals = goals[motions.valid_batch(goals)]
         if self.path is None or len(goals) == 0:
             return False
+
         piece = points_along(self.path, 0.5 * self.max_edge)
         hit = np.flatnonzero(~motions.motion_valid_batch(piece[:-1], piece[1:]))
         piece = piece[: hit[0] + 1] if len(hit) else piece
         if not motions.valid_batch(piece[:1])[0]:
             return False
+
         found = self.connect(piece, goals, motions, stop, chain=False)
         if found is not None:
-            self.path, self.free = found.path, True
+            self.path = found.path
+            self.free = True
         return found is not None
 
     def advance(self, place: Vector, passed: int, motions: MotionQueries) -> None:
         """The robot has gone to ``place``, past ``passed`` waypoints: drop what lies behind it, shorten the rest."""
         free = self.free
         self.rejoin(place, passed)
-        self.free = free
+        self.free = free  # it was, so the part of it that is left is
         if self.path is not None and free and len(self.path) > 2:
             self.path = cut_from_start(self.path, 0.5 * self.max_edge, motions)
 
@@ -133,14 +142,17 @@ class DrrtCon:
     def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
         """Cut at the first hit seen from the robot and at the first one seen from the goal; join the two pieces."""
         hits = np.flatnonzero(self._hits)
-        first, last = int(hits[0]), int(hits[-1])
+        first = int(hits[0])
+        last = int(hits[-1])
         return self.connect(self._dense[: first + 1], self._dense[last + 1 :], motions, stop)
 
     def _take(self, found: Joined | None, motions: MotionQueries) -> bool:
         """Walk on along a new path, if there is one; what is new of it is shortened."""
         self.free = found is not None
         if found is not None:
-            path, begin, end = found.path, found.begin, found.end
+            path = found.path
+            begin = found.begin
+            end = found.end
             new = path[begin : end + 1]
             new = dense_sequential_cut(new, 0.5 * self.max_edge, motions) if self.post is None else self.post(new)
             self.path = without_points_between(np.vstack([path[:begin], new, path[end + 1 :]]))
@@ -181,7 +193,8 @@ def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> M
     :func:`rrtik_ompl.planning.shortening.sequential.sequential_cut` tries every waypoint and no others. Source:
     [1, ch. 5.3, method 1], as DRRT-Con uses it.
     """
-    done, rest = [path[:1]], path
+    done = [path[:1]]
+    rest = path
     while len(rest) > 2:
         rest = cut_from_start(rest, step, motions)
         done.append(rest[1:2])
@@ -196,9 +209,11 @@ def cut_from_start(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
     ends = np.unique(np.linspace(known, len(points) - 1, MAX_CUTS).round().astype(int))
     if known >= len(points):
         return path
+
     free = motions.motion_valid_batch(np.broadcast_to(path[0], (len(ends), path.shape[1])), points[ends])
     if not free.any():
         return path
+
     end = ends[np.flatnonzero(free)[-1]]
     return without_repeats(np.vstack([path[:1], points[end], path[edges[end] + 1 :]]))
 

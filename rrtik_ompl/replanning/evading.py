@@ -51,17 +51,23 @@ def evasion(
     moves = max_change * _directions(q, max_change, rng, path)
     moves *= np.minimum(step / np.linalg.norm(moves, axis=1), 1.0)[:, None]
     moves = np.vstack([np.zeros_like(q), *(speed * moves for speed in SPEED_SHARES)])
+
     near = ahead(0)
-    lower, upper = near.robot.lower, near.robot.upper
+    lower = near.robot.lower
+    upper = near.robot.upper
     ends = np.clip(q + moves, lower, upper)
-    middle, end = near.clearance(0.5 * (q + ends)), near.clearance(ends)
+    middle = near.clearance(0.5 * (q + ends))
+    end = near.clearance(ends)
+
     future = np.full(len(moves), np.inf)
     for ticks in HORIZON_TICKS:
         future = np.minimum(future, ahead(ticks).clearance(np.clip(q + ticks * moves, lower, upper)))
+
     least = end[0] - MAX_LOSS_SHARE * max(abs(end[0]), distance)
     usable = np.flatnonzero(np.minimum(middle, end) >= least)
     enough = np.minimum(end, 2.0 * distance) if end.max() >= distance else np.zeros_like(end)
     order = usable[np.lexsort((-future[usable], -enough[usable]))][:MAX_CANDIDATES]
+
     free = alone.motion_valid_batch(np.tile(q, (len(order), 1)), ends[order])
     best = int(order[np.flatnonzero(free)[0]]) if free.any() else 0
     return ends[best] if best else None

@@ -118,11 +118,13 @@ class Stream:
     def __init__(self, snapshots: Iterable[tuple[float, Scene] | Snapshot], patience: float = SILENCE_SECONDS) -> None:
         self._left: Iterator[Snapshot] = map(_snapshot, snapshots)
         self._patience = patience
+
         first = next(self._left, None)
         if first is None:
             raise InputError("scene feed: it holds no snapshot; give at least one pair of a time and a scene")
         if abs(first.time) > LATEST:
             raise InputError(f"scene feed: its times begin at {first.time:.16g}; give seconds, not milliseconds")
+
         self._begin = first.time
         self._now = replace(first, time=0.0)
         self._next: Snapshot | None = None
@@ -150,6 +152,7 @@ class Stream:
         given = next(self._left, None)
         if given is None:
             return None
+
         time = round(given.time - self._begin, 6)
         before = self._now.time
         if time < before:
@@ -161,6 +164,7 @@ class Stream:
         if self._count == 1 and time > self._patience:
             apart = f"the second scene comes {time:.6g} s after the first, feed_patience is {self._patience:g} s"
             raise InputError(f"scene feed: {apart}; give times in seconds, not milliseconds, or raise feed_patience")
+
         self._count += 1
         return replace(given, time=time)
 
@@ -186,7 +190,8 @@ class MotionTracker:
     def __init__(self, scene: Scene, bound: float | None) -> None:
         # a point's distance from its obstacle's origin counts where the obstacle turns
         self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in scene.obstacles}
-        self._bound, self._warned = bound, set[str]()
+        self._bound = bound
+        self._warned = set[str]()
         self._sightings: dict[str, tuple[float, Obstacle]] = {}
         self._velocities: dict[str, tuple[Vector, Vector]] = {}
         self._reshaped = set[str]()
@@ -197,12 +202,15 @@ class MotionTracker:
         """Measure what was seen; whether anything about the obstacles is new (at the first call: True)."""
         changed = {o.name for o in seen.scene.obstacles} != self._sightings.keys()
         self.faster_since = float("inf")
+
         for obstacle in seen.scene.obstacles:
-            name, when = obstacle.name, seen.seen_at(obstacle.name)
+            name = obstacle.name
+            when = seen.seen_at(obstacle.name)
             before, last = self._sightings.get(name, (when, obstacle))
             reshaped = not same_shape(obstacle.shape, last.shape)
             moved = not np.array_equal(last.pose.homogeneous, obstacle.pose.homogeneous)
             changed |= reshaped or moved or obstacle.margin != last.margin
+
             if reshaped:  # a cloud that was seen anew: its points may have moved
                 self.speeds.setdefault(name, 0.0)
                 self._reshaped.add(name)
@@ -211,6 +219,7 @@ class MotionTracker:
                 if moved:
                     self._measure(obstacle, last.pose, before, when)
             self._sightings[name] = (when, obstacle)
+
         return changed
 
     def later(self, scene: Scene, seconds: float, ages: Mapping[str, float] | None = None) -> Scene:
@@ -240,19 +249,24 @@ class MotionTracker:
         return dict.fromkeys(self._reshaped, (self._bound or 0.0) * seconds)
 
     def _measure(self, obstacle: Obstacle, old: pin.SE3, before: float, now: float) -> None:
-        name, seconds = obstacle.name, now - before
-        shift, turn = obstacle.pose.translation - old.translation, pin.log3(old.rotation.T @ obstacle.pose.rotation)
+        name = obstacle.name
+        seconds = now - before
+        shift = obstacle.pose.translation - old.translation
+        turn = pin.log3(old.rotation.T @ obstacle.pose.rotation)
         angle = float(np.linalg.norm(turn))
+
         if name in self._reshaped:
             self._radii[name] = max(self._radii[name], farthest(obstacle.shape, pin.SE3.Identity()))
         # a half-space has no farthest point
         rotation_path = self._radii[name] * angle if angle > ROTATION_NOISE else 0.0
         if not np.isfinite(rotation_path):
             raise turns_without_end(name)
+
         way = float(np.linalg.norm(shift)) + rotation_path
         speed = way / seconds
         self._velocities[name] = (shift / seconds, turn / seconds)
         self.speeds[name] = max(speed, self.speeds.get(name, 0.0))
+
         if self._bound is None or way <= SPEED_WARNING_RATIO * self._bound * (seconds + TIME_RESOLUTION):
             return
         self.faster_since = min(before, self.faster_since)
@@ -299,15 +313,15 @@ def stated_way(obstacle: Obstacle, seconds: float) -> float:
     motion = obstacle.motion
     if motion is None:
         return 0.0
+
     inside = motion.times[(motion.times > 0.0) & (motion.times < seconds)] if isinstance(motion, TimedPoses) else ()
     poses = [motion.pose_at(obstacle.pose, float(time)) for time in (0.0, *inside, seconds)]
     radius = farthest(obstacle.shape, pin.SE3.Identity())
     way = 0.0
     for a, b in pairwise(poses):
         angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
-        way += float(np.linalg.norm(b.translation - a.translation)) + (
-            radius * angle if angle > ROTATION_NOISE else 0.0
-        )
+        turned = radius * angle if angle > ROTATION_NOISE else 0.0
+        way += float(np.linalg.norm(b.translation - a.translation)) + turned
     return way + ROUNDING
 
 
@@ -321,7 +335,9 @@ class Travels:
     """
 
     def __init__(self, seconds: float, bound: float | None, measured: Mapping[str, float]) -> None:
-        self._seconds, self._bound, self._measured = seconds, bound, measured
+        self._seconds = seconds
+        self._bound = bound
+        self._measured = measured
 
     def since_seen(self, scene: Scene, ages: Mapping[str, float]) -> dict[str, float]:
         """How far each obstacle that moves may have gone since it was seen [m]; without a bound as fast as it was."""

@@ -36,15 +36,19 @@ def moving_scene(robot: Robot, count: int, speed: float, seed: int, *, seconds: 
     centre, reach = _reach(robot)
     steps = int(np.ceil(seconds / WAYPOINT_SECONDS))
     times = WAYPOINT_SECONDS * np.arange(steps + 1)
+
     obstacles = []
     for k in range(count):
         shape = _shape(rng, k, reach)
-        low, high = SHELL[0] * reach + shape.bounding_radius, SHELL[1] * reach
+        low = SHELL[0] * reach + shape.bounding_radius
+        high = SHELL[1] * reach
         places = _wander(rng, steps, speed * WAYPOINT_SECONDS, low, high) + centre
+
         turned = _rotation(rng)
         turns = turning_points(places)
         poses = [pin.SE3(turned, place) for place in places[turns]]
         obstacles.append(Obstacle(f"obstacle{k + 1}", shape, poses[0], TimedPoses(times[turns], poses)))
+
     return Scene(tuple(obstacles))
 
 
@@ -60,12 +64,14 @@ def moving_problem(
     world = World(robot, scene)
     clear = MovingWorld(world)
     clear.move(scene, inflation={o.name: room for o in scene.obstacles})
+
     rng = np.random.default_rng([seed, 1])
     lower, upper = (np.clip(ends, -0.5 * np.pi, 0.5 * np.pi) for ends in robot.finite_range())
     rows = rng.uniform(lower, upper, (ENDPOINT_SAMPLES, robot.dof))
     free = rows[clear.valid_batch(rows)]
     if len(free) < 2:
         raise InputError(f"no free start and goal among {count} obstacles; take fewer, or another seed than {seed}")
+
     far = int(np.argmax(np.linalg.norm(free[1:16] - free[0], axis=1))) + 1
     return Problem(world, free[0], free[far], name=f"{robot.name}_{count}_{seed}")
 
@@ -80,7 +86,8 @@ def turning_points(places: Matrix) -> NDArray[np.int64]:
 def _reach(robot: Robot) -> tuple[Vector, float]:
     """Position of the arm's base and how far its tip gets from there [m]."""
     rows = np.random.default_rng(0).uniform(*robot.finite_range(), (REACH_SAMPLES, robot.dof))
-    frames, tips = robot.joint_frames(rows), robot.fk_batch(rows)[:, :3, 3]
+    frames = robot.joint_frames(rows)
+    tips = robot.fk_batch(rows)[:, :3, 3]
     foot: Vector = frames[:, min(2, frames.shape[1] - 1), :3, 3].mean(axis=0)
     return foot, float(np.linalg.norm(tips - foot, axis=1).max())
 
@@ -98,7 +105,9 @@ def _shape(rng: np.random.Generator, number: int, reach: float) -> Shape:
 def _wander(rng: np.random.Generator, steps: int, length: float, low: float, high: float) -> Matrix:
     """Points ``length`` apart between two spheres about the origin, shape (steps + 1, 3)."""
     place = _direction(rng) * rng.uniform(low, high)
-    heading, places = _direction(rng), [place]
+    heading = _direction(rng)
+    places = [place]
+
     for _ in range(steps):
         if rng.random() < TURN_PROBABILITY:
             heading = _direction(rng)

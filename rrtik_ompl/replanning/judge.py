@@ -100,14 +100,17 @@ def run_violations(
     """
     if not ticks:
         return ()
+
     snapshots = _snapshots(ticks, scenes, problem.world.scene, truth)
     margin = float(problem.world.self_margin)
     found = dict[tuple[int, str, str], RunViolation]()
+
     for era in _eras(snapshots, ticks[-1].time):
-        for each in _Judged(problem.robot, ticks, era, margin, beside).violations():
+        for each in _EraJudge(problem.robot, ticks, era, margin, beside).violations():
             key = each.tick, each.first, each.second
             if key not in found or each.distance - each.kept < found[key].distance - found[key].kept:
                 found[key] = each
+
     return tuple(sorted(found.values(), key=lambda each: (each.time, each.first, each.second)))
 
 
@@ -150,6 +153,7 @@ def _eras(snapshots: Sequence[Snapshot], end: float) -> Iterator[_Era]:
     courses = {o.name: _course(snapshots, o) for o in snapshots[0].scene.obstacles}
     knots = np.unique([time for course in courses.values() if course is not None for time in _times(course)])
     begins = [0, *(k for k, (a, b) in enumerate(pairwise(snapshots), start=1) if not _alike(a.scene, b.scene))]
+
     for first, after in pairwise([*begins, len(snapshots)]):
         scene = snapshots[first].scene
         until = snapshots[after].time if after < len(snapshots) else end
@@ -163,6 +167,7 @@ def _course(snapshots: Sequence[Snapshot], obstacle: Obstacle) -> Motion | None:
     name = obstacle.name
     if snapshots[0].stated:
         return obstacle.motion
+
     seen = {each.seen_at(name): each.scene.obstacle(name).pose for each in snapshots}
     times = sorted(seen)
     places = [seen[time] for time in times]
@@ -185,46 +190,54 @@ def _alike(first: Scene, second: Scene) -> bool:
     return same and pairs_that_may_touch(first) == pairs_that_may_touch(second)
 
 
-class _Judged:
-    """What touches in an era of a run."""
+class _EraJudge:
+    """Says what touches in an era of a run."""
 
     def __init__(self, robot: Robot, ticks: Sequence[Tick], era: _Era, self_margin: float, beside: float) -> None:
-        self._robot, self._ticks, self._era = robot, ticks, era
+        self._robot = robot
+        self._ticks = ticks
+        self._era = era
+
         scene = era.scene
         bodies = (*link_bodies(robot, self_margin), *scene_bodies(robot, scene, self_margin))
         self._bodies = in_contact(robot, scene, bodies)
         self._pairs: Pairs = colliding_pairs(robot, scene, self._bodies)
         self._approach = approach_weights(robot, self._bodies, self._pairs)
         self._sides: NDArray[np.int64] = np.array(self._pairs, dtype=np.int64).reshape(-1, 2)
+
         self._obstacles = {o.name: o for o in scene.obstacles}
         own = {name: o.pose.inverse() for name, o in self._obstacles.items()}
-        obstacles = [body.kind == "obstacle" for body in self._bodies]
         self._within = [  # where each solid is in its joint's frame, or in that of its obstacle
-            (own[b.name] * b.placement if is_one else b.placement).homogeneous
-            for b, is_one in zip(self._bodies, obstacles, strict=True)
+            (own[body.name] * body.placement if body.kind == "obstacle" else body.placement).homogeneous
+            for body in self._bodies
         ]
+
         self._names = list(self._obstacles)
         places = {name: k for k, name in enumerate(self._names)}
-        self._carrier = np.array(
-            [places[b.name] if is_one else -1 for b, is_one in zip(self._bodies, obstacles, strict=True)]
-        )
+        self._carrier = np.array([places[b.name] if b.kind == "obstacle" else -1 for b in self._bodies])
+
         self._radii = np.array([farthest(o.shape, pin.SE3.Identity()) for o in self._obstacles.values()])
         self._balls = np.array([_ball(body) for body in self._bodies]).reshape(-1, 4)
+
         sides = [(self._bodies[i], self._bodies[j]) for i, j in self._pairs]
         self._least = np.array([min(contact_distance(*pair) or 0.0, 0.0) for pair in sides])
         self._kept = np.array([kept_apart(*pair) + (beside if _promised(*pair) else 0.0) for pair in sides])
 
     def violations(self) -> Iterator[RunViolation]:
-        """See the class."""
-        ticks, era = self._ticks, self._era
+        """Who is too near to whom, tick after tick; a pair may come several times in a tick."""
+        ticks = self._ticks
+        era = self._era
         if len(self._pairs) == 0:
             return
+
         for number, tick in enumerate(ticks):
             stands = number + 1 == len(ticks)  # the last one is a moment
             end = tick.time if stands else ticks[number + 1].time
-            begin, last = max(tick.time, era.begin), min(end, era.end)
+            begin = max(tick.time, era.begin)
+            last = min(end, era.end)
             if begin >= last and not (stands and era.last):
                 continue
+
             inside = era.knots[(era.knots > begin) & (era.knots < last)]
             times = [begin, *inside.tolist(), last]
             for a, b in pairwise(times):
@@ -234,11 +247,13 @@ class _Judged:
         """What is too near in a part of a tick in which all moves straight."""
         kept = self._kept if self._ticks[number].proven else self._least
         most = self._most_approach(number, begin, end)
+
         placed = self._placed(number, 0.5 * (begin + end))
         centres = np.einsum("kij,kj->ki", placed[:, :3, :3], self._balls[:, :3]) + placed[:, :3, 3]
         first, second = self._sides.T
         gaps = np.linalg.norm(centres[first] - centres[second], axis=1) - self._balls[first, 3] - self._balls[second, 3]
         near = ~(gaps > kept + 0.5 * most)  # NaN, of what has no end, is near
+
         for pair in np.flatnonzero(near).tolist():
             found = self._worst(number, pair, begin, end, float(kept[pair]), float(most[pair]))
             if found is not None:
@@ -256,13 +271,16 @@ class _Judged:
         ends = self._ends(number, pair, middle)
         if distance(*ends, margin=_less_rounding(room)) is not None:
             return None
+
         here = _signed(*ends)
         lacking = here <= _less_rounding(kept) or (kept < 0.0 and distance(*ends, margin=_less_rounding(kept)) is None)
         if most <= FINEST and not lacking:
             return None
+
         if lacking and most <= max(COARSEST, RELATIVE * (kept - here)):
             looks = [(time, _signed(*self._ends(number, pair, time))) for time in (begin, end)]
             return min((middle, here), *looks, key=lambda each: each[1])
+
         halves = ((begin, middle), (middle, end))
         found = [each for a, b in halves if (each := self._worst(number, pair, a, b, kept, 0.5 * most)) is not None]
         if lacking:

@@ -35,9 +35,12 @@ class KernelDrrtCon(DrrtCon):
     def __init__(
         self, world: MovingWorld, lower: Vector, upper: Vector, max_edge: float, seed: int, *, forgetting: bool = False
     ) -> None:
-        self._world, self._forgetting, self._rng = world, forgetting, np.random.default_rng([seed, 1])
+        self._world = world  # before the check, behind which its type is a lesser one
         if not has_kernels(world):
             raise InputError("replanning in kernels: the world has none; install numba")
+
+        self._forgetting = forgetting
+        self._rng = np.random.default_rng([seed, 1])
         super().__init__(KernelConnect(world, lower, upper, max_edge, seed), max_edge, post=KernelCuts(world, seed))
         tries, patience = (CUTS, PATIENCE) if forgetting else (REPAIR_CUTS, REPAIR_PATIENCE)
         self._kernels = PathRepair(

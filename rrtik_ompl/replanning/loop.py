@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_number
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_number
 from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.choices import TickEvent
 from rrtik_ompl.base.poses import pose_row
@@ -27,9 +27,8 @@ from rrtik_ompl.replanning.feed import (
 )
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
-from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs
+from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs, sampling_box
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.moving_world import MovingWorld, check_held
 from rrtik_ompl.world.problem import Problem
@@ -59,40 +58,47 @@ class Loop:
         patience: float = SILENCE_SECONDS,
     ) -> None:
         self._clock: Clock = lambda: finite_number(clock(), "clock: what it gives")
-        self._problem, self._feed, self._settings, self._goal_feed = problem, feed, settings, goal_feed
+        self._problem = problem
+        self._feed = feed
+        self._settings = settings
+        self._goal_feed = goal_feed
         self._patience = patience
+
         robot = problem.robot
         self._seen = self._watched(0.0)
         scene = self._seen.scene
         refuse_endless_turns(scene)
         first = problem.world.with_accuracy("exact").with_scene(scene)
         self._make_worlds(first)
+
         between = 0.5 * first.motion_resolution  # the margin holds between two checked configurations too
         self._kept = min(CLEARANCE, between) if settings.clearance is None else settings.clearance
         self._searched = between + (settings.clearance or 0.0)
+
         self._tracker = MotionTracker(scene, settings.speed_bound)
         self._travels = Travels(settings.tick, settings.speed_bound, self._tracker.speeds)
         self._max_change = settings.max_change(robot)
         self._rng = np.random.default_rng(settings.seed)
+
         self.q = problem.start
         self._goals = (
             every_goal(problem, self._alone, self._rng) if goal_feed is None else goal_now(robot, goal_feed, 0.0)
         )
-        self._first = {o.name: o.pose for o in scene.obstacles}
-        self._left = np.nan
-        self._distances: dict[str, float] = {}
+        self._first = {o.name: o.pose for o in scene.obstacles}  # a record tells of those that have moved since
+        self._left = np.nan  # [m]: the distance left at the end of the tick before
+        self._distances: dict[str, float] = {}  # [m] to be kept from each obstacle now
+
         self.run = ReplanRun(
             problem.name, robot.name, robot.joint_names, settings.planner, settings.seed, settings.step, settings.rate,
             settings.margin, settings.speed_bound, clearance=self._kept,
         )  # fmt: skip
+
         self._read_scene(0.0)
         self._world.move(scene, inflation=self._distances)  # a start may be where an obstacle is only predicted
         check_start(self.q, scene, first, self._world)
-        ends = np.vstack([self.q, self._goals])
-        lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
-        upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
-        self._box = lower, upper
-        self._planner = make_planner(settings, self._world, lower, upper)
+
+        self._box = sampling_box(robot, np.vstack([self.q, self._goals]))
+        self._planner = make_planner(settings, self._world, *self._box)
         self._distances = {}  # so that the first tick puts the predicted places in
 
     def _make_worlds(self, first: World) -> None:
@@ -106,31 +112,42 @@ class Loop:
 
     def tick(self, number: int) -> bool:
         """Do one tick and add it to the record; False when the run is over."""
-        now, begin = number * self._settings.tick, self._clock()
+        now = number * self._settings.tick
+        begin = self._clock()
+
         if self._arrived():
             self._record(now, self.q, "arrive", {}, 0, "")
             self.run.outcome = "arrived"
             return False
+
         if self._goal_feed is not None:
             self._goals = goal_now(self._problem.robot, self._goal_feed, now)
+
         spent: dict[str, float] = {}
         changed = self._measured(spent, "sense", self._read_scene, now)
         if now - self._seen.time > self._patience:
             return self._give_up(now)
         self._measured(spent, "retarget", self._follow_goal)
-        checked = self._world.checked
+
+        before_look = self._world.checked
         free = self._measured(spent, "look", self._check) if changed or not self._planner.free else True
+        checked = self._world.checked - before_look
+
         event: TickEvent = "walk"
-        checked = self._world.checked - checked
         if not free and not self._world.blocked:
-            event, before = "repair" if self._planner.path is not None else "plan", self._planner.path
+            event = "repair" if self._planner.path is not None else "plan"
+            before = self._planner.path
             free = self._measured(spent, event, self._repair)
             event = "walk" if free and self._planner.path is before else event
+
         here = self.q
         event, reason, place = self._early_evasion() or (self._go(event) if free else self._wait_or_evade())
-        self._left, path = self._distance_left(place), self._planner.path
+        self._left = self._distance_left(place)
+
+        path = self._planner.path
         moves = (place != here).any()
         proven = self._measured(spent, "prove", self._surely_free, here, place) if moves else None
+
         self._record(now, here, event, {**spent, "all": self._clock() - begin}, checked, reason, path, proven)
         self.q = place
         return True
@@ -140,7 +157,8 @@ class Loop:
         silent = f"no scene since {self._seen.time:.3g} s: the scene feed has ended, or has been silent for longer"
         reason = f"{silent} than feed_patience ({self._patience:g} s)"
         self._record(now, self.q, "wait", {}, 0, reason)
-        self.run.outcome, self.run.reason = "no scene", reason
+        self.run.outcome = "no scene"
+        self.run.reason = reason
         return False
 
     def _watched(self, now: float) -> Snapshot:
@@ -152,23 +170,31 @@ class Loop:
     def _read_scene(self, now: float) -> bool:
         """Read the scene; whether anything has moved, or may have since it was seen."""
         seen = self._watched(now)
-        scene, ages = seen.scene, seen.ages(now)
+        scene = seen.scene
+        ages = seen.ages(now)
+
         allows = self._allow(scene)
         changed = self._tracker.update(seen) or allows
         self._doubt_moves_since(self._tracker.faster_since)
         self._seen = seen
         self.run.see(seen)
+
         self._blind = self._settings.speed_bound is not None and max(ages.values(), default=0.0) > self._settings.tick
         self._aged = self._travels.since_seen(scene, ages)
+
+        # What to keep from each obstacle [m]: for what it may do in the tick, also for what it may have done since it
+        # was seen, and for what nobody has ruled out.
         clear = self._settings.margin + self._searched
         in_tick = self._travels.in_tick(scene)
         self._at_once = required_distances(scene, clear, in_tick)
         distances = required_distances(scene, clear, {name: way + self._aged[name] for name, way in in_tick.items()})
         self._ways = self._travels.possible(seen, ages)
         self._possible = None if self._ways is None else required_distances(scene, clear, self._ways)
+
         if not changed and distances == self._distances:
             return False
         self._distances = distances
+
         predicted = (self._tracker.later(scene, seconds, ages) for seconds in self._lookahead())
         self._world.move(scene, *predicted, inflation=distances)
         return True
@@ -193,7 +219,8 @@ class Loop:
 
     def _lookahead(self) -> list[float]:
         """Times from now at which obstacles are avoided where they are predicted to be [s]."""
-        ticks, last = self._settings.lookahead_ticks, PREDICTED_PLACES - 1
+        ticks = self._settings.lookahead_ticks
+        last = PREDICTED_PLACES - 1
         return [ticks * self._settings.tick * k / last for k in range(1, PREDICTED_PLACES)] if ticks else []
 
     def _follow_goal(self) -> bool:
@@ -217,8 +244,11 @@ class Loop:
 
     def _new_proven_path(self) -> bool:
         """Find a free path, if need be some more times until one is proven; the last one if none is."""
-        planner, before, stop = self._planner, self._planner.path, self._budget_ends()
+        planner = self._planner
+        before = self._planner.path
+        stop = self._budget_ends()
         found: Matrix | None = None
+
         for _ in range(TRIES):
             if not self._new_path(stop):
                 break
@@ -227,6 +257,7 @@ class Loop:
                 return True
             planner.path = before
             planner.check_path(self._world)
+
         if found is None:
             return False
         planner.path = found
@@ -272,13 +303,16 @@ class Loop:
 
     def _step(self) -> Vector:
         """Go a step along the path, round corners if that is free; the configuration of the robot then."""
-        path, settings = self._planner.path, self._settings
+        path = self._planner.path
+        settings = self._settings
         if path is None or len(path) < 2:
             return self.q
+
         place, passed = one_step(path, settings.step, self._max_change)
         round_corner = bool(passed) and self._world.motion_valid(self.q, place)
         if passed and not (round_corner and self._proven(self.q[None], place[None])):
             place, passed = to_first_corner(path, settings.step, self._max_change)
+
         if self._blind and not self._surely_free(self.q, place):
             return self.q
         self._planner.advance(place, passed, self._world)
@@ -299,11 +333,13 @@ class Loop:
         """Without a free path: wait, or evade an obstacle that is too near. Event, reason, configuration."""
         if self._world.blocked:
             return "wait", self._world.blocked, self.q
+
         if self._world.valid(self.q):
             path = self._planner.path
             goals = self._goals if path is None else path[-1:]
             reason = "there is no path" if self._world.valid_batch(goals).any() else "the goal is not free"
             return "wait", reason, self.q
+
         place = self._evasion()
         if place is None:
             return "wait", "an obstacle is too near, and every escape is blocked", self.q
@@ -321,7 +357,8 @@ class Loop:
 
     def _ahead(self, ticks: int) -> MovingWorld:
         """The world without self-collision so many ticks ahead; what cannot be predicted may have come nearer."""
-        seconds, now = ticks * self._settings.tick, self._world.scene
+        seconds = ticks * self._settings.tick
+        now = self._world.scene
         scene = self._tracker.later(now, seconds) if ticks else now
         unforeseen = self._tracker.unforeseen(seconds)
         room = {name: way + unforeseen.get(name, 0.0) for name, way in self._aged.items()}
@@ -333,7 +370,8 @@ class Loop:
 
     def _budget_ends(self) -> Stop:
         """When a search that begins now has used up the budget of a repair."""
-        clock, end = self._clock, self._clock() + self._settings.repair_seconds
+        clock = self._clock
+        end = self._clock() + self._settings.repair_seconds
         return lambda: clock() > end
 
     def _measured(self, spent: dict[str, float], name: str, work: Callable[..., bool], *arguments: Any) -> bool:
@@ -352,3 +390,38 @@ class Loop:
             if not np.array_equal(o.pose.homogeneous, self._first[o.name].homogeneous)
         }
         self.run.ticks.append(Tick(now, q, event, path, poses, spent, checked, reason, proven))
+
+
+def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:
+    """The configuration after a tick, and how many waypoints of the path lie behind it then.
+
+    Args:
+        path: Shape (k, n), k at least 2, the robot's configuration first.
+        step: Length of a step [unit of the space].
+        max_change: How far each joint can move in a tick, shape (n,).
+    """
+    left = 1.0  # of the tick
+    place = path[0]
+    passed = 0
+
+    for end in path[1:]:
+        edge = end - place
+        share = _share(edge, step, max_change)  # of a tick that the whole edge takes
+        if share > left:
+            return place + edge * (left / share), passed
+        left -= share
+        place = end
+        passed += 1
+    return place, passed - 1
+
+
+def to_first_corner(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:
+    """As :func:`one_step`, but no farther than the next waypoint."""
+    return one_step(path[:2], step, max_change)
+
+
+def _share(edge: Vector, step: float, max_change: Vector) -> float:
+    """How many ticks an edge takes."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rates = np.where(edge == 0.0, 0.0, np.abs(edge) / max_change)
+    return max(float(np.linalg.norm(edge)) / step, float(rates.max()))

@@ -24,7 +24,9 @@ class PatientFeed(Generic[Answer]):
     """
 
     def __init__(self, made: Callable[[], Callable[[float], Answer]], patience: float, what: str) -> None:
-        self._made, self._patience, self._what = made, patience, what
+        self._made = made
+        self._patience = patience
+        self._what = what
         self._times: queue.SimpleQueue[float | None] = queue.SimpleQueue()
         self._answers: queue.SimpleQueue[tuple[Answer | None, BaseException | None]] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._answer, daemon=True)
@@ -48,6 +50,7 @@ class PatientFeed(Generic[Answer]):
         except queue.Empty:
             late = f"no answer for {time:g} s within {self._patience:g} s, and the run was ended"
             raise InputError(f"{self._what}: {late}; is its source still there? feed_patience allows more") from None
+
         if error is not None:
             raise error
         return answer  # type: ignore[return-value]

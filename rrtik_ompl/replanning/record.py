@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from rrtik_ompl.base.errors import InputError, in_file, require
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
+from rrtik_ompl.model.judgement import Contact, Judged, PathContact, Verdict
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.shapes import PointCloud
 from rrtik_ompl.model.transitions import route_length
@@ -28,10 +29,8 @@ from rrtik_ompl.replanning.scenes_file import scenes_data, scenes_of
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.world.problem import Problem
 
-if TYPE_CHECKING:
-    from rrtik_ompl.model.judgement import Judged
-
 KIND = "replan_run"
+NOWHERE = np.full(3, np.nan)  # a fault tells of no place
 MOST_POINTS = 2_000_000  # of all clouds that a record keeps
 MAX_RECORD_BYTES = 512 * 1024 * 1024  # bytes of a record, half an hour of 20 obstacles at 50 Hz
 EVENTS: tuple[TickEvent, ...] = get_args(TickEvent)
@@ -129,9 +128,23 @@ class ReplanRun:
         Args:
             problem: That was run; None if it is not known, and nothing is judged anew.
         """
-        from rrtik_ompl.replanning.verdict import judged_run
+        made, proven = self.moves
+        unproven = {k for k, tick in enumerate(self.ticks) if tick.proven is False}
+        text = f"{proven} of {made} moves proven free when they were made" if made else "no move of it is called proven"
 
-        return judged_run(self, problem)
+        found: tuple[RunViolation, ...] = ()
+        if problem is not None:
+            try:
+                found = self.violations(problem)
+                text += "; judged anew: " + (f"{len(found)} faults, the first: {found[0]}" if found else "no fault")
+            except InputError as error:
+                text += f"; not judged anew: {error}"
+
+        unproven |= {each.tick for each in found}
+        last = len(self.ticks) - 2  # from the last tick on nothing is drawn
+        drawn = tuple(sorted({min(k, last) for k in unproven} if last >= 0 else ()))
+        contacts = tuple(_contact(each) for each in found)
+        return Judged(Verdict(made > 0 and proven == made and not found, text, drawn), None, contacts)
 
     @property
     def arrived(self) -> bool:
@@ -169,18 +182,21 @@ class ReplanRun:
         return np.array([tick.seconds[part] for tick in chosen if part in tick.seconds])
 
     def summary(self) -> str:
-        """One line for a person."""
+        """What has become of the run, in one line: outcome, repairs, waits, evasions, length and what is proven."""
+
+        def counted(event: TickEvent, noun: str) -> str:
+            number = self.count(event)
+            return f"{number} {noun}{'s' * (number != 1)}"
+
         repairs = self.seconds("repair", "repair")
         worst = f", the longest {1e3 * repairs.max():.1f} ms" if len(repairs) else ""
-        counted: tuple[tuple[TickEvent, str], ...] = (("repair", "repair"), ("wait", "wait"), ("evade", "evasion"))
-        made, waits, evasions = (
-            f"{self.count(event)} {noun}{'s' * (self.count(event) != 1)}" for event, noun in counted
-        )
         why = f" ({self.reason})" if self.reason else ""
         end = f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s"
         moves, proven = self.moves
         share = f", {proven} of {moves} moves proven" if moves else ""
-        return f"{end}: {made}{worst}, {waits}, {evasions}, length {self.length:.2f}{share}"
+
+        events = f"{counted('repair', 'repair')}{worst}, {counted('wait', 'wait')}, {counted('evade', 'evasion')}"
+        return f"{end}: {events}, length {self.length:.2f}{share}"
 
     def figures(self) -> dict[str, Any]:
         """The run in numbers, for JSON: outcome, times [s], counts of events, length, and wall times of repairs [s]."""
@@ -214,6 +230,13 @@ _HEADS: tuple[str, ...] = ("problem", "robot", "joint_names", "planner", "seed",
 _HEADS += ("speed_bound", "outcome", "reason")
 
 
+def _contact(fault: RunViolation) -> PathContact:
+    """A fault as what is drawn red in its tick."""
+    contact = Contact(fault.first, fault.second, fault.distance, NOWHERE, NOWHERE, fault.kept)
+    names = frozenset((fault.first, fault.second))
+    return PathContact(float(fault.tick), float(fault.tick + 1), contact, names)
+
+
 def load_run(path: str | os.PathLike[str]) -> ReplanRun:
     """Read a record written by :meth:`ReplanRun.save`.
 
@@ -241,6 +264,7 @@ def load_run(path: str | os.PathLike[str]) -> ReplanRun:
 def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
     """What a record says beside its ticks, each entry of the right kind."""
     given = {name: document[name] for name in _HEADS}
+
     for name in ("problem", "robot", "planner", "outcome", "reason"):
         require(given[name], str, name)
     require(given["joint_names"], list, "joint_names")
@@ -250,6 +274,7 @@ def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
     not_negative(given["margin"], "margin")
     if given["speed_bound"] is not None:
         positive(given["speed_bound"], "speed_bound")
+
     outcome = one_of(OUTCOMES, given["outcome"], "outcome")
     clearance = document.get("clearance")  # older records have none
     given["clearance"] = None if clearance is None else not_negative(clearance, "clearance")

@@ -43,17 +43,20 @@ def scenes_data(snapshots: Sequence[Snapshot]) -> Json:
         rows = {o.name: _obstacle_data(o, number_of(o.shape)) for o in seen.scene.obstacles}
         entry["obstacles"] = [row for name, row in rows.items() if known.get(name) != row]
         known = rows
+
         pairs = [list(pair) for pair in seen.scene.allowed_collisions]
         if pairs != allowed:
             entry["allowed_collisions"] = allowed = pairs
         touching = [[each.first, each.second, each.distance] for each in seen.scene.contacts]
         if touching != contacts:
             entry["contacts"] = contacts = touching
+
         if not entries and seen.scene.attached:
             entry["attached"] = [_held_data(held, number_of(held.shape)) for held in seen.scene.attached]
         entry |= {"unseen": dict(seen.unseen)} if seen.unseen else {}
         entry |= {"stated": True} if seen.stated else {}
         entries.append(entry)
+
     return {"shapes": list(shapes.values()), "scenes": entries}
 
 
@@ -67,23 +70,29 @@ def scenes_of(document: Mapping[str, Any]) -> list[Snapshot]:
         return []
     require(document["scenes"], list, "scenes")
     shapes = [_shape(entry) for entry in document.get("shapes", [])]
-    found, known = list[Snapshot](), dict[str, Obstacle]()
+
+    found = list[Snapshot]()
+    known = dict[str, Obstacle]()
     attached: tuple[AttachedObject, ...] = ()
     allowed: list[list[str]] = []
     contacts = list[list[Any]]()
+
     for entry in document["scenes"]:
         known |= {o.name: o for o in (_obstacle(row, shapes) for row in entry["obstacles"])}
         allowed = entry.get("allowed_collisions", allowed)
         attached = tuple(_held(row, shapes) for row in entry["attached"]) if "attached" in entry else attached
         contacts = entry.get("contacts", contacts)
+
         time = finite_number(entry["time"], "time of a scene")
         unseen = {name: finite_number(age, f"unseen of '{name}'") for name, age in entry.get("unseen", {}).items()}
         pairs = tuple((first, second) for first, second in allowed)
         touching = tuple(Touching(*each) for each in contacts)
         scene = Scene(tuple(known.values()), attached, pairs, touching)
+
         if found and time <= found[-1].time:
             raise InputError(f"scenes: times go backwards: {time:g} s comes after {found[-1].time:g} s")
         found.append(Snapshot(time, scene, unseen, bool(entry.get("stated", False))))
+
     return found
 
 

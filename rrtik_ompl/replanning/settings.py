@@ -27,6 +27,15 @@ MAX_RATE = 1e5  # [Hz]
 MIN_EDGE_SHARE = 1e-3  # of the usual max_edge: a path is checked in pieces of half of it, which must fit into memory
 PREDICTED_PLACES = 3  # places of an obstacle that are avoided at once where its motion is predicted
 
+_POSITIVE = {
+    "step": "how far to go in a tick [rad or m]",
+    "max_edge": "the longest edge of the trees [rad or m]",
+    "speed_bound": "metres a second",
+    "seconds": "how long the run may last",
+    "repair_budget": "how long a repair may take [s]",
+}
+_OPTIONAL = ("max_edge", "speed_bound", "repair_budget")
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ReplanSettings:
@@ -70,10 +79,12 @@ class ReplanSettings:
     def __post_init__(self) -> None:
         if self.limits is not None:
             require(self.limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
+
         one_of(PLANNERS, self.planner, "replanner")
         rate = positive(self.rate, "rate", "give ticks a second, such as 50")
         if rate > MAX_RATE:
             raise InputError(f"rate must be {MAX_RATE:g} Hz or less, got {rate:g}")
+
         checked: dict[str, float | None] = {"rate": rate}
         checked |= {name: whole_number(getattr(self, name), name) for name in ("lookahead_ticks", "seed")}
         checked["margin"] = not_negative(self.margin, "margin")
@@ -81,6 +92,7 @@ class ReplanSettings:
         for name, meaning in _POSITIVE.items():
             value = getattr(self, name)
             checked[name] = None if value is None and name in _OPTIONAL else positive(value, name, f"give {meaning}")
+
         for name, number in checked.items():
             object.__setattr__(self, name, number)
 
@@ -109,7 +121,8 @@ class ReplanSettings:
         Raises:
             InputError: If ``max_edge`` is far too small for the robot's range.
         """
-        lower, upper = (np.clip(ends, -TAU, TAU) for ends in (robot.lower, robot.upper))
+        lower = np.clip(robot.lower, -TAU, TAU)
+        upper = np.clip(robot.upper, -TAU, TAU)
         usual, _ = connect_lengths(lower, upper, None, None, turning=np.ones(robot.dof, dtype=bool))
         if self.max_edge is None:
             return usual
@@ -117,16 +130,6 @@ class ReplanSettings:
             least = f"max_edge must be at least {MIN_EDGE_SHARE * usual:.3g}, got {self.max_edge:g}"
             raise InputError(f"{least}; {usual:.3g} suits this robot")
         return self.max_edge
-
-
-_POSITIVE = {
-    "step": "how far to go in a tick [rad or m]",
-    "max_edge": "the longest edge of the trees [rad or m]",
-    "speed_bound": "metres a second",
-    "seconds": "how long the run may last",
-    "repair_budget": "how long a repair may take [s]",
-}
-_OPTIONAL = ("max_edge", "speed_bound", "repair_budget")
 
 
 def refuse_renamed(options: Mapping[str, object]) -> None:
@@ -144,7 +147,8 @@ def refuse_renamed(options: Mapping[str, object]) -> None:
 
 def make_planner(settings: ReplanSettings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
-    edge, seed = settings.edge_length(world.robot), settings.seed
+    edge = settings.edge_length(world.robot)
+    seed = settings.seed
     kind = REPLANNERS[settings.planner]
     cuts = KernelCuts(world, seed) if has_kernels(world, *KERNELS) else None
     if cuts is not None and kind.repairs_in_kernels:

@@ -65,6 +65,7 @@ class SingleTree(DrrtCon):
         aim = first[-1]
         if self._tree is None or not (self._tree.rows[0] == second[0]).all():
             self._tree = ConfigurationTree(second[:1])
+
         for _ in range(ITERATIONS):
             if stop():
                 return None
@@ -79,11 +80,13 @@ class SingleTree(DrrtCon):
 
 def trimmed(tree: ConfigurationTree, motions: MotionQueries) -> ConfigurationTree:
     """What is left of a tree when blocked edges and all that hangs on them are cut off; checked in one call."""
-    rows, parents = tree.rows, np.array(tree.parents)
+    rows = tree.rows
+    parents = np.array(tree.parents)
     keep: Mask = np.ones(len(rows), dtype=bool)
     keep[1:] = motions.motion_valid_batch(rows[parents[1:]], rows[1:])
     for k in range(1, len(rows)):  # parents come before their children
         keep[k] &= keep[parents[k]]
+
     numbers = np.cumsum(keep) - 1
     left = ConfigurationTree(rows[:1])
     for k in np.flatnonzero(keep)[1:]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.model.robot import Robot
@@ -69,6 +69,13 @@ def goal_now(robot: Robot, goal_feed: GoalFeed, now: float) -> Matrix:
     if fault := robot.limit_fault(q):
         raise InputError(f"goal at {now:g} s: {fault}")
     return robot.onto_limits(q)[None]
+
+
+def sampling_box(robot: Robot, ends: Matrix) -> tuple[Vector, Vector]:
+    """The box to sample in, shape (n,) each: a joint's limits, or a turn beyond ends, shape (k, n), if it has none."""
+    lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
+    return lower, upper
 
 
 def held_pairs(scene: Scene) -> tuple[tuple[str, str], ...]:

@@ -14,8 +14,8 @@ from rrtik_ompl.replanning.drrt_con import (
     points_along,
     without_points_between,
 )
+from rrtik_ompl.replanning.loop import one_step, to_first_corner
 from rrtik_ompl.replanning.single_tree import trimmed
-from rrtik_ompl.replanning.walking import one_step, to_first_corner
 from rrtik_tests.moving_plane import HIGH, LOW
 
 

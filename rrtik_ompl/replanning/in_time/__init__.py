@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import TAU, Matrix, not_negative, positive, whole_number
+from rrtik_ompl.base.arrays import Matrix, not_negative, positive, whole_number
 from rrtik_ompl.base.choices import TickEvent
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import at_most, require
@@ -21,7 +21,7 @@ from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.search import Ends, TimeSearch
 from rrtik_ompl.replanning.in_time.tree import Pace
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints
+from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints, sampling_box
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.problem import Problem
@@ -124,6 +124,7 @@ def plan_in_time(
     require(problem, Problem, "problem to plan in time", "use Problem(world, start, goal) or load_scenario(name)")
     refuse_constraints(problem, "plan in time")
     refuse_endless_turns(problem.world.scene)
+
     settings = problem.world.settings
     wanted = CLEARANCE if clearance is None else not_negative(clearance, "clearance")
     options = _Options(
@@ -136,7 +137,9 @@ def plan_in_time(
         seed=whole_number(seed, "seed"),
     )
     at_most(options.horizon / options.slot, MOST_SLOTS, "slots of time", "lower horizon or rate")
-    most, limit = whole_number(iterations, "iterations", least=1), positive(seconds, "seconds")
+    most = whole_number(iterations, "iterations", least=1)
+    limit = positive(seconds, "seconds")
+
     begun = time.perf_counter()
     search, cut_short = _search(problem, options)
     reason = _hopeless(search, options, cut_short)
@@ -144,6 +147,7 @@ def plan_in_time(
     rows = None if reason else search.run(most, lambda: time.perf_counter() > end)
     if rows is None and not reason:
         reason = _not_found(search, cut_short)
+
     run = None if rows is None else _record(problem, search, rows, options)
     return TimedPlan(run, reason, options.slot * search.least, search.iterations, time.perf_counter() - begun)
 
@@ -163,18 +167,22 @@ class _Options:
 
 def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
     """The search of a problem, and why it has less time than the horizon, or ""."""
-    robot, scene, rng = problem.robot, problem.world.scene, np.random.default_rng(options.seed)
+    robot = problem.robot
+    scene = problem.world.scene
+    rng = np.random.default_rng(options.seed)
+
     if options.limits is not None:
         require(options.limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
     rates = RateLimits.of(robot) if options.limits is None else options.limits.for_joints(robot.dof)
+
     alone = problem.world.with_accuracy("conservative").with_scene(Scene((), scene.attached, held_pairs(scene)))
     goals = every_goal(problem, alone, rng)
-    around = np.vstack([problem.start, goals])
-    lower = np.where(np.isfinite(robot.lower), robot.lower, around.min(axis=0) - TAU)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, around.max(axis=0) + TAU)
+    lower, upper = sampling_box(robot, np.vstack([problem.start, goals]))
+
     worlds = ForeseenWorlds(problem.world, options.slot, options.margin + options.clearance)
     reached, cut_short = worlds.base_reached(options.horizon)
     last = int(min(options.horizon, reached) / options.slot + ROUNDING)
+
     pace = Pace(np.maximum(rates.velocity * options.slot, SLOWEST), max(options.speed * options.slot, SLOWEST))
     return TimeSearch(worlds, pace, Ends(problem.start, goals, lower, upper, last), rng), cut_short
 
@@ -205,14 +213,18 @@ def _not_found(search: TimeSearch, cut_short: str) -> str:
 
 def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Options) -> ReplanRun:
     """The motion as a run: a tick for each slot, obstacles where they are when it begins."""
-    robot, slot = problem.robot, options.slot
+    robot = problem.robot
+    slot = options.slot
     step = min(search.pace.step, float(np.linalg.norm(search.pace.change)))
+
     run = ReplanRun(
         problem.name, robot.name, robot.joint_names, NAME, options.seed, step, 1.0 / slot, options.margin, None,
         clearance=options.clearance,
     )  # fmt: skip
+
     run.see(Snapshot(0.0, search.worlds.scene_at(0.0), stated=True))
     first = {o.name: o.pose for o in search.worlds.scene_at(0.0).obstacles}  # stated poses may be others
+
     for number, q in enumerate(rows):
         left = rows[number:]
         moves = len(left) > 1 and bool((left[1] != q).any())
@@ -222,5 +234,6 @@ def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Option
         proven = search.worlds.free(number, q, left[1]) if moves else None
         path = without_points_between(left) if len(left) > 1 else None
         run.ticks.append(Tick(slot * number, q, event, path, poses, {}, 0, "" if event != "wait" else WAITS, proven))
+
     run.outcome = "arrived"
     return run

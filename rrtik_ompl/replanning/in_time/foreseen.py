@@ -43,7 +43,9 @@ class ForeseenWorlds:
     """
 
     def __init__(self, world: World, slot: float, room: float) -> None:
-        self._world, self._slot, self._room = world.with_accuracy("exact"), slot, room
+        self._world = world.with_accuracy("exact")
+        self._slot = slot
+        self._room = room
         self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in world.scene.obstacles}
         self._worlds: dict[bytes, MovingWorld] = {}
         self._keys: dict[int, bytes] = {}  # of the slots' worlds
@@ -75,21 +77,26 @@ class ForeseenWorlds:
         base between them.
         """
         obstacles = {o.name: o for o in self._world.scene.obstacles if o.motion is not None}
-        bodies, found = self._world.bodies, (float("inf"), "")
+        bodies = self._world.bodies
+        found = (float("inf"), "")
+
         for pair in self._world.pairs:
             part, solid = sorted((bodies[k] for k in pair), key=lambda body: body.kind == "obstacle")
             if part.joint == solid.joint == 0 and solid.name in obstacles:
                 time = self._touch(part, solid, obstacles[solid.name], 0.0, min(until, found[0]))
                 if time is not None:
                     found = time, f"'{solid.name}' reaches '{part.name}' at {time:.3g} s, and the base cannot give way"
+
         return found
 
     def _touch(self, part: Body, solid: Body, obstacle: Obstacle, begin: float, end: float) -> float | None:
         """When an obstacle first touches a body at rest, None if it is proven apart from it from begin to end [s]."""
-        middle, way = 0.5 * (begin + end), travel(obstacle, begin, end, self._radii[obstacle.name])
+        middle = 0.5 * (begin + end)
+        way = travel(obstacle, begin, end, self._radii[obstacle.name])
         pose = _placed(obstacle, middle) * solid.within
         if distance(part.geometry, part.placement.homogeneous, solid.geometry, pose.homogeneous, way) is not None:
             return None
+
         if way <= FINEST:
             return begin
         first = self._touch(part, solid, obstacle, begin, middle)
@@ -105,10 +112,13 @@ class ForeseenWorlds:
         key = self._keys.get(slot)
         if key is not None and key in self._worlds:
             return self._worlds[key]
-        begin, end = slot * self._slot, (slot + 1) * self._slot
+
+        begin = slot * self._slot
+        end = (slot + 1) * self._slot
         scene = self.scene_at(0.5 * (begin + end))
         kept = {o.name: self._room + travel(o, begin, end, self._radii[o.name]) for o in self._world.scene.obstacles}
         places = np.array([[*o.pose.homogeneous.ravel(), kept[o.name]] for o in scene.obstacles])
+
         key = self._keys[slot] = blake2b(places.tobytes(), digest_size=16).digest()
         if key not in self._worlds:
             world = self._world_to_place()
@@ -148,7 +158,9 @@ def travel(obstacle: Obstacle, begin: float, end: float, radius: float) -> float
         return 0.0
     if isinstance(motion, ConstantVelocity):
         return 0.5 * (end - begin) * float(np.linalg.norm(motion.velocity)) + ROUNDING
-    middle, ways = 0.5 * (begin + end), []
+
+    middle = 0.5 * (begin + end)
+    ways = []
     for first, last in ((begin, middle), (middle, end)):
         stations = motion.times[(motion.times > first) & (motion.times < last)]
         poses = [motion.pose_at(obstacle.pose, float(time)) for time in (first, *stations, last)]

@@ -40,15 +40,18 @@ def hurried(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, most: int, stop: S
         stop: Ends it without a way.
     """
     places = full_pace(rows, pace)
-    last, begin = len(places) - 1, (0, 0)
+    last = len(places) - 1
+    begin = (0, 0)
     before: dict[Place, Place] = {begin: begin}
     queue = deque([begin])  # those that have stood less come first
+
     while queue and not stop():
         slot, k = queue.popleft()
         if k == last:
             return places[_numbers(before, (slot, k))]
         if slot + last - k > most:
             continue
+
         for on in (0, 1):  # going on is put before standing, for it is taken from the left
             place = (slot + 1, k + on)
             if place in before or (not on and slot + 1 + last - k > most):
@@ -56,12 +59,14 @@ def hurried(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, most: int, stop: S
             if worlds.free(slot, places[k], places[k + on]):
                 before[place] = (slot, k)
                 (queue.appendleft if on else queue.append)(place)
+
     return None
 
 
 def _numbers(before: dict[Place, Place], end: Place) -> list[int]:
     """Numbers of the places in each slot until one."""
-    numbers, place = [end[1]], end
+    numbers = [end[1]]
+    place = end
     while before[place] != place:
         place = before[place]
         numbers.append(place[1])

@@ -9,6 +9,7 @@ others, in turn for such as arrive earlier from the outset and for any.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ PATIENCE = 600  # iterations of a further round
 ROUNDS = 12  # without an earlier arrival, one after the other
 STANDING = 0.1  # share of the extensions in which the robot stands
 CUTS = 200  # tries to shorten the way
+
+Aim: TypeAlias = tuple[int, tuple[Vector, int]]  # a vertex, and the configuration and the slot to grow towards
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,9 +66,13 @@ class TimeSearch:
     """
 
     def __init__(self, worlds: ForeseenWorlds, pace: Pace, ends: Ends, rng: np.random.Generator) -> None:
-        self.worlds, self.pace, self.ends, self._rng = worlds, pace, ends, rng
+        self.worlds = worlds
+        self.pace = pace
+        self.ends = ends
+        self._rng = rng
         self._each_least: NDArray[np.int64] = np.maximum(pace.whole_slots(ends.goals - ends.start), 1)
-        self.least, self.iterations = int(self._each_least.min()), 0
+        self.least = int(self._each_least.min())
+        self.iterations = 0
         self._begin_anew(None)
 
     @property
@@ -85,18 +92,24 @@ class TimeSearch:
     def run(self, iterations: int, stop: Stop) -> Matrix | None:
         """The earliest arrival that is found: a configuration for each slot, shape (k, n); None if there is none."""
         best: Matrix | None = None
-        fruitless = since = 0  # rounds without an earlier way, iterations of the round
+        fruitless = 0  # rounds without an earlier way
+        since = 0  # iterations of the round
+
         while self.iterations < iterations and not (stop() or self._done(best, fruitless)):
-            self.iterations, since = self.iterations + 1, since + 1
+            self.iterations += 1
+            since += 1
             found = self._iterate(stop)
             found = None if found is None else self._improved(found, stop)
+
             if found is not None and (best is None or len(found) < len(best)):
-                best, fruitless = found, 0
+                best = found
+                fruitless = 0
             elif best is not None and (found is not None or since >= (PUT_OFF if self._hard else PATIENCE)):
                 fruitless += 1
             else:
                 self._last = min(2 * self._last, self.ends.last) if since % PUT_OFF == 0 else self._last
                 continue
+
             since = 0
             self._begin_anew(None if self._hard else len(best) - 2)
         return best
@@ -109,15 +122,19 @@ class TimeSearch:
         """A further arrival, an extension of one tree and a connection to the other; the way if they meet."""
         self._add_arrival()
         grown, other = self._trees[:: 1 if self.iterations % 2 else -1]
+
         new = self._extend(grown, stop) if grown.size else None
         if new is None:
             return None
+
         near = other.nearest(grown.q[new], int(grown.slot[new]))
         if near is None:
             return None
+
         end = self._grow(other, near, (grown.q[new], int(grown.slot[new])), self.ends.last, stop)
         if end is None or not end[1]:
             return None
+
         forward, backward = (new, end[0]) if grown.onward > 0 else (end[0], new)
         return self._way(forward, backward)
 
@@ -127,6 +144,7 @@ class TimeSearch:
         earliest = int(self._each_least[goal])
         if earliest > self._last:
             return
+
         slot = int(self._rng.integers(earliest, self._last + 1))
         q = self.ends.goals[goal]
         if (goal, slot) not in self._rooted and self.worlds.free(slot - 1, q, q):
@@ -135,25 +153,32 @@ class TimeSearch:
 
     def _extend(self, tree: TimeTree, stop: Stop) -> int | None:
         """Towards a sample, or standing still; the new vertex."""
-        if self._rng.random() < STANDING:
-            vertex = int(self._rng.integers(tree.size))
-            q, slot = tree.q[vertex].copy(), int(tree.slot[vertex]) + tree.onward * PIECE
-            slot = min(max(slot, 0), self._last)
-            if tree.onward * (slot - int(tree.slot[vertex])) <= 0:
-                return None
-        else:
-            q = self._rng.uniform(self.ends.lower, self.ends.upper)
-            earliest = int(self.pace.whole_slots((q - self.ends.start)[None])[0])
-            latest = self._last - int(self.pace.whole_slots(self.ends.goals - q).min())
-            if earliest > latest:
-                return None
-            slot = int(self._rng.integers(earliest, latest + 1))
-            near = tree.nearest(q, slot)
-            if near is None:
-                return None
-            vertex = near
-        end = self._grow(tree, vertex, (q, slot), PIECE, stop)
+        aim = self._standing(tree) if self._rng.random() < STANDING else self._sample(tree)
+        if aim is None:
+            return None
+        vertex, to = aim
+        end = self._grow(tree, vertex, to, PIECE, stop)
         return None if end is None else end[0]
+
+    def _standing(self, tree: TimeTree) -> Aim | None:
+        """A vertex at random, and the same configuration some slots on; None if there are no more slots."""
+        vertex = int(self._rng.integers(tree.size))
+        q = tree.q[vertex].copy()
+        slot = int(tree.slot[vertex]) + tree.onward * PIECE
+        slot = min(max(slot, 0), self._last)
+        return (vertex, (q, slot)) if tree.onward * (slot - int(tree.slot[vertex])) > 0 else None
+
+    def _sample(self, tree: TimeTree) -> Aim | None:
+        """A random configuration in a slot in which it may be, and the vertex next to it; None if there is none."""
+        q = self._rng.uniform(self.ends.lower, self.ends.upper)
+        earliest = int(self.pace.whole_slots((q - self.ends.start)[None])[0])
+        latest = self._last - int(self.pace.whole_slots(self.ends.goals - q).min())
+        if earliest > latest:
+            return None
+
+        slot = int(self._rng.integers(earliest, latest + 1))
+        near = tree.nearest(q, slot)
+        return None if near is None else (near, (q, slot))
 
     def _grow(
         self, tree: TimeTree, vertex: int, to: tuple[Vector, int], most: int, stop: Stop
@@ -197,6 +222,7 @@ class TimeSearch:
             shorter = _length(straight) < _length(rows[a : b + 1]) - 1e-9
             if shorter and self.worlds.steps_free(a, straight, 1, stop) == b - a:
                 rows = np.vstack([rows[:a], straight, rows[b + 1 :]])
+
         return rows
 
 

@@ -52,26 +52,33 @@ class TimeTree:
     """
 
     def __init__(self, pace: Pace, onward: int) -> None:
-        self._pace, self.onward, self.size = pace, onward, 0
+        self._pace = pace
+        self.onward = onward
+        self.size = 0
         self._q = np.zeros((64, len(pace.change)))
-        self._slot, self._parent = np.zeros(64, dtype=np.int64), np.zeros(64, dtype=np.int64)
+        self._slot = np.zeros(64, dtype=np.int64)
+        self._parent = np.zeros(64, dtype=np.int64)
 
     @property
     def q(self) -> Matrix:
-        """See the class."""
+        """Configurations of the vertices, shape (k, n)."""
         return self._q[: self.size]
 
     @property
     def slot(self) -> NDArray[np.int64]:
-        """See the class."""
+        """Slots of the vertices, shape (k,)."""
         return self._slot[: self.size]
 
     def add(self, q: Vector, slot: int, parent: int) -> int:
         """A new vertex, a root if the parent is -1; its number."""
         if self.size == len(self._q):
             self._q = np.vstack([self._q, np.zeros_like(self._q)])
-            self._slot, self._parent = (np.concatenate([a, np.zeros_like(a)]) for a in (self._slot, self._parent))
-        self._q[self.size], self._slot[self.size], self._parent[self.size] = q, slot, parent
+            self._slot = np.concatenate([self._slot, np.zeros_like(self._slot)])
+            self._parent = np.concatenate([self._parent, np.zeros_like(self._parent)])
+
+        self._q[self.size] = q
+        self._slot[self.size] = slot
+        self._parent[self.size] = parent
         self.size += 1
         return self.size - 1
 
