@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import positive, whole_number
+from rrtik_ompl.base.arrays import Vector, positive, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import require
+from rrtik_ompl.geometry.collision.contacts import measured
 from rrtik_ompl.model.judgement import Violation
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.tasks.branches import Branch
 from rrtik_ompl.tasks.contact_life import MotionContact as MotionContact
 from rrtik_ompl.tasks.contact_life import world_from
 from rrtik_ompl.tasks.foreseen import never_set_down
-from rrtik_ompl.tasks.notes import notes_of
 from rrtik_ompl.tasks.program import check_program, steps_of
-from rrtik_ompl.tasks.search import TaskSearch
+from rrtik_ompl.tasks.search import Done, TaskSearch
 from rrtik_ompl.tasks.setting import Setting, world_of_motion
 from rrtik_ompl.tasks.stages import Alternatives as Alternatives
 from rrtik_ompl.tasks.stages import Attach as Attach
@@ -37,7 +38,8 @@ from rrtik_ompl.world.world import World
 if TYPE_CHECKING:
     from rrtik_ompl.tasks.played import PlayedTask
 
-SECONDS = 10.0
+SECONDS = 10.0  # [s] that a task may be planned
+FAR = 0.05  # [m] between an object and what holds it, from which on that is said
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,6 +115,7 @@ class TaskPlan:
         found: list[tuple[Violation, ...]] = []
         contacts = self._stood_on()
         parts = zip(self.paths, self.worlds, self.stages, contacts, self._standing(), strict=True)
+
         for path, world, stage, stood_on, standing in parts:
             wrong = [*standing, *path.violations(world_of_motion(path, world, stage))]
             ended = sorted({each.until for each in stood_on if each.until is not None})
@@ -185,6 +188,7 @@ class Task:
         require(world, World, "world of a task", "use World(robot, scene)")
         steps = steps_of(self.stages)
         check_program(steps, world)
+
         given: Any = world.robot.posture(start) if isinstance(start, str) else start
         begun = Setting.beginning(world, world.robot.configuration(given, "start"))
         q = usable_configuration(begun.world, given, "start")
@@ -204,6 +208,34 @@ class Task:
             chosen=done.last.chosen,
             reason="",
             end=done.last.after.world,
-            notes=notes_of(done),
+            notes=_notes_of(done),
             contacts=done.contacts,
         )
+
+
+def _notes_of(done: Done) -> tuple[str, ...]:
+    """What is odd about a way: objects attached from far away; and the contacts that its motions stood on."""
+    notes = []
+    stood_on = {id(branch): contacts for (branch, _), contacts in zip(done.motions, done.contacts, strict=True)}
+
+    for branch in done.last.chain():
+        notes += [f"{branch.step}: {branch.note}"] if branch.note else []
+        notes += [f"{branch.step} stands on a contact: {each}" for each in stood_on.get(id(branch), ())]
+        if branch.before is not None and branch.step is not None and isinstance(branch.step.stage, Attach):
+            stage = branch.step.stage
+            away = _gap(branch.before.after.world, branch.q, stage.object, stage.link)
+            if away > FAR:
+                text = f"'{stage.object}' is {1e3 * away:.0f} mm away from '{stage.link}' when it is attached"
+                notes.append(f"{branch.step}: {text}")
+    return tuple(notes)
+
+
+def _gap(world: World, q: Vector, name: str, link: str) -> float:
+    """Distance of an obstacle from a link and what is rigidly joined with it at q [m]; 0 where these have no solid."""
+    robot = world.robot
+    bodies = world.bodies
+    joint = robot.model.frames[robot.model.getFrameId(link)].parentJoint
+    links = [k for k, body in enumerate(bodies) if body.joint == joint and body.name in robot.link_names]
+    own = [k for k, body in enumerate(bodies) if body.name == name]
+    pairs = measured(bodies, list(product(links, own)), robot.joint_frames(q[None])[0], near_only=False)
+    return min((pair.distance for pair in pairs), default=0.0)

@@ -127,8 +127,10 @@ class Expander:
 
     def after(self, branch: Branch) -> Iterator[Branch]:
         """The branches that go one step on; none if the step fails, which is noted."""
-        step, rest = branch.rest[0], branch.rest[1:]
+        step = branch.rest[0]
+        rest = branch.rest[1:]
         stage = step.stage
+
         try:
             if isinstance(stage, Alternatives):
                 for number, row in enumerate(options_of(step)):
@@ -175,12 +177,15 @@ class Expander:
             choices = self._choices(branch, branch.after, stage)
             reason = choices.search.reason
         except ProblemError as error:
-            choices, reason = None, str(error)
+            choices = None
+            reason = str(error)
+
         if choices is None or not len(choices.search.rows):
             arriving = branch.after.arriving(may_touch(branch.after.world, branch.rest[1:]))
             if arriving is not branch.after:
                 choices = self._choices(branch, arriving, stage)
                 reason = choices.search.reason
+
         if reason:
             self.failures.append((branch, step, reason))
         if choices is not None:
@@ -195,7 +200,8 @@ class Expander:
         return Choices(branch, search, setting is not branch.after, problem.goal.q is None)
 
     def _drawn(self, choices: Choices) -> Iterator[Branch]:
-        branch, rows = choices.branch, choices.search.rows
+        branch = choices.branch
+        rows = choices.search.rows
         for q in rows[choices.used :]:
             arriving = self._arriving(branch, q) if choices.arrives or branch.after.scene.contacts else ()
             setting = branch.after.arriving(arriving)
@@ -212,21 +218,25 @@ class Expander:
         if touching := world.explain(branch.q):
             self.failures.append((branch, step, f"it cannot begin: {touching}; move it or allow the pair"))
             return
+
         way = _way(branch, stage, self.seed)
         if way.leads_nowhere(world.robot):
             still = JointPath.of(world.robot, branch.q[None]).proved(world)
             yield _next(branch, step, branch.after, branch.q, still)
             return
+
         setting, arriving, made, reason = self._along(branch, way)
         if made.fraction < WHOLE:
             self.failures.append((branch, step, f"ends at {100.0 * made.fraction:.3g} %: {reason}"))
             return
+
         path = path_of(setting.world, made)
         assert path is not None, "it has come to its end"
         done = lived(path, setting.world, setting.named, arriving)
         if done.fault:
             self.failures.append((branch, step, done.fault))
             return
+
         left = setting.left_with(done.lasting)
         yield _next(branch, step, setting, path.end, done.path, left=left, contacts=done.contacts)
 
@@ -236,19 +246,23 @@ class Expander:
         Returns:
             The setting on the way, the contacts of what is taken or set down at its end, how far it came, and why.
         """
-        setting, steps = branch.after, branch.rest[1:]
+        setting = branch.after
+        steps = branch.rest[1:]
         world = setting.world
         made = self._followed(branch, way, world)
+
         if not handled(steps, world.robot):
             return setting, (), made, made.reason
         if made.fraction == WHOLE:
             arriving = self._arriving(branch, made.rows[-1]) if setting.scene.contacts else ()
             return setting.arriving(arriving), arriving, made, made.reason
+
         unchecked = follow(world.robot, way.rails[0], branch.q, way.tolerance, centred(world.robot))
         if not unchecked.complete:
             return setting, (), made, made.reason
         if deep := left_where(world, steps, unchecked.rows[-1]):
             return setting, (), made, deep
+
         arriving = self._arriving(branch, unchecked.rows[-1])
         if arriving:
             setting = setting.arriving(arriving)
@@ -290,16 +304,17 @@ def _next(
 ) -> Branch:
     rows = [branch.q, q] if path is None else path.waypoints
     cost = branch.cost + sum(way_of(setting.robot, a, b) for a, b in pairwise(rows))
+
     return Branch(
         setting,
         q,
         branch.rest[1:],
-        branch,
-        step,
-        path,
-        contacts,
-        left,
-        arriving,
+        before=branch,
+        step=step,
+        path=path,
+        contacts=contacts,
+        left=left,
+        arriving=arriving,
         done=branch.done + 1,
         cost=cost,
         chosen=branch.chosen,

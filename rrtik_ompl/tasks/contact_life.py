@@ -121,15 +121,19 @@ def with_contacts(scene: Scene, contacts: Iterable[Touching]) -> Scene:
 
 def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
     """What touches or overlaps a thing at q, shape (dof,), the deepest first, of the pairs that are checked."""
-    bodies, frames = world.bodies, world.robot.joint_frames(q[None])[0]
+    bodies = world.bodies
+    frames = world.robot.joint_frames(q[None])[0]
     found: dict[tuple[str, str], Nearness] = {}
+
     for i, j in world.pairs:
-        first, second = bodies[i], bodies[j]
+        first = bodies[i]
+        second = bodies[j]
         if name in (first.name, second.name):
             away = signed_distance(world.robot, (first, second), q, frames)
             other = second.name if first.name == name else first.name
             if away <= NEAR and ((name, other) not in found or away < found[name, other].distance):
                 found[name, other] = Nearness(name, other, away, deepest_contact(bodies, name, other))
+
     return sorted(found.values(), key=lambda near: near.distance)
 
 
@@ -138,6 +142,7 @@ def signed_distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Ma
     poses = _transforms(pair, frames)
     if distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], NEAR) is not None:
         return np.inf
+
     (contact,) = measured(pair, [(0, 1)], frames, near_only=False)
     if contact.distance > NEAR:
         return np.inf
@@ -151,11 +156,14 @@ def _depth_of_pieces(robot: Robot, pair: tuple[Body, Body], q: Vector) -> float:
     others = zip(pair, pair[::-1], strict=True)
     bare = [replace(one, margin=0.0, padding=0.0, contacts=((other.name, 0.0),)) for one, other in others]
     prover = Prover(robot, bare, ((0, 1),))
-    low, high = 0.0, DEEPEST
+
+    low = 0.0
+    high = DEEPEST
     if prover.route(q[None], slack=-low).proven:
         return 0.0
     if not prover.route(q[None], slack=-high).proven:
         return np.inf
+
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         apart = prover.route(q[None], slack=-middle).proven
@@ -197,8 +205,10 @@ def lived(path: JointPath, world: World, named: frozenset[frozenset[str]], arriv
         for contact in world.scene.contacts
         if at_end.get(contact.pair) != contact
     }
+
     places = sorted({place for place in ends.values() if place is not None})
     rows, numbers = _with_places(path.waypoints, places)
+
     contacts = []
     for contact in world.scene.contacts:
         place = ends.get(contact)
@@ -208,14 +218,17 @@ def lived(path: JointPath, world: World, named: frozenset[frozenset[str]], arriv
         else:
             later = None if then is None else then.distance
             contacts.append(MotionContact(contact, numbers[place], later, contact.pair in named))
+
     for until in sorted(set(numbers.values())):
         strict = world_from(world, contacts, until)
         if wrong := violations_of(strict, rows[until:]):
             fault = f"what has parted touches again: {wrong[0].reason}"
             return Lived(path_through(path, rows[: until + 1]), (), (), fault, strict)
+
     made = path
     if len(rows) > len(path.waypoints):
         made = proved(path_through(path, rows), world, clearance=None if path.proof is None else path.proof.clearance)
+
     left = contacts_from(contacts, len(rows))
     lasting = tuple(contact for contact in left if at_end.get(contact.pair) != contact)
     return Lived(made, tuple(each for each in contacts if each.until != 0), lasting)
@@ -256,6 +269,7 @@ def parting(rows: Matrix, world: World, contact: Touching) -> tuple[int, float] 
     pairs = [pair for pair in world.pairs if {bodies[k].name for k in pair} == contact.pair]
     if not pairs:
         return 0, 0.0
+
     weights = approach_weights(world.robot, bodies, pairs).max(axis=0)
     for number, share, frames in _places(rows, world.robot, weights):
         if all(_apart((bodies[i], bodies[j]), frames) for i, j in pairs):
@@ -290,14 +304,19 @@ def _transforms(pair: tuple[Body, Body], frames: Matrix) -> list[coal.Transform3
 
 def _with_places(rows: Matrix, places: Iterable[tuple[int, float]]) -> tuple[Matrix, dict[tuple[int, float], int]]:
     """Waypoints with further ones at places between them, and the number of the waypoint at each place."""
-    made, numbers, added = list(rows), {}, 0
+    made = list(rows)
+    numbers = {}
+    added = 0
+
     for number, share in places:
         if share in (0.0, 1.0):
             numbers[number, share] = number + added + int(share)
             continue
+
         added += 1
         made.insert(number + added, rows[number] + share * (rows[number + 1] - rows[number]))
         numbers[number, share] = number + added
+
     return np.array(made), numbers
 
 

@@ -48,12 +48,14 @@ def finger_motion(before: Setting, after: Setting, q: Vector, taken: Sequence[st
         q: Where the arm is, shape (dof,).
         taken: Things that are attached before the arm moves on: fingers may press on these.
     """
-    first, last = before.world.bodies, after.world.bodies
+    first = before.world.bodies
+    last = after.world.bodies
     moving = {k for k in range(len(first)) if not _same(first[k].placement, last[k].placement)}
     if not moving:
         return FingerMotion()
     if not _on_screws(before.robot, after.robot):
         return FingerMotion(note="the way of the fingers is not checked: it is not about or along one axis")
+
     note = _pressed_in(before, after, q, moving, taken)
     frames = before.robot.joint_frames(q[None])[0]
     for i, j in before.world.pairs:
@@ -64,16 +66,20 @@ def finger_motion(before: Setting, after: Setting, q: Vector, taken: Sequence[st
         if not way.apart():
             names_in_order = " and ".join(f"'{body.name}'" for body in (first[i], first[j]))
             return FingerMotion(fault=f"contact of the fingers on their way: {names_in_order}; {REMEDY}")
+
     return FingerMotion(note=note)
 
 
 def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], taken: Sequence[str]) -> str:
     """A note of the finger that closes deepest into what is held or taken next, q of shape (dof,); "" if none does."""
-    first, last = before.world.bodies, after.world.bodies
+    first = before.world.bodies
+    last = after.world.bodies
     held = {item.name for item in after.scene.attached} | set(taken)
     things = [k for k in range(len(last)) if last[k].name in held and k not in moving]
     frames = after.robot.joint_frames(q[None])[0]
-    deepest, note = DEEPER + DISTANCE_TOLERANCE, ""
+
+    deepest = DEEPER + DISTANCE_TOLERANCE
+    note = ""
     for finger in sorted(moving):
         for thing in things:
             depth = -signed_distance(after.robot, (last[finger], last[thing]), q, frames)
@@ -81,6 +87,7 @@ def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], ta
                 continue
             deepest = depth
             note = f"'{last[finger].name}' closes {1e3 * depth:.3g} mm deep into '{last[thing].name}'"
+
     return f"{note}; give a width that only touches it" if note else ""
 
 
@@ -94,9 +101,9 @@ class Way:
     """
 
     def __init__(self, first: tuple[Body, Body], last: tuple[Body, Body], frames: Vector) -> None:
-        self._first, self._frames = first, frames
-        twists = (pin.log6(a.placement.actInv(b.placement)).vector for a, b in zip(first, last, strict=True))
-        self._twists = tuple(twists)
+        self._first = first
+        self._frames = frames
+        self._twists = [pin.log6(a.placement.actInv(b.placement)).vector for a, b in zip(first, last, strict=True)]
         self._speed = sum(_speed(body, twist) for body, twist in zip(first, self._twists, strict=True))
         self._kept = kept_apart(*first)
         if self._distance(0.0, hulls=False) <= NEAR:  # what fingers let go may go on touching them, no deeper
@@ -152,6 +159,7 @@ def _on_screws(before: Robot, after: Robot) -> bool:
         {(str(item.name), int(item.parentJoint)): item.placement for item in robot.collision.geometryObjects}
         for robot in (before, middle, after)
     ]
+
     return all(
         name in places[1]
         and name in places[2]
@@ -162,7 +170,8 @@ def _on_screws(before: Robot, after: Robot) -> bool:
 
 def _entry(before: Robot, after: Robot) -> str:
     """The entry of the robot with its fingers in the middle, as JSON."""
-    begin, end = (dict(robot.source.get("locked", {})) for robot in (before, after))
+    begin = before.source.get("locked", {})
+    end = after.source.get("locked", {})
     held = {name: 0.5 * (begin.get(name, 0.0) + value) for name, value in end.items()}
     return json.dumps({**before.source, "locked": held}, sort_keys=True)
 

@@ -40,6 +40,7 @@ def never_set_down(steps: Sequence[Step], world: World, q: Vector) -> str:
     tip: Tip | None = Tip(world.robot.fk(q))
     grasps: dict[str, Tip] = {}
     taken = {held.name for held in world.scene.attached}
+
     for step in steps:
         stage = step.stage
         if isinstance(stage, Alternatives):
@@ -49,8 +50,8 @@ def never_set_down(steps: Sequence[Step], world: World, q: Vector) -> str:
         elif isinstance(stage, Straight) and tip is not None:
             tip = Tip(stage.goal(tip.pose), tip.away + DEVIATION, tip.turned + TURN_DEVIATION)
         elif isinstance(stage, Attach):
-            known = tip is not None and stage.object not in taken
-            if known and tip is not None and world.robot.tip in joined_with(world.robot, stage.link):
+            moved = stage.object in taken
+            if tip is not None and not moved and world.robot.tip in joined_with(world.robot, stage.link):
                 pose = tip.pose.actInv(world.scene.obstacle(stage.object).pose)
                 grasps[stage.object] = replace(tip, pose=pose)
             taken.add(stage.object)
@@ -80,6 +81,7 @@ def _too_deep(world: World, q: Vector, name: str, tip: Tip, grasp: Tip, taken: s
     others = {each.name for each in world.scene.obstacles if frozenset((name, each.name)) not in allowed} - taken
     arm = float(np.linalg.norm(grasp.pose.translation))
     shift = pose * world.scene.obstacle(name).pose.inverse()
+
     for own in (body for body in world.bodies if body.name == name):
         reach = arm + float(np.linalg.norm(_centre(world, own, name)) + own.geometry.aabb_radius)
         unsure = tip.away + grasp.away + (tip.turned + grasp.turned) * reach

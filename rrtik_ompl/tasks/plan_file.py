@@ -91,6 +91,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
         raise InputError("task plan: it has no motion to save" + (f": {plan.reason}" if plan.reason else ""))
     if plan.worlds[0].constraints is not None:
         raise InputError("task plan: its world has path constraints, which the file has no key for; give MoveTo them")
+
     folder = file_name(file).parent
     stood_on = plan.contacts or ((),) * len(plan.paths)
     motions = [
@@ -102,6 +103,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
         }
         for path, world, stage, contacts in zip(plan.paths, plan.worlds, plan.stages, stood_on, strict=True)
     ]
+
     first = plan.worlds[0]
     document = {
         "version": 1,
@@ -113,6 +115,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
         "end": _world_data(plan.worlds[-1] if plan.end is None else plan.end, folder),
         "notes": list(plan.notes),
     }
+
     write_text(file, json.dumps(document, allow_nan=False))
 
 
@@ -152,6 +155,7 @@ def load_task_plan(file: str | os.PathLike[str], *, trust_xacro: bool = False) -
 def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
     document = read_yaml(file_name(file))
     entry = parse(document, TaskPlanFile)
+
     worlds: list[World] = []
     paths: list[JointPath] = []
     for number in range(len(entry.motions)):
@@ -160,6 +164,7 @@ def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
             raise document.error(("motions", number), "begins elsewhere than the motion before ends")
         worlds.append(world)
         paths.append(path)
+
     stages = tuple(motion.stage.build(world.robot) for motion, world in zip(entry.motions, worlds, strict=True))
     end = worlds[-1] if entry.end is None else _world(document, entry, entry.end, ("end",))
     contacts = tuple(tuple(each.stood_on() for each in motion.contacts) for motion in entry.motions)
@@ -179,12 +184,14 @@ def _contact_data(contacts: tuple[MotionContact, ...]) -> dict[str, Any]:
 
 
 def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[World, JointPath]:
-    motion, place = entry.motions[number], ("motions", number)
+    motion = entry.motions[number]
+    place = ("motions", number)
     world = _world(document, entry, motion, place)
     for index, contact in enumerate(motion.contacts):
         if contact.until is not None and contact.until >= len(motion.waypoints):
             what = f"there is no waypoint {contact.until}; the last one is {len(motion.waypoints) - 1}"
             raise document.error((*place, "contacts", index, "until"), what)
+
     with document.at((*place, "waypoints")):
         rows = finite_array(motion.waypoints, (None, world.robot.dof), "waypoints")
         return world, JointPath.of(world.robot, rows)
@@ -194,10 +201,12 @@ def _world(document: YamlDocument, entry: TaskPlanFile, part: WorldEntry, place:
     data: Any = document.data
     for key in (*place, "robot"):
         data = data[key]
+
     with document.at((*place, "robot")):
         robot = robot_from_entry(data, document.path.parent)
         if robot.joint_names != tuple(entry.joint_names):
             raise InputError(f"robot '{robot.name}' has other joints than the plan's: {', '.join(entry.joint_names)}")
+
     scene = part.scene.build(document, (*place, "scene"))
     with document.at((*place, "scene")):
         return World.of(entry.settings(robot, scene))

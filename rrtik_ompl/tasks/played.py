@@ -63,6 +63,7 @@ def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
     starts = np.array([path.start for path in plan.paths])
     if not any(path.length > 0.0 for path in plan.paths):
         return numbers, starts, np.zeros(len(numbers))
+
     timed = time_task(plan)
     clock, states = timed.trajectory.sampled(RATE)
     motions = np.searchsorted(timed.begins, clock, side="right") - 1

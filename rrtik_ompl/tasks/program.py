@@ -73,6 +73,7 @@ def _attached(stage: Attach, held: Held, world: World) -> Held:
         raise InputError(f"'{stage.object}' is held already; detach it first")
     if stage.object not in world.scene.names:
         raise UnknownNameError("obstacle", stage.object, world.scene.names)
+
     links = world.robot.link_names
     if stage.link not in links:
         raise UnknownNameError(f"link of robot '{world.robot.name}'", stage.link, links)

@@ -68,7 +68,9 @@ class TaskSearch:
             found = self._round(effort)
             if found is not None or self._out_of_time:
                 return found
-            waiting, self._late = self._late, []
+
+            waiting = self._late
+            self._late = []
             self._blocked.clear()
             failed = [branch for branch, _, _ in self._expander.failures] if effort == 0 else []
             for branch in (*waiting, *failed):
@@ -85,12 +87,15 @@ class TaskSearch:
         texts: dict[str, tuple[Step, Counter[str]]] = {}
         for _, step, text in failures:
             texts.setdefault(step.number, (step, Counter()))[1][text] += 1
+
         order = sorted(texts.values(), key=lambda item: [int(n) for n in item[0].number.split(".")], reverse=True)
         parts = []
         for step, reasons in order[:NAMED]:
-            (text, _), times = reasons.most_common(1)[0], reasons.total()
+            text, _ = reasons.most_common(1)[0]
+            times = reasons.total()
             short = text if len(text) <= MOST_WORDS else text[:MOST_WORDS] + "..."
             parts.append(f"{step} failed" + (f" {times} times, for instance: " if times > 1 else ": ") + short)
+
         late = ["out of time before all choices were tried"] if self._out_of_time else []
         return "; ".join([*late, *parts]) or "no choice of alternatives and configurations works"
 
@@ -130,46 +135,52 @@ class TaskSearch:
 
     def _plan(self, link: Branch, effort: int) -> bool:
         """Find the way of a motion between postures."""
-        before, world = link.before, link.setting.world
+        before = link.before
+        world = link.setting.world
         assert before is not None, "it comes after another"
         assert link.step is not None, "it has done one"
         kept = link.step.stage.constraints if isinstance(link.step.stage, MoveTo) else ()
+
         try:
             problem = Problem(world, before.q, link.q, name=f"stage {link.step.number}", constraints=kept)
         except ProblemError as error:
-            self._expander.failures.append((before, link.step, str(error)))
+            self._failed(link, str(error))
             return False
+
         if problem.world.motion_proven(before.q, link.q):
             straight = JointPath.of(world.robot, np.stack([before.q, link.q]))
             if self._kept(link, proved_as_clear(straight, problem.world, CLEARANCE), effort):
                 return True
+
         path = self._found(problem, link, effort)
         return path is not None and self._kept(link, path, effort)
 
     def _found(self, problem: Problem, link: Branch, effort: int) -> JointPath | None:
         """A path of a problem that a motion poses; why there is none is noted."""
-        assert link.before is not None, "it comes after another"
-        assert link.step is not None, "it has done one"
         left = max(self._budget.left, LEAST_SECONDS)
         made = plan_counted(problem, Budget(self._budget.seed, left, FIRST_ITERATIONS * GROWTH**effort))
         if made.path is None:
-            self._expander.failures.append((link.before, link.step, made.reason))
+            self._failed(link, made.reason)
         return made.path
 
     def _from_parting(self, link: Branch, world: World, q: Vector, goal: Vector, effort: int) -> JointPath | None:
         """A way on from where two have parted to the goal of a motion, both of shape (dof,)."""
-        assert link.before is not None, "it comes after another"
-        assert link.step is not None, "it has done one"
         try:
             return self._found(Problem(world, q, goal), link, effort)
         except ProblemError as error:
-            self._expander.failures.append((link.before, link.step, str(error)))
+            self._failed(link, str(error))
             return None
+
+    def _failed(self, link: Branch, reason: str) -> None:
+        """Note why the way of a motion between postures was not found."""
+        assert link.before is not None, "it comes after another"
+        assert link.step is not None, "it has done one"
+        self._expander.failures.append((link.before, link.step, reason))
 
     def _kept(self, link: Branch, path: JointPath, effort: int) -> bool:
         """Keep the way of a motion; if what has parted on it touches again, another one is planned from there."""
-        assert link.before is not None, "it comes after another"
         assert link.step is not None, "it has done one"
+
         setting = link.setting
         if setting.scene.contacts:
             world = world_of_motion(path, setting.world, link.step.stage)
@@ -181,9 +192,11 @@ class TaskSearch:
                 whole = proved(path_through(path, np.vstack([done.path.waypoints, rest.waypoints[1:]])), world)
                 done = lived(whole, world, setting.named, link.arriving)
             if done.fault:
-                self._expander.failures.append((link.before, link.step, done.fault))
+                self._failed(link, done.fault)
                 return False
-            path, self._contacts[id(link)] = done.path, done.contacts
+            path = done.path
+            self._contacts[id(link)] = done.contacts
+
         self._ways[id(link)] = path
         return True
 

@@ -31,7 +31,10 @@ class Setting:
     """
 
     def __init__(self, like: World, robot: Robot, scene: Scene, named: frozenset[frozenset[str]] = frozenset()) -> None:
-        self._like, self.robot, self.scene, self.named = like, robot, scene, named
+        self._like = like
+        self.robot = robot
+        self.scene = scene
+        self.named = named
 
     @classmethod
     def of(cls, world: World) -> Setting:
@@ -87,9 +90,11 @@ class Setting:
         pose = self.robot.fk(q, stage.link).actInv(self.scene.obstacle(stage.object).pose)
         links = tuple(name for name in stage.allow if name in self.robot.link_names)
         scene = self.scene.attaching(stage.object, stage.link, links, pose=pose, padding=stage.padding)
+
         others = frozenset(stage.allow) - frozenset(links)
         named = self.named | {frozenset((stage.object, other)) for other in others}
         held = Setting(self._like, self.robot, scene, named)
+
         bodies = held.world.bodies
         contacts = {frozenset((stage.object, other)): allowed(bodies, stage.object, other) for other in sorted(others)}
         near = touching_at(held.world, q, stage.object)
@@ -101,6 +106,7 @@ class Setting:
         for near in touching_at(self.world, q, stage.object):
             if near.second in standing and near.too_deep:
                 raise InputError(left_inside(near))
+
         held = next(item for item in self.scene.attached if item.name == stage.object)
         pose = self.robot.fk(q, held.link) * held.pose
         named = frozenset(pair for pair in self.named if stage.object not in pair)

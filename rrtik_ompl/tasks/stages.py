@@ -43,6 +43,7 @@ class MoveTo:
         object.__setattr__(self, "constraints", listed(self.constraints, "constraints of MoveTo"))
         for region in self.constraints:
             require(region, TaskRegion, "each constraint of MoveTo", "use upright, on_plane, on_line or inside")
+
         goal = self.goal
         if isinstance(goal, pin.SE3) or (not isinstance(goal, Goal | str) and dimensions(goal) == 2):
             goal = PoseGoal(rigid(goal, "goal of MoveTo"))
@@ -80,11 +81,13 @@ class Straight:
     ) -> None:
         if (by is None) == (to is None):
             raise InputError("Straight: give its end, by=[dx, dy, dz] or to=POSE, and only one of them")
+
         shift = None if by is None else frozen(finite_array(by, (3,), "Straight: by"))
         if shift is not None and np.linalg.norm(shift) < NO_LENGTH:
             raise InputError("Straight: by=[0, 0, 0] leads nowhere; give a shift, or leave the stage out")
         end = None if to is None else rigid(to, "Straight: to")
         place_alone = to is not None and not isinstance(to, pin.SE3) and np.shape(to) == (3,)
+
         object.__setattr__(self, "by", shift)
         object.__setattr__(self, "to", frozen(end.translation) if end is not None and place_alone else end)
         object.__setattr__(self, "frame", one_of(get_args(LineFrame), frame, "frame of Straight"))

@@ -42,15 +42,18 @@ def standing_faults(
     """
     found: list[list[Violation]] = []
     before: tuple[Touching, ...] = ()
+
     for number, (path, world, stood_on) in enumerate(zip(paths, worlds, contacts, strict=True)):
         reasons = _false_names(world, stood_on)
         reasons += _too_deep(world, path.start, stood_on, before)
         if number:
             reasons += _changes(worlds[number - 1], world, paths[number - 1].end)
         found.append([Violation(0, path.start, f"motion {number + 1}: {reason}") for reason in reasons])
+
         own = {each.touching for each in stood_on}
         others = (contact for contact in world.scene.contacts if contact not in own)
         before = (*others, *contacts_from(stood_on, len(path.waypoints)))
+
     if end is not None and paths:
         changes = _changes(worlds[-1], end, paths[-1].end)
         last = max(len(paths[-1].waypoints) - 2, 0)
@@ -77,12 +80,14 @@ def _too_deep(world: World, q: Vector, stood_on: Sequence[MotionContact], before
     going_on = {contact.pair: contact.distance for contact in before}
     named = {each.touching for each in stood_on if each.allowed}
     faults = []
+
     for contact in world.scene.contacts:
         if contact.distance < going_on.get(contact.pair, 0.0) and contact.distance < -DEEPER - DISTANCE_TOLERANCE:
             depth = _depth(world, q, contact)
             most = (depth if contact in named else min(depth, LITTLE)) + DEEPER
             if contact.distance < -most - DISTANCE_TOLERANCE:
                 faults.append(_deeper(contact.names, contact.distance, most, depth))
+
     for each in stood_on:
         if each.then is not None and each.then < -DEEPER - DISTANCE_TOLERANCE:
             faults.append(_deeper(each.touching.names, each.then, DEEPER, 0.0))
@@ -117,6 +122,7 @@ def _changes(before: World, after: World, q: Vector) -> list[str]:
         faults.append("the robot is not described as in the motion before")
     if set(before.scene.allowed_collisions) != set(after.scene.allowed_collisions):
         faults.append("the allowed collisions are not those of the motion before")
+
     old = _things(before.scene)
     new = _things(after.scene)
     faults += [f"'{name}' is in one of the scenes before and after, not in both" for name in sorted(old.keys() ^ new)]
@@ -168,6 +174,7 @@ def _between(
             for robot_after in (before, after):
                 place = _place(old, robot_before, q)
                 differences.append(place.actInv(_place(new, robot_after, q)))
+
     sizes = [
         (float(np.linalg.norm(each.translation)), float(np.linalg.norm(pin.log3(each.rotation))))
         for each in differences

@@ -235,9 +235,11 @@ def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
                 )
             raise UnknownNameError("task", name_or_file, shipped)
         path = shipped[name_or_file]
+
     document = read_yaml(path)
     if isinstance(document.data, dict) and "goal" in document.data and document.data.keys().isdisjoint(OF_TASKS):
         raise InputError(f"{path}: a problem, not a task: {NO_STAGES}; use rrtik plan {path.name}")
+
     entry = parse(document, TaskFile)
     with document.at(("robot",)):
         robot = robot_from_entry(document.data["robot"], document.path.parent)
@@ -248,6 +250,7 @@ def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
         given = entry.start.configuration(robot)
         begun = Setting.beginning(world, robot.configuration(given, "start"))
         start = usable_configuration(begun.world, given, "start")
+
     task = Task(_stages(document, entry, world, start))
     for key in OF_TASKS:
         if getattr(entry, key) is not None:
@@ -270,9 +273,11 @@ def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector
     if entry.task is not None:
         with document.at(("task",)):
             return [stage.build(world.robot) for stage in entry.task]
+
     held = build_constraints(document, entry.path_constraints, world.robot)
     with document.at(("path_constraints",)):
         placed = placed_constraints(world, start, held)
+
     stages: list[Stage] = []
     for number, goal in enumerate(entry.goals or ()):
         with document.at(("goals", number)):

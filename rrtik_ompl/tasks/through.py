@@ -94,10 +94,12 @@ def plan_through(
     placed = placed_constraints(world, start, constraints)
     if dimensions(goals) == 1 and all(isinstance(goal, Real) for goal in wanted):
         raise InputError("goals to be reached in order: this is one configuration; put it into a list: [q]")
+
     stages = [MoveTo(goal, constraints=placed) for goal in wanted]
     plan = Task(stages).plan(world, start, seconds=seconds, seed=seed)
     if not plan.found:
         return PlanThrough(False, None, (), plan.reason)
+
     rows = [plan.paths[0].waypoints, *(path.waypoints[1:] for path in plan.paths[1:])]
     reached = np.cumsum([len(part) for part in rows]) - 1
     path = path_through(plan.paths[0], np.vstack(rows))

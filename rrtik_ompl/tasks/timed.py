@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Vector, frozen, not_negative
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen, not_negative
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.model.path import JointPath
@@ -80,24 +80,31 @@ def time_task(
     radius = not_negative(blend, "blend")
     if not any(path.length > 0.0 for path in plan.paths):
         raise InputError("task plan to time: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
+
     used = RateLimits.of(plan.worlds[0].robot) if limits is None else limits
     parts: list[Trajectory] = []
     gaps: list[float] = []  # [s] of rest before each part
     begins: list[float] = []
-    now = waiting = 0.0
     pauses: list[tuple[float, float]] = []
+    now = 0.0
+    waiting = 0.0  # since the last part that moves
+
     for number, (path, world, stage) in enumerate(zip(plan.paths, plan.worlds, plan.stages, strict=True)):
         if number and rest and _changed(plan.worlds[number - 1], world):
             pauses.append((now, now + rest))
-            waiting, now = waiting + rest, now + rest
+            waiting += rest
+            now += rest
         begins.append(now)
         if path.length == 0.0:
             continue
+
         held = world_of_motion(path, world, stage)
         part = _timed(path, held, plan.contacts[number] if plan.contacts else (), used, radius, options)
         parts.append(part)
         gaps.append(waiting)
-        waiting, now = 0.0, now + part.duration
+        waiting = 0.0
+        now += part.duration
+
     return TimedTask(_joined(parts, gaps), frozen(begins), frozen(np.reshape(pauses, (-1, 2))))
 
 
@@ -135,20 +142,24 @@ def _changed(before: World, after: World) -> bool:
 
 def _joined(parts: list[Trajectory], gaps: list[float]) -> Trajectory:
     """Motions that begin where the one before ends, at rest, with a rest [s] before each."""
-    times, rows = [], {"positions": [], "velocities": [], "accelerations": []}  # type: ignore[var-annotated]
+    times = []
+    rows: dict[str, list[Matrix]] = {"positions": [], "velocities": [], "accelerations": []}
     now = 0.0
+
     for part, gap in zip(parts, gaps, strict=True):
         values = {name: getattr(part, name) for name in rows}
         if gap > 0.0:
             times.append(np.array([now]))
             for name, kept in rows.items():
-                kept.append(values[name][:1] * (name == "positions"))
+                kept.append(values[name][:1] * (name == "positions"))  # nothing moves in a rest
+
         now += gap
-        last = -1 if part is not parts[-1] else len(part.times)
+        last = -1 if part is not parts[-1] else len(part.times)  # the next one begins where a part ends
         times.append(now + part.times[:last])
         for name, kept in rows.items():
             kept.append(values[name][:last])
         now += part.duration
+
     first = parts[0]
     return Trajectory(
         np.concatenate(times),
