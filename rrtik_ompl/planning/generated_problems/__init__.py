@@ -32,11 +32,8 @@ POSTURES = 512  # drawn at a time
 DRAWS = 300  # of scenes, before a seed is given up
 SPACE_PER_DRAW = 0.01  # more room with every draw
 STARTS = 2  # tried in a scene
-MIN_DISTANCE, MAX_DISTANCE, MIN_HEIGHT = (
-    0.4,
-    0.85,
-    -0.25,
-)  # where a goal's tip lies: distance from the base and height, in reaches
+MIN_DISTANCE, MAX_DISTANCE = 0.4, 0.85  # of a goal's tip from the base, in reaches
+MIN_HEIGHT = -0.25  # of a goal's tip above the base, in reaches
 AWAY = 0.3  # the tip's least distance between start and goal, in reaches
 OUTWARD = 0.3  # cosine of the forearm's angle to the way out, at least
 PATIENCE = 60.0  # [s], never used up
@@ -59,18 +56,22 @@ def generated_problem(robot: Robot, family: str, seed: int, *, motion_resolution
     if family not in FAMILIES:
         raise UnknownNameError("family of generated problems", str(family), FAMILIES)
     whole_number(seed, "seed")
+
     rng = np.random.default_rng([list(FAMILIES).index(family), int(seed)])
     alone = World(robot)
     reach = _reach(robot)
     goals = _goals(alone, reach, rng)
+
     for number in range(DRAWS):
         goal, place = next(goals)
         scene = Scene(obstacles(family, rng, place, reach, 1.0 + SPACE_PER_DRAW * number))
         world = World(robot, scene, motion_resolution=motion_resolution)
+
         for start in _starts(world, goal, reach, rng):
             problem = Problem(world, start, goal, name=f"{robot.name}/{family}/{seed}")
             if _solvable(problem):
                 return problem
+
     raise InputError(f"{family} {seed}: none of {DRAWS} scenes for robot '{robot.name}' is solvable; take another seed")
 
 
@@ -90,10 +91,8 @@ def _postures(robot: Robot, count: int, rng: np.random.Generator) -> Matrix:
     """Random configurations within half a turn of zero and within the limits, shape (count, dof)."""
     lower, upper = robot.finite_range()
     turning = ~robot.prismatic & (lower < np.pi) & (upper > -np.pi)
-    lower, upper = (
-        np.where(turning, np.maximum(lower, -np.pi), lower),
-        np.where(turning, np.minimum(upper, np.pi), upper),
-    )
+    lower = np.where(turning, np.maximum(lower, -np.pi), lower)
+    upper = np.where(turning, np.minimum(upper, np.pi), upper)
     return np.asarray(rng.uniform(lower, upper, (count, robot.dof)))
 
 
@@ -104,19 +103,18 @@ def _goals(alone: World, reach: float, rng: np.random.Generator) -> Iterator[tup
     while True:
         rows = _postures(robot, POSTURES, rng)
         rows = rows[alone.valid_batch(rows)]
-        frames, tips = robot.joint_frames(rows), robot.fk_batch(rows)[:, :3, 3]
+
+        frames = robot.joint_frames(rows)
+        tips = robot.fk_batch(rows)[:, :3, 3]
         elbow = frames[:, (len(robot.chain.parent) + 1) // 2, :3, 3]
         away = tips - base
+
         for row, tip, joint, way, axis in zip(rows, tips, elbow, away, frames[:, 1, :3, 2], strict=True):
-            forearm, distance = tip - joint, float(np.linalg.norm(way))
-            long_enough = (
-                np.linalg.norm(forearm) > 1e-3 * reach and MIN_DISTANCE * reach < distance < MAX_DISTANCE * reach
-            )
-            if (
-                long_enough
-                and way[2] > MIN_HEIGHT * reach
-                and forearm @ way > OUTWARD * distance * np.linalg.norm(forearm)
-            ):
+            forearm = tip - joint
+            distance = float(np.linalg.norm(way))
+            length = np.linalg.norm(forearm)
+            near_enough = MIN_DISTANCE * reach < distance < MAX_DISTANCE * reach and way[2] > MIN_HEIGHT * reach
+            if near_enough and length > 1e-3 * reach and forearm @ way > OUTWARD * distance * length:
                 yield row, pin.SE3(_axes(forearm, axis), tip)
 
 
@@ -135,7 +133,9 @@ def _starts(world: World, goal: Vector, reach: float, rng: np.random.Generator) 
     if not world.valid(goal) or not world.certify(goal[None])[0]:
         return []
     rows = _postures(world.robot, POSTURES, rng)
-    tips, target = world.robot.fk_batch(rows)[:, :3, 3], world.robot.fk(goal).translation
+    tips = world.robot.fk_batch(rows)[:, :3, 3]
+    target = world.robot.fk(goal).translation
+
     rows = rows[np.linalg.norm(tips - target, axis=1) > AWAY * reach]
     rows = rows[world.valid_batch(rows) & world.certify(rows)]
     rows = rows[~world.motion_valid_batch(rows, np.repeat(goal[None], len(rows), axis=0))]

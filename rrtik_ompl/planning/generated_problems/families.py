@@ -34,16 +34,24 @@ def _board(low: tuple[float, float, float], high: tuple[float, float, float]) ->
 
 def panel(rng: np.random.Generator, room: float) -> Solids:
     """A board behind the tip with a shelf below it, a wall on one side, and knobs; after the subsea panel."""
-    gap, width, up = rng.uniform(0.04, 0.08), rng.uniform(0.3, 0.5), rng.uniform(0.2, 0.4)
-    side, floor, depth = rng.choice([-1.0, 1.0]), -room * rng.uniform(0.1, 0.18), rng.uniform(0.2, 0.35)
+    gap = rng.uniform(0.04, 0.08)
+    width = rng.uniform(0.3, 0.5)
+    up = rng.uniform(0.2, 0.4)
+    side = rng.choice([-1.0, 1.0])
+    floor = -room * rng.uniform(0.1, 0.18)
+    depth = rng.uniform(0.2, 0.35)
     wall = sorted(side * (room * rng.uniform(0.1, 0.18) + np.array([0.0, THICKNESS])))
+
     solids = [
         _board((gap, -width, floor), (gap + THICKNESS, width, up)),
         _board((-depth, -width, floor - THICKNESS), (gap + THICKNESS, width, floor)),
         _board((-depth, wall[0], floor), (gap, wall[1], up)),
     ]
+
     for _ in range(rng.integers(2, 5)):
-        y, z, length = -side * rng.uniform(0.12, width), rng.uniform(floor, up), rng.uniform(0.04, 0.12)
+        y = -side * rng.uniform(0.12, width)
+        z = rng.uniform(floor, up)
+        length = rng.uniform(0.04, 0.12)
         turned = pin.SE3(pin.utils.rotate("y", np.pi / 2), np.array([gap - 0.5 * length, y, z]))
         solids.append((Cylinder(rng.uniform(0.01, 0.03), length), turned))
     return solids
@@ -53,10 +61,8 @@ def pipes(rng: np.random.Generator, room: float) -> Solids:
     """Upright and level pipes around the way of the forearm."""
     solids: Solids = []
     for number in range(rng.integers(6, 11)):
-        x, away = (
-            rng.uniform(-0.4, 0.15),
-            rng.choice([-1.0, 1.0]) * rng.uniform(room * FREE_AROUND, 0.4 + room * FREE_AROUND),
-        )
+        x = rng.uniform(-0.4, 0.15)
+        away = rng.choice([-1.0, 1.0]) * rng.uniform(room * FREE_AROUND, 0.4 + room * FREE_AROUND)
         along = float(rng.uniform(-0.3, 0.3))
         upright = number % 2 == 0
         rotation = np.eye(3) if upright else pin.utils.rotate("x", np.pi / 2)
@@ -67,14 +73,19 @@ def pipes(rng: np.random.Generator, room: float) -> Solids:
 
 def frame(rng: np.random.Generator, room: float) -> Solids:
     """Two windows of bars one behind the other, joined by four rails; the forearm reaches through the first."""
-    half, front, back = room * rng.uniform(0.12, 0.2, 2), -rng.uniform(0.08, 0.2), rng.uniform(0.1, 0.2)
+    half = room * rng.uniform(0.12, 0.2, 2)
+    front = -rng.uniform(0.08, 0.2)
+    back = rng.uniform(0.1, 0.2)
     y, z = half + BARS
     solids: Solids = []
+
     for x in (front, back):
         for sign in (-1.0, 1.0):
             solids.append(_beam((x, sign * y, 0.0), (BARS, BARS, z + BARS)))
             solids.append(_beam((x, 0.0, sign * z), (BARS, y + BARS, BARS)))
-    middle, length = 0.5 * (front + back), 0.5 * (back - front)
+
+    middle = 0.5 * (front + back)
+    length = 0.5 * (back - front)
     solids += [_beam((middle, a * y, b * z), (length, BARS, BARS)) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
     return solids
 
@@ -85,9 +96,12 @@ def _beam(centre: tuple[float, float, float], half: tuple[float, float, float]) 
 
 def _slot(rng: np.random.Generator, room: float, roll: float) -> Solids:
     """Two plates with the forearm between them, turned about its way."""
-    gap, front, back = room * rng.uniform(0.065, 0.09), -rng.uniform(0.15, 0.3), rng.uniform(0.05, 0.1)
+    gap = room * rng.uniform(0.065, 0.09)
+    front = -rng.uniform(0.15, 0.3)
+    back = rng.uniform(0.05, 0.1)
     half = rng.uniform(0.2, 0.35)
     turned = pin.SE3(pin.utils.rotate("x", roll), np.zeros(3))
+
     plates = [
         _board((front, gap, -half), (back, gap + THICKNESS, half)),
         _board((front, -gap - THICKNESS, -half), (back, -gap, half)),
@@ -109,8 +123,10 @@ def clutter(rng: np.random.Generator, room: float) -> Solids:
     """Boxes, cylinders and balls of many sizes, some near the tip and some far."""
     solids: Solids = []
     for _ in range(CLUTTER):
-        kind, size = rng.integers(3), rng.uniform(0.03, 0.12, 3)
+        kind = rng.integers(3)
+        size = rng.uniform(0.03, 0.12, 3)
         shape: Shape = (Box(size), Cylinder(0.5 * size[0], 2.0 * size[1]), Sphere(0.6 * size[0]))[kind]
+
         way = rng.normal(size=3)
         centre = way / np.linalg.norm(way) * rng.uniform(room * 0.1, 0.9)
         solids.append((shape, pin.SE3(pin.exp3(rng.normal(size=3)), centre)))

@@ -62,11 +62,13 @@ def cut_parts(waypoints: ArrayLike, motions_free: MotionsFree, *, stop: Stop = n
     The cut of a whole route checks about the square of its moves, and far waypoints come first; most of its gain is
     near. See :func:`axis_cut`.
     """
-    route, size = _route(waypoints), PART
+    route = _route(waypoints)
+    size = PART
     while size < len(route) - 1 and not stop():
         parts = [route[k : k + size + 1] for k in range(0, len(route) - 1, size)]
         cut = [double_axis_cut(part, motions_free, stop=stop) for part in parts]
-        route, size = merge_moves(np.vstack(cut), tolerance=0.0), LONGER * size
+        route = merge_moves(np.vstack(cut), tolerance=0.0)
+        size = LONGER * size
     return double_axis_cut(route, motions_free, stop=stop)
 
 
@@ -88,7 +90,8 @@ def check_once(motions_free: MotionsFree) -> MotionsFree:
 
     def free(A: Matrix, B: Matrix) -> Mask:
         turned = np.array([a > b for a, b in zip(A.tolist(), B.tolist(), strict=True)], dtype=bool)[:, None]
-        first, second = np.where(turned, B, A), np.where(turned, A, B)
+        first = np.where(turned, B, A)
+        second = np.where(turned, A, B)
         keys = [motion.tobytes() for motion in np.hstack([first, second])]
         fresh = {key: k for k, key in enumerate(keys) if key not in answers}
         if fresh:
@@ -102,36 +105,42 @@ def check_once(motions_free: MotionsFree) -> MotionsFree:
 def _backward_pass(route: Matrix, motions_free: MotionsFree, axes: Sequence[int] | None, stop: Stop) -> Matrix:
     """Algorithm 12. The returned route runs from the last waypoint to the first."""
     order = _order(axes, route.shape[1])
-    pivot, new = len(route) - 1, [route[-1:]]
+    pivot = len(route) - 1
+    new = [route[-1:]]
     while pivot > 0 and not stop():
         test = _earliest_reachable(route, pivot, motions_free, order)
         new.append(_way(route, pivot, test, motions_free, order))
         pivot = test
+
     new.append(route[:pivot][::-1])
     return merge_moves(np.vstack(new), tolerance=0.0)
 
 
 def _earliest_reachable(route: Matrix, pivot: int, motions_free: MotionsFree, order: Sequence[int]) -> int:
     """The first waypoint that single-joint moves reach from the pivot; its neighbour if there is no other."""
-    first, count = 0, FIRST_TESTS
+    first = 0
+    count = FIRST_TESTS
     while first < pivot - 1:
         last = min(first + count, pivot - 1)
         reached = _reached(route[pivot], route[first:last], motions_free, order)
         if reached.any():
             return first + int(reached.argmax())
-        first, count = last, MORE_TESTS * count
+        first = last
+        count = MORE_TESTS * count
     return pivot - 1
 
 
 def _reached(a: Vector, goals: Matrix, motions_free: MotionsFree, order: Sequence[int]) -> Mask:
     """Which goals, shape (m, n), single-joint moves from a reach, the joints in the order given. Shape (m,)."""
     # What moves last from a, a proximal joint, sweeps most, so it refutes soonest. The answers are the same.
-    reached, order = np.ones(len(goals), dtype=bool), list(order)
+    reached = np.ones(len(goals), dtype=bool)
+    order = list(order)
     for k, axis in reversed(list(enumerate(order))):
         here = np.repeat(a[None], len(goals), axis=0)
         here[:, order[:k]] = goals[:, order[:k]]
         there = here.copy()
         there[:, axis] = goals[:, axis]
+
         open_ = np.flatnonzero(reached & (there[:, axis] != here[:, axis]))
         if len(open_):
             reached[open_] = motions_free(here[open_], there[open_])
@@ -145,6 +154,7 @@ def _way(route: Matrix, pivot: int, test: int, motions_free: MotionsFree, order:
     must not stop the pass.
     """
     moves = axis_moves(route[pivot], route[test], order)
+
     neighbours = test == pivot - 1 and len(moves) > 1
     if neighbours and not _reached(route[pivot], route[test:pivot], motions_free, order).all():
         return route[test:pivot]

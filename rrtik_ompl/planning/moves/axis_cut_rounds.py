@@ -43,11 +43,13 @@ def axis_cut_rounds(
     """
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
+
     budget = Budget() if budget is None else budget
     rng = np.random.default_rng(budget.seed)
     free = check_once(motions_free)
     route = best = double_axis_cut(waypoints, free, stop=budget.over)
     fewest = lower_bound(best[0], best[-1])
+
     for k in range(rounds):
         if transitions(best) == fewest or budget.over():
             break
@@ -72,6 +74,7 @@ def best_of(attempt: Callable[[int], Matrix | None], count: int, *, seed: int = 
     """
     if count < 1:
         raise InputError(f"count: expected at least 1, got {count}")
+
     seeds = np.random.SeedSequence(seed).generate_state(count).tolist()
     return min((route for s in seeds if (route := attempt(s)) is not None), key=route_rank, default=None)
 

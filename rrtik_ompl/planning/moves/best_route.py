@@ -34,7 +34,10 @@ class BestRoute:
     def __init__(
         self, queries: BatchedMotionQueries, costs: Vector, order: Sequence[int], smallest_move: Vector
     ) -> None:
-        self._queries, self._costs, self._order, self._smallest_move = queries, costs, order, smallest_move
+        self._queries = queries
+        self._costs = costs
+        self._order = order
+        self._smallest_move = smallest_move
         self.route: Matrix | None = None
         self._rank: tuple[int, float] = NONE, np.inf  # of the route
 
@@ -46,19 +49,13 @@ class BestRoute:
     def take(self, route: Matrix) -> None:
         """Take in a free route, shape (k, n); it is kept if it is better."""
         if self._gains(route):
-            self.route, self._rank = route, self.rank(route)
+            self.route = route
+            self._rank = self.rank(route)
 
     def rank(self, route: Matrix) -> tuple[int, float]:
         """What is to be made small: moves, then travel; a gain of rounding is none."""
         travel = float((np.abs(np.diff(route, axis=0)) @ self._costs).sum())
         return transitions(route), round(travel, DIGITS)
-
-    def _of_less_travel(self, values: Values, start: Vector, goal: Vector) -> Values:
-        """Those values that a route between two ends can take with no more travel than the best one."""
-        if self.route is None:
-            return values
-        left = within_travel(values, start, goal, self._costs, self._rank[1])
-        return [v[:1] for v in values] if left is None else left
 
     def cut(self, route: Matrix, axes: Sequence[int] | None = None) -> Matrix:
         """The published double axis cut of a free route: on long ones it gains much more in a second than a lattice.
@@ -97,11 +94,20 @@ class BestRoute:
         """
         if shorter and last - first == len(route) - 1:  # where a part begins or ends moves may become one
             values = self._of_less_travel(values, route[0], route[-1])
+
         part = self._lattice_route(values, route[first], route[last])
         if part is not None:
             whole = merge_moves(np.vstack([route[:first], part, route[last + 1 :]]), tolerance=0.0)
             if self._gains(whole) and self._confirmed(whole, route):
-                self.route, self._rank = whole, self.rank(whole)
+                self.route = whole
+                self._rank = self.rank(whole)
+
+    def _of_less_travel(self, values: Values, start: Vector, goal: Vector) -> Values:
+        """Those values that a route between two ends can take with no more travel than the best one."""
+        if self.route is None:
+            return values
+        left = within_travel(values, start, goal, self._costs, self._rank[1])
+        return [v[:1] for v in values] if left is None else left
 
     def _gains(self, route: Matrix) -> bool:
         return self.rank(route) < self._rank and long_enough(route, self._smallest_move)
@@ -116,6 +122,7 @@ class BestRoute:
     def _lattice_route(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
         if lattice_size(values) < 2:
             return None
+
         lattice = MoveLattice(values, self._queries, self._costs)
         found = lattice.best_route(start, goal, self._order)
         return found if found is not None and self._confirmed(found, start[None]) else None

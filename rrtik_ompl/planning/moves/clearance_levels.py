@@ -24,7 +24,9 @@ class Level:
     """
 
     def __init__(self, world: World, clearance: float | None, searched: float) -> None:
-        self._world, self._kept, self._searched = world, clearance, searched
+        self._world = world
+        self._kept = clearance
+        self._searched = searched
         self.clearance = 0.0 if clearance is None else clearance
 
     @cached_property

@@ -71,6 +71,7 @@ class FineGrids:
         best: tuple[Matrix, int] | None = None
         if not 0 < len(self.joints) <= MOST_JOINTS:
             return best
+
         rng = np.random.default_rng(self.budget.seed)
         with suppress(OutOfTime):
             idle = 0
@@ -79,16 +80,21 @@ class FineGrids:
                 for start, goal in pairs[:MOST_PAIRS]:
                     if len(known) - 1 <= least or idle > MOST_IDLE:
                         return best
+
                     values = self._values_near(known, nodes, rng) if near else self._values(start, goal, nodes, rng)
                     first, last = (known[0], known[-1]) if near else (start, goal)
+
                     found = self._kept(values, first, last, len(known) - 2)
                     if found is not None:
-                        best, known, idle = found, found[0], 0
+                        best = found
+                        known = found[0]
+                        idle = 0
         return best
 
     def _values(self, start: Vector, goal: Vector, nodes: int, rng: np.random.Generator) -> Values:
         """As many values of each joint as a grid of so many configurations has, at equal distances."""
-        values, each = values_of(np.array([start, goal])), self._each(nodes)
+        values = values_of(np.array([start, goal]))
+        each = self._each(nodes)
         for joint in self.joints:
             more = spread_values(float(self.lower[joint]), float(self.upper[joint]), each, rng)
             values[joint] = distinct(np.append(values[joint], more))
@@ -96,9 +102,12 @@ class FineGrids:
 
     def _values_near(self, route: Matrix, nodes: int, rng: np.random.Generator) -> Values:
         """The values of a route, and as many close to each as a grid of so many configurations has."""
-        values, each = values_of(route), self._each(nodes)
+        values = values_of(route)
+        each = self._each(nodes)
         for joint in self.joints:
-            own, (low, high) = values[joint], (float(self.lower[joint]), float(self.upper[joint]))
+            own = values[joint]
+            low = float(self.lower[joint])
+            high = float(self.upper[joint])
             aside = NEAR * (high - low) * spread_values(-1.0, 1.0, max(each // len(own), 1), rng)
             values[joint] = distinct(np.append(own, np.clip(np.add.outer(own, aside).ravel(), low, high)))
         return values
@@ -112,6 +121,7 @@ class FineGrids:
         route = self._proven(self.levels[last], values, start, goal, most)
         if route is None:
             return None
+
         for number, level in enumerate(self.levels[:last]):
             roomy = self._proven(level, values, start, goal, len(route) - 1)
             if roomy is not None:
@@ -123,6 +133,7 @@ class FineGrids:
         in_steps = BatchedMotionQueries(level.searched.motion_valid_batch, self.budget.over)
         proving = BatchedMotionQueries(level.proving.motion_valid_batch, self.budget.over)
         lattice = MoveLattice(values, in_steps, self.costs)
+
         for _ in range(MOST_PROOFS):
             route = lattice.best_route(start, goal, range(len(start)), most)
             if route is None or not long_enough(route, self.smallest_move):

@@ -60,15 +60,19 @@ class MoveLattice:
         Returns:
             Shape (moves + 1, n), or None if there is no such route.
         """
-        end, steps = self._index(goal), self._steps()
+        end = self._index(goal)
+        steps = self._steps()
+
         levels = [np.full(self._shape, np.inf)]
         levels[0][self._index(start)] = 0.0
+
         while not np.isfinite(levels[-1][end]):
             if len(levels) - 1 == most:
                 return None
             levels.append(_after_a_move(levels[-1], steps))
             if (np.isfinite(levels[-1]) == np.isfinite(levels[-2])).all():
                 return None
+
         return self._traced(levels, end, [self._joints.index(joint) for joint in order if joint in self._joints])
 
     def closed_on(self, route: Matrix, motions_free: MotionsFree) -> int:
@@ -78,13 +82,15 @@ class MoveLattice:
             route: Shape (k, n).
             motions_free: Which straight motions are free, for batches of shape (m, n).
         """
-        places, closed = [np.array(self._index(q)) for q in route], 0
+        places = [np.array(self._index(q)) for q in route]
+        closed = 0
         for one, other in pairwise(places):
             axis = int(np.flatnonzero(one != other)[0])
             low, high = sorted((int(one[axis]), int(other[axis])))
             line = np.repeat(one[:, None], high - low + 1, axis=1)
             line[axis] = np.arange(low, high + 1)
             rows = self._rows(line)
+
             hit = np.flatnonzero(~motions_free(rows[:-1], rows[1:]))
             _line(self._open[axis], tuple(one.tolist()), axis)[low + hit] = False
             closed += len(hit)
@@ -95,10 +101,13 @@ class MoveLattice:
         rows = self._rows(np.indices(self._shape).reshape(len(self._shape), -1))
         inside = motions_free(rows, rows).reshape(self._shape)
         numbers = np.arange(self.size).reshape(self._shape)
+
         found = [_both_ends(inside, joint) for joint in range(len(self._shape))]
         tails = [_without_last(numbers, joint)[open_] for joint, open_ in enumerate(found)]
         heads = [_without_first(numbers, joint)[open_] for joint, open_ in enumerate(found)]
+
         free = motions_free(rows[np.concatenate(tails)], rows[np.concatenate(heads)])
+
         parts = np.split(free, np.cumsum([len(part) for part in tails])[:-1])
         for open_, part in zip(found, parts, strict=True):
             open_[open_] = part
@@ -124,7 +133,8 @@ class MoveLattice:
         """The route to a configuration, from the last move to the first."""
         indices = [end]
         for level in range(len(levels) - 1, 0, -1):
-            here, wanted = indices[-1], float(levels[level][indices[-1]])
+            here = indices[-1]
+            wanted = float(levels[level][here])
             indices.append(next(self._origins(levels[level - 1], here, wanted, order)))
         return self._rows(np.array(indices[::-1]).T)
 
@@ -151,7 +161,9 @@ def _after_a_move(costs: Costs, steps: list[tuple[int, Costs]]) -> Costs:
     """The least costs after one more move, or as before where no move helps: carried along all runs, both ways."""
     best = costs.copy()
     for axis, step in steps:
-        source, sink, count = costs.swapaxes(axis, 0), best.swapaxes(axis, 0), len(step)
+        source = costs.swapaxes(axis, 0)
+        sink = best.swapaxes(axis, 0)
+        count = len(step)
         for forward in (True, False):
             carried = np.full(source.shape[1:], np.inf)
             for k in range(count) if forward else range(count - 1, -1, -1):

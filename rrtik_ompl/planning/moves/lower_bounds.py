@@ -78,10 +78,16 @@ class OneFreeValue:
     """
 
     def __init__(self, world: World, start: Vector, goal: Vector, joint: int, stop: Stop) -> None:
-        self._world, self._start, self._goal, self._joint, self._stop = world, start, goal, joint, stop
+        self._world = world
+        self._start = start
+        self._goal = goal
+        self._joint = joint
+        self._stop = stop
+
         self._others = [k for k in np.flatnonzero(moved(start, goal)).tolist() if k != joint]
         self._full = (1 << len(self._others)) - 1
         self._depth = OverlapDepth(world.robot, world.bodies, world.pairs)
+
         ends = start[joint], goal[joint]
         self._lower = float(max(world.robot.lower[joint], min(ends) - TAU))
         self._upper = float(min(world.robot.upper[joint], max(ends) + TAU))
@@ -90,10 +96,12 @@ class OneFreeValue:
         """Whether there is a proof that something collides on every such route."""
         if self._full >= MOST_CORNERS:
             return False
+
         corners = range(self._full + 1)
         self._stretches = {(mask, end): self._stretch(mask, end) for end in (START, GOAL) for mask in corners}
         steps = [step for end in (START, GOAL) for step in self._steps_of_others(end)]
         self._standing = {step for step in steps if self._is_free(step, 0.0)}
+
         parts = [(self._lower, self._upper)]
         for _ in range(MOST_WORK // (self._full + 1)):
             if not parts:
@@ -108,12 +116,14 @@ class OneFreeValue:
 
     def _verdict(self, low: float, high: float) -> bool | None:
         """Whether no value of a part makes a free route; None if its middle does."""
-        middle, refuted = 0.5 * (low + high), set[Step]()
+        middle = 0.5 * (low + high)
+        refuted = set[Step]()
         while True:
             route = self._route(low, high, refuted)
             if route is None:
                 return True
             free = [step for step in pairwise(route) if step[0][1] == step[1][1] == FREE]
+
             fresh = {step for step in free if self._collides_deeply(step, middle, 0.5 * (high - low))}
             if not fresh:
                 return None if all(self._is_free(step, middle) for step in pairwise(route)) else False
@@ -126,9 +136,11 @@ class OneFreeValue:
             if here in origin:
                 for there in self._open_from(here, low, high, refuted):
                     origin.setdefault(there, here)
+
         place: Place | None = (self._full, GOAL)
         if place not in origin:
             return None
+
         route = []
         while place is not None:
             route.append(place)
@@ -168,23 +180,29 @@ class OneFreeValue:
 
     def _stretch(self, mask: int, end: int) -> tuple[float, float]:
         """Between which values the free joint could move to or from an end of its motion, while the others rest."""
-        rows = self._between(*((mask, FREE, value) for value in (self._lower, self._upper)))
+        rows = self._between(((mask, FREE), (mask, FREE)), (self._lower, self._upper))
         here = self._configuration((mask, end), 0.0)[self._joint]
         hits = rows[~self._world.valid_batch(rows), self._joint]
         return hits[hits <= here].max(initial=self._lower), hits[hits >= here].min(initial=self._upper)
 
-    def _between(self, first: tuple[int, int, float], last: tuple[int, int, float]) -> Matrix:
-        """Configurations from one to another as dense as the world checks a motion, shape (k, n)."""
-        a, b = (self._configuration((mask, state), value) for mask, state, value in (first, last))
+    def _between(self, step: Step, values: tuple[float, float]) -> Matrix:
+        """Configurations of a move as dense as the world checks it, shape (k, n).
+
+        ``values``: of the free joint, where it is free, at the begin and at the end.
+        """
+        a = self._configuration(step[0], values[0])
+        b = self._configuration(step[1], values[1])
         shares = np.linspace(0.0, 1.0, self._world.steps(a, b) + 1)[:, None]
         rows: Matrix = (1.0 - shares) * a + shares * b
         return rows
 
     def _collides_deeply(self, step: Step, value: float, reach: float) -> bool:
         """Whether a move collides wherever the free joint is within ``reach`` of a value."""
-        rows = self._between(*((mask, state, value) for mask, state in step))
+        rows = self._between(step, (value, value))
         needed = float(self._world.weights[self._joint]) * reach
+
         hits = np.flatnonzero(~self._world.valid_batch(rows))
+
         stretches = sorted(np.split(hits, np.flatnonzero(np.diff(hits) > 1) + 1), key=len, reverse=True)
         probes = [stretch[len(stretch) // 2] for stretch in stretches[:PROBES] if len(stretch)]
         return any(self._depth.travel(rows[k]) > needed for k in probes)

@@ -38,11 +38,16 @@ def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector
         At most ``most``; 0 if there are not two joints, one has no limits, or there was no time.
     """
     chosen = list(joints)
-    lower, upper = world.robot.lower[chosen], world.robot.upper[chosen]
+    lower = world.robot.lower[chosen]
+    upper = world.robot.upper[chosen]
     if len(chosen) != 2 or not np.isfinite([lower, upper]).all() or not (lower < upper).all():
         return 0
-    depth, left, bound = OverlapDepth(world.robot, world.bodies, world.pairs), MOST_DEPTHS, 0
+
+    depth = OverlapDepth(world.robot, world.bodies, world.pairs)
+    left = MOST_DEPTHS
+    bound = 0
     closed = np.zeros((1, 1), dtype=bool)
+
     for count in CELLS:
         closed = closed.repeat(count // len(closed), axis=0).repeat(count // closed.shape[1], axis=1)
         half = 0.5 * (upper - lower) / count
@@ -53,10 +58,12 @@ def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector
         if len(hits) > left or stop():
             break
         left -= len(hits)
+
         deep = _deep(depth, rows[hits], float(world.weights[chosen] @ (half + SAME)), stop)
         if deep is None:
             break
         closed[tuple(places[hits[deep]].T)] = True
+
         ends = [_cell(q[chosen], lower, half, count) for q in (start, goal)]
         bound = _moves_between(closed, ends[0], ends[1], most)
         if bound == most:
@@ -67,6 +74,7 @@ def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector
 def _deep(depth: OverlapDepth, rows: Matrix, reach: float, stop: Stop) -> Mask | None:
     """Which configurations, shape (m, n), collide more deeply than a reach [m]; None if there is no time."""
     found = np.zeros(len(rows), dtype=bool)
+
     for k, q in enumerate(rows):
         if k % AT_ONCE == 0 and stop():
             return None

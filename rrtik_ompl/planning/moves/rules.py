@@ -59,6 +59,7 @@ class MoveRules:
         names = tuple(name_of(name, "a joint") for name in listed(names, "names of joints"))
         dof = len(names) if dof is None else whole_number(dof, "dof")
         at_most(dof, MOST_JOINTS, "dof")
+
         self.joint_costs = costs_of_joints(joint_costs, dof)
         self.frozen_joints = joint_numbers(frozen_joints, names, dof, "frozen_joints")
         self.last_joints = joint_numbers(last_joints, names, dof, "last_joints")
@@ -77,10 +78,13 @@ class MoveRules:
             InputError: If it is no route of n joints, or has no row.
         """
         route = self._route(route)
+
         ending = np.diff(route[self.head(route) - 1 :], axis=0)
         others = np.delete(ending, self.last_joints, axis=1)
-        once = (np.count_nonzero(np.diff(merge_moves(route, tolerance=0.0), axis=0), axis=0) <= 1)[self.last_joints]
+        times = np.count_nonzero(np.diff(merge_moves(route, tolerance=0.0), axis=0), axis=0)  # that each joint moves
+        once = times[self.last_joints] <= 1
         rests = (route[:, self.frozen_joints] == route[0, self.frozen_joints]).all()
+
         return bool(rests and once.all() and not others.any() and long_enough(route, self.smallest_move))
 
     def head(self, route: Matrix) -> int:
@@ -146,6 +150,7 @@ def joint_numbers(joints: Joints, names: Sequence[str], dof: int, option: str) -
     """
     if isinstance(joints, str) or not isinstance(joints, Sequence):
         raise InputError(f"{option}: expected a list of joints, got {joints!r}")
+
     numbers = {}
     for joint in joints:
         if isinstance(joint, str):

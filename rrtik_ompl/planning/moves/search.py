@@ -78,15 +78,19 @@ class MoveSearch:
         self._differing = min(self._bounds)
         self._lower = lower
         self._upper = upper
+
         self._queries = BatchedMotionQueries(motions_free, budget.over)
         self._rng = np.random.default_rng(budget.seed)
+
         count = starts.shape[1]
         order = self._rng.permutation(count).tolist()
         shortest = np.zeros(count) if smallest_move is None else smallest_move
         travel = np.ones(count) if costs is None else costs
         self._best = BestRoute(self._queries, travel, order, shortest)
+
         self._unkept = None if all_free is None else BatchedMotionQueries(all_free, budget.over)
         self._any = self._best if self._unkept is None else BestRoute(self._unkept, travel, order, shortest)
+
         self._movable = [j for j in range(count) if j not in frozen and lower[j] < upper[j]]
         self._most_nodes = most_nodes
         self._prove = prove
@@ -148,6 +152,7 @@ class MoveSearch:
                 if lattice_size(values) > self._most_nodes:
                     self._try_plain_orders(start, goal)
                     continue
+
                 found = self._best.search(values, start, goal)
                 if (found is None or transitions(found) > least) and self._any is not self._best:
                     found = self._any.search(values, start, goal)
@@ -181,11 +186,13 @@ class MoveSearch:
             if not self.proven:
                 self._offers = [self._cut(offered) for offered in self._offers]
                 self._cut_again()
+
             for joint in self._movable:
                 self._free_values([joint])
             for offered in self._offers:
                 if not self.proven:
                     self._rearrange(offered)
+
             for joints in islice(self._free_joints(), rounds):
                 self._sharpen()
                 if self.proven:
@@ -195,6 +202,7 @@ class MoveSearch:
                 self._cut_again()
                 if self.route is not None:
                     self._around(self.route)
+
             self._other_orders()
             self._less_travel()
 
@@ -231,7 +239,9 @@ class MoveSearch:
         """Prove a better bound where that would settle the matter."""
         if self._prove is None or self.moves != self.bound + 1:
             return
-        prove, self._prove = self._prove, None
+
+        prove = self._prove
+        self._prove = None
         for number, (start, goal) in enumerate(self.pairs):
             if lower_bound(start, goal) < self._bounds[number] < self.moves:  # its corners are settled
                 self.raise_bound(number, prove(start, goal))
@@ -251,6 +261,7 @@ class MoveSearch:
         last = self._window(route, first)
         while first > 0 and lattice_size(values_of(route[first - 1 : last + 1])) <= self._most_nodes // SPARE:
             first -= 1
+
         joints = self._some_joints(MOST_FREE)
         self._best.replace(route, first, last, self._with_spread(route[first : last + 1], joints))
 
@@ -271,7 +282,8 @@ class MoveSearch:
     def _other_orders(self) -> None:
         """Let the joints that make detours in the best route make others, in other orders."""
         if self.route is not None:
-            values, ends = values_of(self.route), values_of(self.route[[0, -1]])
+            values = values_of(self.route)
+            ends = values_of(self.route[[0, -1]])
             detours = [j for j in self._movable if len(values[j]) > len(ends[j])]
             if detours:
                 self._free_values(detours)

@@ -71,20 +71,25 @@ def one_joint_moves(
     if len(path.waypoints) < 2:
         raise InputError("path to convert: it has one waypoint, so there is nothing to convert")
     require_joints(world.robot, path.joint_names, "path")
+
     faults = violations_of(world, path.waypoints)
     if faults:
         raise InputError(f"path to convert: motion {faults[0].edge + 1} is not valid: {faults[0].reason}")
+
     least = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
     check_route_clearance(world, clearance, path.waypoints)
+
     for kept in provable_clearances(world, path.waypoints, clearance):
         with suppress(InputError):  # no staircase keeps so much; one that keeps less may
             rows = _converted(path.waypoints, keeping(world, 0.0, proven=kept), least)
             return proved(path_through(path, rows), world, clearance=kept)
+
     for density in DENSITIES:
         finer = form_of(world, motion_resolution=max(world.motion_resolution / density, FINEST_RESOLUTION))
         rows = _converted(path.waypoints, finer, least)
         if not violations_of(world, rows):
             return proved(path_through(path, rows), world)
+
     raise InputError("path to convert: its single-joint moves do not pass the second check; lower motion_resolution")
 
 
@@ -101,6 +106,7 @@ def staircase_orders(a: Vector, b: Vector, motions_free: MotionsFree) -> list[Or
     """
     joints = np.flatnonzero(a != b)
     steps = _free_steps(a, b, joints, motions_free)
+
     full = (1 << len(joints)) - 1
     orders = []
     for first in steps.get(0, []):
@@ -114,17 +120,22 @@ def staircase_orders(a: Vector, b: Vector, motions_free: MotionsFree) -> list[Or
 def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_free: MotionsFree) -> dict[int, list[int]]:
     """The free steps that lead from a to b, by the corner of the box where they begin; a corner is a set of bits."""
     places = range(len(joints))[::-1]  # the last joint first: distal joints sweep less
-    frontier, layers = [0], []
+    frontier = [0]
+    layers = []
+
     for _ in places:
         tried = [(corner, k) for corner in frontier for k in places if not corner >> k & 1]
         tails = np.array([_corner(a, b, joints, corner) for corner, _ in tried])
         heads = np.array([_corner(a, b, joints, corner | 1 << k) for corner, k in tried])
+
         free = [step for step, ok in zip(tried, motions_free(tails, heads), strict=True) if ok]
         layers.append(free)
         frontier = sorted({corner | 1 << k for corner, k in free})[:WIDEST]
         if not frontier:
             return {}
-    alive, steps = {(1 << len(joints)) - 1}, dict[int, list[int]]()
+
+    alive = {(1 << len(joints)) - 1}
+    steps = dict[int, list[int]]()
     for layer in reversed(layers):  # backwards, so that steps into dead ends fall away
         for corner, k in layer:
             if corner | 1 << k in alive:
@@ -159,7 +170,9 @@ def _converted(waypoints: Matrix, world: World, finest: float) -> Matrix:
         found = iter(_free_orders([piece for piece in pieces if not piece.orders], world))
         pieces = [piece if piece.orders else replace(piece, orders=next(found)) for piece in pieces]
         pieces = [part for piece in pieces for part in ([piece] if piece.orders else _halves(piece, world, finest))]
-    walked, last = [rows[:1]], -1
+
+    walked = [rows[:1]]
+    last = -1
     for piece in pieces:
         order = next((order for order in piece.orders if order[0] == last), piece.orders[0])  # two moves become one
         walked.append(_staircase(piece, order)[1:])
@@ -171,10 +184,13 @@ def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
     """For every piece: last joint first and first joint first, as far as they are free, else whichever order is."""
     joints = [tuple(np.flatnonzero(piece.a != piece.b).tolist()) for piece in pieces]
     trials = [(piece, order) for piece, own in zip(pieces, joints, strict=True) for order in (own[::-1], own)]
+
     stairs = [_staircase(*trial) for trial in trials]
     free = world.checks.motions_free(np.vstack([s[:-1] for s in stairs]), np.vstack([s[1:] for s in stairs]))
+
     ends = np.cumsum([len(s) - 1 for s in stairs])[:-1]
     passed = [bool(ok.all()) for ok in np.split(free, ends)]
+
     found = []
     for k, piece in enumerate(pieces):
         both = zip(trials[2 * k : 2 * k + 2], passed[2 * k : 2 * k + 2], strict=True)
@@ -189,6 +205,7 @@ def _halves(piece: _Piece, world: World, finest: float) -> list[_Piece]:
             f"path to convert: motion {piece.edge + 1} passes too close to something to be walked one joint at a time "
             f"in steps of {1e3 * finest:.3g} mm; use a planner of single-joint moves instead, such as the default one"
         )
+
     middle = 0.5 * (piece.a + piece.b)
     ends = ((piece.a, middle), (middle, piece.b))
     return [_Piece(a, b, piece.edge, []) for a, b in ends if (a != b).any()]

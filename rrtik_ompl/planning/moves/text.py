@@ -24,6 +24,7 @@ def moves_csv(path: JointPath) -> str:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)
+
     for number, move in enumerate(path.moves(), start=1):
         start, unit = reading(move.start, move.unit)
         end, _ = reading(move.end, move.unit)
@@ -55,13 +56,21 @@ def spoken_moves(path: JointPath) -> list[str]:
 def _sentence(move: Move) -> str:
     end = move.end
     if move.unit == "m":
-        words, unit, factor = ("out", "in"), "millimetres", 1e3
+        words = ("out", "in")
+        unit = "millimetres"
+        factor = 1e3
     else:
-        words, unit, factor = ("up", "down"), "degrees", float(np.rad2deg(1.0))
+        words = ("up", "down")
+        unit = "degrees"
+        factor = float(np.rad2deg(1.0))
+
     if move.continuous:
-        words, end = ("forward", "back"), float(wrapped(end))
+        words = ("forward", "back")
+        end = float(wrapped(end))
+
     word = words[0] if move.change > 0.0 else words[1]
-    far, target = _rounded(factor * abs(move.change)), _rounded(factor * end)
+    far = _rounded(factor * abs(move.change))
+    target = _rounded(factor * end)
     return f"{_said(move.joint)} {word} {far} {unit} to {target.replace('-', 'minus ')}"
 
 

@@ -47,6 +47,7 @@ def with_spread(
     """
     others = lattice_size([v for joint, v in enumerate(values) if joint not in joints])
     each = int((most_nodes / others) ** (1.0 / len(joints)))
+
     found = list(values)
     for joint in joints:
         count = min(each - len(values[joint]), MOST_VALUES)
@@ -68,12 +69,14 @@ def near_values(route: Matrix, width: float, lower: Vector, upper: Vector, most_
     """
     values = values_of(route)
     free = [v[(v != ends[0]) & (v != ends[1])] for v, ends in zip(values, route[[0, -1]].T, strict=True)]
+
     best = values
     for count in range(1, STEPS_ASIDE + 1):
         aside = width * 0.5 ** np.arange(count)
         steps = np.outer(upper - lower, np.concatenate([-aside, aside]))
         moved = [np.add.outer(f, step).ravel() for f, step in zip(free, steps, strict=True)]
         moved = [np.clip(m, low, high) for m, low, high in zip(moved, lower, upper, strict=True)]
+
         wider = [distinct(np.append(v, m)) for v, m in zip(values, moved, strict=True)]
         if lattice_size(wider) > most_nodes:
             break
@@ -91,7 +94,8 @@ def within_travel(values: Values, start: Vector, goal: Vector, costs: Vector, mo
         costs: Cost of each joint's travel, shape (n,).
         most: Travel of the whole route.
     """
-    low, high = np.minimum(start, goal), np.maximum(start, goal)
+    low = np.minimum(start, goal)
+    high = np.maximum(start, goal)
     spare = most - float(costs @ (high - low))
     if spare < 0.0:
         return None
