@@ -40,7 +40,7 @@ class Budget:
     seconds: float = np.inf
     iterations: int | None = None
     stop: Stop = no_stop
-    begun: float = field(default_factory=lambda: time.monotonic())
+    begun: float = field(default_factory=lambda: time.monotonic())  # looked up then: another clock may be in its place
 
     @property
     def elapsed(self) -> float:
@@ -49,12 +49,12 @@ class Budget:
 
     @property
     def left(self) -> float:
-        """Time that is left [s], whoever stops the work; less than none when it is over."""
+        """Time that is left [s], whatever ``stop`` says; negative when it is over."""
         return self.begun + self.seconds - time.monotonic()
 
     @property
     def limited(self) -> bool:
-        """Whether time or iterations end at some point, whoever stops the work."""
+        """Whether time or iterations end at some point, whatever ``stop`` says."""
         return self.iterations is not None or bool(np.isfinite(self.seconds))
 
     def over(self) -> bool:

@@ -23,6 +23,9 @@ class Aims:
         attempts: How many there may be.
         seed: Of inverse kinematics.
         seconds_left: How long there is time.
+
+    Attributes:
+        none_needed: Whether the planner finds configurations at the goal itself, so that there is nothing to aim at.
     """
 
     def __init__(
@@ -35,14 +38,14 @@ class Aims:
         seed: int,
         seconds_left: Callable[[], float],
     ) -> None:
+        self.none_needed = traits.finds_goals and isinstance(problem.goal, TipGoal)
         self._problem = problem
         self._clearance = clearance
         self._attempts = attempts
         self._one_goal = traits.one_goal
         self._in_joints = problem.goal.q is not None
-        self._goals = GoalSearch(problem, seed, seconds_left=seconds_left)
-        self.none_needed = traits.finds_goals and isinstance(problem.goal, TipGoal)
         self._long_ways = self._in_joints and has_continuous(problem.robot) and attempts > 1
+        self._goals = GoalSearch(problem, seed, seconds_left=seconds_left)
 
     @property
     def exhausted(self) -> bool:
@@ -55,14 +58,20 @@ class Aims:
         return self._goals.reason
 
     def of(self, attempt: int) -> Matrix:
-        """What an attempt aims at: all that is known, the newest first, for some planners take the first alone."""
+        """What an attempt aims at: all that is known, shape (k, dof).
+
+        Some planners take the first row alone. So the newest ones come first or, if there is nothing new, at each
+        attempt another one does.
+        """
         if self.none_needed:
             return np.zeros((0, self._problem.robot.dof))
+
         known = len(self._goals.rows)
         newer = attempt > 0 and self._goals.more()
         rows = self._roomy()
         if self.short_way(attempt):
-            return rows[:1]
+            return rows[:1]  # the goal as it is given; in the others a joint goes the other way round
+
         first = known if newer else attempt
         return np.roll(rows, -first, axis=0) if first else rows
 
@@ -77,10 +86,11 @@ class Aims:
         return not self._goals.exhausted or (self._one_goal and attempt + 1 < len(self._goals.rows))
 
     def _roomy(self) -> Matrix:
-        """All that is known to be at a goal of the tip: those that keep the clearance asked for, if there are any."""
+        """All that is known to be at the goal or, at one of the tip, those that keep the clearance if any does."""
         rows = self._goals.first()
         if self._clearance is None or self._in_joints:
             return rows
+
         for _ in range(MAX_ROUNDS):
             kept = self._problem.world.prover.proven(rows, rows, clearance=self._clearance)
             if kept.any():

@@ -9,8 +9,11 @@ The rows of a planner's `Turn`; which one comes next depends on what has come of
 | strict | in steps, with room beyond the clearance | 4, 16, ... | see below |
 | proving | by proofs, with that room | 2, 4, ... | after five strict ones, or without kernels |
 
-Strict ones are due from the first path on that is valid but not proven, for half of the effort. A plain one that no
-other could follow which aims elsewhere has no bound but time.
+Strict ones are due from the first path on that is valid but not proven, for half of the effort. A plain one has no
+bound but time if no later one would aim at other configurations.
+
+`Turn.rows` yields a row, :func:`walk` makes the attempt and gives what has come of it to `Turn.take`, and only then
+does `rows` go on: it finds in the turn what the next row depends on.
 
 "auto" and ``improve=`` are turns one after the other (:mod:`rrtik_ompl.planning.portfolio`,
 :mod:`rrtik_ompl.planning.improving`); a planner that is named has one.
@@ -18,6 +21,7 @@ other could follow which aims elsewhere has no bound but time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Literal, NamedTuple, TypeAlias, get_args
@@ -42,10 +46,10 @@ from rrtik_ompl.world.proof import PROOF_KERNELS
 SHORTEST = 1e-3  # [s] that an attempt gets at least
 EFFORT_ITERATIONS = 1000  # that an attempt of effort 1 may take
 SHORT_WAY_EFFORT = 16  # for the short way round alone, before the long way is tried; some 0.2 s of kernels
-ANYTIME_SHARE = 0.8  # of the time, for the first attempt of an anytime planner, which keeps a clearance
+ANYTIME_SHARE = 0.8  # of the time, for a strict attempt of an anytime planner, so that a plain one can follow
 ROUNDS = 24  # attempts to find a proven path, once there is one that is checked in steps
 BRIEF_ROUNDS = 2  # attempts to find one that keeps the clearance, once there is a proven one that keeps less
-IN_KERNELS = 5  # of them, without proofs while searching, for planners that run in kernels
+IN_KERNELS = 5  # strict attempts without proofs while searching, for planners that run in kernels
 SEPARATED = 2  # attempts with further goal configurations, once none that is known can be reached
 
 Kind: TypeAlias = Literal["quick", "plain", "strict"]
@@ -137,8 +141,8 @@ class Turn:
 
         traits = traits_of(planner.factory)
         seeds = attempt_seeds(self.budget.seed, request.restarts)
-        leaving = {"clearance": request.clearance} if traits.leaves_room and request.clearance is not None else {}
-        self.parameters: Mapping[str, object] = {**leaving, **request.parameters}
+        kept = {"clearance": request.clearance} if traits.leaves_room and request.clearance is not None else {}
+        self.parameters: Mapping[str, object] = {**kept, **request.parameters}
         self._problem = problem
         self._request = request
         self._traits = traits
@@ -149,11 +153,12 @@ class Turn:
             request.clearance,
             attempts=len(seeds),
             seed=seeds[0],
-            seconds_left=lambda: self.budget.left,
+            seconds_left=lambda: self.budget.left,  # of the budget of that moment: `rows` and `take` put others here
         )
         self._check = SecondCheck(problem, planner, request, seed=seeds[0])
+
         self._made: dict[Kind, int] = dict.fromkeys(KINDS, 0)
-        self._spent: dict[Kind, int] = dict.fromkeys(KINDS, 0)  # checked motions, and what an attempt costs beside
+        self._spent: dict[Kind, int] = dict.fromkeys(KINDS, 0)  # motions checked, see `take`
         self._forms: dict[bool, Problem] = {}  # for strict attempts, by whether motions have to be proven
 
     def rows(self) -> Iterator[Row]:
@@ -162,26 +167,20 @@ class Turn:
             _refuse_if_it_breaks_constraints(self.planner)
         load_kernels_for(self._problem, self.planner.factory)
         self.budget = self.budget.begun_now()
-
-        still = _nothing_to_do(self._problem)  # some planners would find a detour
-        if still:
-            check_options(self.planner.factory, self.planner.name, self._request.parameters)
-        self.reason = self._check.impossible()
-        if self.reason:
-            return
-        if still:
-            self.path = self._check.still()
+        if self._decided():
             return
 
         for number in range(len(self._seeds)):
             if self._over():
                 return
+
             self.totals["attempts"] += 1
             aims = self._aims.of(number)
             if len(aims) == 0 and not self._aims.none_needed:
                 if self._aims.exhausted:
                     return
-                continue
+                continue  # a round of inverse kinematics in vain counts as an attempt
+
             if number == 0:
                 yield from self._quick(aims)
                 if self._over():
@@ -193,10 +192,13 @@ class Turn:
         if outcome.counting:
             self.budget = self.budget.put_off(outcome.counting)
         for key, value in outcome.statistics.items():
-            self.totals[key] = value if key in self._traits.path_statistics else self.totals.get(key, 0) + value
+            describes_path = key in self._traits.path_statistics
+            self.totals[key] = value if describes_path else self.totals.get(key, 0) + value
+
         self._made[row.kind] += 1
         self._spent[row.kind] += int(outcome.statistics.get("checked_motions", 0))
-        self._spent[row.kind] += EFFORT_ITERATIONS * MOTIONS_PER_ITERATION
+        self._spent[row.kind] += EFFORT_ITERATIONS * MOTIONS_PER_ITERATION  # what an attempt costs beside
+
         self.path = self._check.accepted(outcome)
         self.totals["rejected"] = self._check.rejected
 
@@ -205,9 +207,11 @@ class Turn:
         self.seconds = self.budget.elapsed
         if self.error is not None or self.path is not None:
             return
+
         if not self.reason:
             self.path = self._check.best
             self.reason = "" if self.path is not None else self._check.reason or self._aims.reason
+
         if self.path is None and self.seconds >= self.budget.seconds:
             attempts = self.totals["attempts"]
             tried = f"{attempts} attempt{'s' * (attempts != 1)}"
@@ -216,10 +220,46 @@ class Turn:
 
     def plan(self) -> Plan:
         """What has come of the turn."""
-        counts = MappingProxyType(self.totals)
-        found = self.path is not None
-        name, seed = self.planner.name, self.budget.seed
-        return Plan(found, self.path, self.reason, self.seconds, name, seed, counts, problem=self._problem)
+        return Plan(
+            self.path is not None,
+            self.path,
+            self.reason,
+            self.seconds,
+            self.planner.name,
+            self.budget.seed,
+            MappingProxyType(self.totals),
+            problem=self._problem,
+        )
+
+    def _decided(self) -> bool:
+        """Whether it is known without any attempt what comes of the turn: its path or reason then says it."""
+        at_goal = _starts_at_goal(self._problem)  # some planners would find a detour
+        if at_goal:  # no attempt will check the options
+            check_options(self.planner.factory, self.planner.name, self._request.parameters)
+
+        self.reason = self._check.impossible()
+        if at_goal and not self.reason:
+            self.path = self._check.still()
+        return at_goal or self.reason != ""
+
+    def _over(self) -> bool:
+        """Whether there is a path, no time or iterations left, or nothing better to be expected."""
+        if self.path is not None or self._good_enough() or self._separated():
+            return True
+        left = self._iterations_left()
+        return self.budget.over() or (left is not None and left <= 0)
+
+    def _good_enough(self) -> bool:
+        """Whether the best path that is not proven with the clearance wanted will do: others came to no more."""
+        best = self._check.best
+        if best is None:
+            return False
+        return self._check.settled or self._check.open > (BRIEF_ROUNDS if best.proven else ROUNDS)
+
+    def _separated(self) -> bool:
+        """Whether path constraints keep start and goal apart, as far as the planner sees."""
+        seen = self.totals.get("separated", 0)
+        return seen > 0 and (self._aims.exhausted or seen > SEPARATED)
 
     def _quick(self, aims: Matrix) -> list[Row]:
         """A brief attempt on what the kernels can prove; none where they cannot prove an end."""
@@ -227,6 +267,7 @@ class Turn:
             return []
         if self._aims.none_needed and not self._traits.kernels:
             return []
+
         proven = self._problem.with_accuracy("conservative")
         free = proven.world.checks.free(np.concatenate([proven.start[None], aims]))
         aims = aims[free[1:]]
@@ -234,18 +275,11 @@ class Turn:
             return []
         return [Row("quick", proven, aims, self._budget(0, effort=1), checked=True)]
 
-    def _plain(self, number: int, aims: Matrix) -> Row:
-        """An attempt with exact checks."""
-        dense = self._traits.anytime or self._check.rejected
-        asked = densely_checked(self._problem) if dense else self._problem
-        checked = asked.world.accuracy == "exact"  # by the problem and by the search for goals
-        effort = self._plain_effort(number)
-        return Row("plain", asked, aims, self._budget(number, effort, share=self._share(number)), checked)
-
     def _strict(self, number: int, aims: Matrix) -> Row | None:
         """An attempt with room to spare; None if it is not due, or no aim has that room."""
         if not self._strict_is_due(number):
             return None
+
         earlier = self._made["strict"]
         proving = not self._traits.kernels or earlier >= IN_KERNELS
         if proving not in self._forms:
@@ -254,20 +288,29 @@ class Turn:
         roomy = aims[form.world.checks.free(aims)]
         if len(roomy) == 0 and not self._aims.none_needed:
             return None
+
         base = 2 if proving else 4
         effort = base ** (earlier + 1) if self._traits.supports_iteration_limit else None
         share = ANYTIME_SHARE if self._traits.anytime else self._share(number)
         return Row("strict", form, roomy, self._budget(number, effort, share))
 
     def _strict_is_due(self, number: int) -> bool:
-        """Whether an attempt keeps more than the clearance: half of the effort, from the first unproven path on.
+        """Whether an attempt keeps more than the clearance: half of the effort, from the first unproven path on."""
+        if not self._check.proves or self._traits.leaves_room:
+            return False
+        if self._traits.anytime and number == 0 and len(self._seeds) > 1:
+            return True  # an optimal path touches what it goes round, so it would not be proven
+        if self._check.open == 0:
+            return False
+        return self._traits.anytime or self._made["strict"] == 0 or self._spent["strict"] < self._spent["plain"]
 
-        The first one of an anytime planner does: an optimal path touches what it goes round.
-        """
-        first = self._traits.anytime and number == 0 and len(self._seeds) > 1
-        less = self._made["strict"] == 0 or self._spent["strict"] < self._spent["plain"]
-        turn = self._check.open > 0 and (self._traits.anytime or less)
-        return self._check.proves and not self._traits.leaves_room and (first or turn)
+    def _plain(self, number: int, aims: Matrix) -> Row:
+        """An attempt with exact checks."""
+        dense = self._traits.anytime or self._check.rejected
+        form = densely_checked(self._problem) if dense else self._problem
+        checked = form.world.accuracy == "exact"  # by the problem and by the search for goals
+        budget = self._budget(number, self._plain_effort(number), self._share(number))
+        return Row("plain", form, aims, budget, checked)
 
     def _plain_effort(self, number: int) -> int | None:
         """Of an attempt after which others aim elsewhere, of planners that have it; None for all there is time for."""
@@ -285,7 +328,7 @@ class Turn:
         """Of one attempt: a share of the time, and iterations by its effort, as far as there are any left."""
         left = self._iterations_left()
         if left is not None:
-            most = max(int(-(-self._share(number) * left // EFFORT_ITERATIONS)), 1)
+            most = max(math.ceil(self._share(number) * left / EFFORT_ITERATIONS), 1)
             effort = most if effort is None else min(effort, most)
         iterations = None if effort is None else effort * EFFORT_ITERATIONS
         seconds = max(share * self.budget.left, SHORTEST)
@@ -296,20 +339,6 @@ class Turn:
         if self.budget.iterations is None or not self._traits.supports_iteration_limit:
             return None
         return self.budget.iterations - int(self.totals.get("iterations", 0))
-
-    def _over(self) -> bool:
-        """Whether there is a path, no time or iterations left, or nothing better to be expected."""
-        best = self._check.best
-        enough = best is not None and self._check.open > (BRIEF_ROUNDS if best.proven else ROUNDS)
-        if self.path is not None or enough or self._check.settled or self._separated():
-            return True
-        left = self._iterations_left()
-        return self.budget.over() or (left is not None and left <= 0)
-
-    def _separated(self) -> bool:
-        """Whether path constraints keep start and goal apart, as far as the planner sees."""
-        seen = self.totals.get("separated", 0)
-        return seen > 0 and (self._aims.exhausted or seen > SEPARATED)
 
 
 def load_kernels_for(problem: Problem, factory: PlannerFactory) -> None:
@@ -330,7 +359,7 @@ def _refuse_if_it_breaks_constraints(planner: NamedPlanner) -> None:
     raise InputError(f"planner {planner.name}: the problem has path constraints, and it {why}; use {able}")
 
 
-def _nothing_to_do(problem: Problem) -> bool:
+def _starts_at_goal(problem: Problem) -> bool:
     """Whether the start is the goal, to the bit if that is a configuration; a `Problem` has checked its start."""
     if problem.goal.q is not None:
         return bool((problem.start == problem.goal.q).all())

@@ -79,9 +79,10 @@ def plans_together(
     for k, proof in proofs.items():
         query = found[k].query
         path = found[k].path.with_proof(proof)
-        counts = MappingProxyType({"attempts": 1, "rejected": 0, **found[k].counts} | {"rejected": 0})
+        counts = {"attempts": 1, "rejected": 0, **found[k].counts}
+        counts["rejected"] = 0  # paths, whatever a planner counts by that name
         problem = known_problem(world, path.start, query.goal)
-        plans[k] = Plan(True, path, "", taken, planner.name, query.seed, counts, problem=problem)
+        plans[k] = Plan(True, path, "", taken, planner.name, query.seed, MappingProxyType(counts), problem=problem)
     return plans
 
 
@@ -124,7 +125,7 @@ class _Searcher:
         self._bounds = self._robot.lower, self._robot.upper
         options = {ITERATION_LIMIT: EFFORT_ITERATIONS, **request.parameters}
         brief = problem.with_accuracy("conservative")
-        assert is_safe(planner.factory)
+        assert is_safe(planner.factory)  # as `serves` has seen
         space = shared_space(*self._bounds)
         self._planner: SafePlanner = safe_planner(planner.factory, planner.name, space, brief, 0, options)
 
@@ -135,10 +136,12 @@ class _Searcher:
         if isinstance(self._planner, SolvesEach) and queries:
             ends = np.array([(query.start, query.goal.q) for query in queries.values()])
             quick = self._planner.solve_each(ends, seeds, self._bounds)
+
         made = dict[int, _Found]()
-        for (k, query), seed, found in zip(queries.items(), seeds, quick, strict=True):
-            path = self._path(query, found or self._alone(query, seed))
-            made |= {} if path is None else {k: path}
+        for (k, query), seed, result in zip(queries.items(), seeds, quick, strict=True):
+            found = self._found(query, result or self._alone(query, seed))
+            if found is not None:
+                made[k] = found
         return made
 
     def _alone(self, query: Query, seed: int) -> SearchResult:
@@ -149,14 +152,14 @@ class _Searcher:
         _, rows = self._planner.solve_rows(*ends, self._bounds, budget.over, checked=True)
         return SearchResult(rows, self._planner.statistics)
 
-    def _path(self, query: Query, found: SearchResult) -> _Found | None:
+    def _found(self, query: Query, result: SearchResult) -> _Found | None:
         """What was found, if it is a path from the start to the goal."""
-        if found.path is None:
+        if result.path is None:
             return None
-        path = JointPath.of(self._robot, found.path)
+        path = JointPath.of(self._robot, result.path)
         if len(path.waypoints) < 2 or (path.start != query.start).any() or (path.end != query.goal.q).any():
             return None
-        return _Found(query, path, found.statistics)
+        return _Found(query, path, result.statistics)
 
 
 def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Room | None]]) -> dict[int, Proof]:
@@ -169,6 +172,7 @@ def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Room | None]]) -> d
             np.concatenate([rows[1:] for rows in own.values()]),
             clearance=kept,
         )
+
         ends = np.cumsum([len(rows) - 1 for rows in own.values()])
         for (k, rows), each in zip(own.items(), np.split(proven, ends[:-1]), strict=True):
             if each.all():

@@ -71,8 +71,8 @@ def improved(problem: Problem, first: Plan, planner: NamedPlanner, request: Requ
     name = "length_bound" if how.objective == "length" else "cost_bound"
     bound = {name: work.bound} if work.bound > 0.0 else {}
     course = {"improving_rounds": work.rounds, "cost_over_time": tuple(work.course)}
-    path = work.best.with_waypoints(work.best.waypoints) if request.proof == "off" else work.best
     statistics = MappingProxyType({**first.statistics, **bound, **course})
+    path = work.best.with_waypoints(work.best.waypoints) if request.proof == "off" else work.best  # without its proof
     return replace(first, path=path, seconds=work.clock(), statistics=statistics)
 
 
@@ -93,11 +93,12 @@ class _Work:
         self._how = how
         self._one_joint = first.path.one_joint_at_a_time
         self._bounded = BOUND_OPTION in planner_options(planner.factory) and not self._one_joint
+
         seconds = min(how.seconds, request.budget.seconds - first.seconds)
         self._budget = replace(request.budget, seconds=seconds).begun_now()
         self._least = self._cost(first.path)
         self.course = [(first.seconds, self._least[1])]
-        self._idle = 0
+        self._idle = 0  # rounds in a row that gained nothing
         self._shortenings = 0
 
     def clock(self) -> float:
@@ -111,11 +112,13 @@ class _Work:
         while self._how.strategy == "restart-shorten" and self._idle < PATIENCE:
             if self._done():
                 return
+
             self.rounds += 1
-            self._idle += 1
+            self._idle += 1  # until `_take` sees a gain
             (turn,) = walk([self._turn(int(seeds.integers(2**31)))])
             if turn.path is not None:
                 paths.append(self._shortened(turn.path, self._quick))
+
             if len(paths) == PLANS or self._idle >= PATIENCE:
                 self._settle(min(paths, key=self._cost, default=self.best))
                 paths = []
@@ -138,9 +141,9 @@ class _Work:
 
     def _settle(self, path: JointPath) -> None:
         """Shorten a path as long as that gains something, if it is worth it."""
-        before = np.inf
         if self._one_joint or self._cost(path)[1] > WORTH * self._least[1]:
             return
+        before = np.inf
         while self._cost(path)[1] < before * (1.0 - SETTLED) and not self._done():
             before = self._cost(path)[1]
             path = self._shortened(path, None)
@@ -152,11 +155,13 @@ class _Work:
         """A path after some work, kept if it is the best; as it was if there is no time, or it does not move."""
         if self._budget.left <= LEAST_SECONDS or len(path.waypoints) < 2:
             return path
-        self._shortenings += 1
+
+        self._shortenings += 1  # each has random numbers of its own
         clearance = possible_clearance(self._problem.world, self._request.clearance, path.waypoints)
         budget = Budget(self._budget.seed + self._shortenings, iterations=checks, stop=self._budget.over)
         single = self._one_joint and path.one_joint_at_a_time
         found = shortened(path, self._problem, Wishes(budget, single, clearance=clearance))
+
         self._take(found)
         return found
 
@@ -166,11 +171,13 @@ class _Work:
             return
         if self._first.proven and not candidate.proven:
             return
+
         cost = self._cost(candidate)
         if cost >= self._least:
             return
         if cost < (self._least[0], self._least[1] * (1.0 - GAIN)):
             self._idle = 0
+
         self.best = candidate
         self._least = cost
         self.course.append((self.clock(), cost[1]))

@@ -72,15 +72,18 @@ def plan_many(
     require(world, World, "world of plan_many", "use World(robot, scene)")
     one_of(PROOF_MODES, proof, "proof")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
+
     dof = world.robot.dof
     wanted = _goals(goals, world.robot)
     rows = finite_array(starts, (dof,) if dimensions(starts) == 1 else (None, dof), "starts")
     rows = np.broadcast_to(rows, (len(wanted), dof)) if rows.ndim == 1 else rows
     if len(rows) != len(wanted):
         raise InputError(f"plan_many: as many starts as goals are needed, got {len(rows)} and {len(wanted)}")
+
     seeds = np.random.SeedSequence(whole_number(seed, "seed")).generate_state(max(len(rows), 1), np.uint32).tolist()
     options = {"seconds": seconds, "parameters": parameters, "proof": proof}
     queries = list(zip(rows, wanted, seeds[: len(rows)], strict=True))
+
     alone = planner is not None and not is_auto(planner) and not is_safe(find_planner(planner))
     batches = [queries[first : first + TOGETHER] for first in range(0, len(queries), TOGETHER)]
     made = in_threads(partial(_batch, world, planner, options), batches, 1 if alone else threads)
@@ -92,6 +95,7 @@ def _goals(given: Ends, robot: Robot) -> list[Goal]:
     if not isinstance(given, Sequence) or not all(isinstance(goal, Goal) for goal in given):
         rows: Any = given
         return [JointGoal(row) for row in finite_array(rows, (None, robot.dof), "goals")]
+
     goals = [goal for goal in given if isinstance(goal, Goal)]
     for number, goal in enumerate(goals):
         if goal.q is not None:
@@ -110,6 +114,7 @@ def _batch(
         joints = {k: Query(q, goal, seed) for k, (q, goal, seed) in enumerate(queries) if isinstance(goal, JointGoal)}
         found = plans_together(world, NamedPlanner(planner, find_planner(planner)), list(joints.values()), request)
         known = dict(zip(joints, found, strict=True))
+
     return [known.get(k) or _planned(world, planner, options, query) for k, query in enumerate(queries)]
 
 

@@ -80,7 +80,8 @@ class Plan:
     member: int | None = None
     problem: Problem | None = field(default=None, repr=False)
 
-    __repr__, _repr_html_ = in_one_line, in_notebook
+    __repr__ = in_one_line
+    _repr_html_ = in_notebook
 
     def __post_init__(self) -> None:
         if self.path is not None:

@@ -47,6 +47,7 @@ def weighted_length(path: JointPath, problem: Problem) -> float:
     rows = path.waypoints
     motions, shares, places = places_along(problem.world, rows)
     distances = distances_at(problem.world, places)
+
     lengths = np.append(np.linalg.norm(np.diff(rows * _weights(problem), axis=0), axis=1), 0.0)
     ends = np.append(np.where(motions[1:] == motions[:-1], shares[1:], 1.0), 1.0)
     pieces = lengths[np.minimum(motions, len(lengths) - 1)] * (ends - shares)

@@ -52,11 +52,12 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
             break
 
     best = _best(turns)
-    reason = "" if best.found else "; ".join(map(_reason, filter(_in_vain, turns)))
+    reason = "" if best.found else "; ".join(_reason(turn) for turn in turns if turn.path is None)
     counts = MappingProxyType(_totals(turns))
+
     spent = sum(turn.seconds for turn in turns)
     left = replace(request.budget, seconds=request.budget.seconds - spent).begun_now()
-    path = best.path if best.path is None else _shortened(best.path, problem, request, left)
+    path = None if best.path is None else _shortened(best.path, problem, request, left)
     return replace(best, path=path, reason=reason, seconds=spent + left.elapsed, statistics=counts)
 
 
@@ -89,13 +90,13 @@ def _turns(problem: Problem, request: Request) -> Iterator[Turn]:
     """The turns of the planners, each with a share of the time that is left then, as long as there is any."""
     names = members(problem)
     left = request.budget.seconds
-    for number, name in enumerate(names):
-        share = 1.0 if number == len(names) - 1 else SHARE
+    for name in names:
         if left <= 0.0:
             return
+        share = 1.0 if name == names[-1] else SHARE
         planner = NamedPlanner(name, find_planner(name))
         turn = Turn(problem, planner, request, replace(request.budget, seconds=share * left))
-        yield turn
+        yield turn  # `walk` asks for the next one when this one is over
         left -= turn.seconds
 
 
@@ -103,14 +104,11 @@ def _best(turns: Sequence[Turn]) -> Plan:
     """Of the first turn with a proven path, or else with any, or else of the last one whose planner did not break."""
     plans = [turn.plan() for turn in turns if turn.error is None]
     if not plans:
-        broken = next((turn.error for turn in reversed(turns)), None)
+        broken = turns[-1].error if turns else None
         raise broken or InputError(f"planner '{AUTO}': no planner is installed; name one of OMPL's, such as RRTConnect")
+
     found = [plan for plan in plans if plan.found]
     return min(found, key=lambda plan: plan.proven is False, default=plans[-1])
-
-
-def _in_vain(turn: Turn) -> bool:
-    return turn.path is None
 
 
 def _reason(turn: Turn) -> str:
@@ -121,7 +119,9 @@ def _totals(turns: Sequence[Turn]) -> dict[str, int | float]:
     """The counts of all planners that did not break."""
     totals: dict[str, int | float] = {}
     for turn in turns:
-        for key, value in turn.totals.items() if turn.error is None else ():
+        if turn.error is not None:
+            continue
+        for key, value in turn.totals.items():
             totals[key] = totals.get(key, 0) + value
     return totals
 
@@ -130,6 +130,7 @@ def _shortened(path: JointPath, problem: Problem, request: Request, budget: Budg
     """The path after a fixed number of checks, as far as there is time."""
     if len(path.waypoints) < 3 or budget.over():
         return path
+
     clearance = possible_clearance(problem.world, request.clearance, path.waypoints)
     counted = replace(budget, iterations=SHORTENING_CHECKS)
     shorter = shortened(path, problem, Wishes(counted, clearance=clearance))

@@ -104,12 +104,14 @@ class SecondCheck:
             why = f": {outcome.reason}" if outcome.reason else f" with '{outcome.status}'"  # or else OMPL's words
             self.reason = f"{self._name} ended{why}"
             return None
+
         problem = self._problem
         path = JointPath.of(problem.robot, outcome.rows)
         if not (path.start == problem.start).all() or not _at_goal(problem, path.end):
             self.reason = f"the path of {self._name} does not lead from the start to the goal"
             self.rejected += 1
             return None
+
         proven = self._proven(path) if self.proves else None
         return proven if proven is not None else self._checked(path)
 
@@ -119,19 +121,24 @@ class SecondCheck:
         if room is None:
             self._ends_proven = False
             return None
+
         world = self._problem.world
-        rows = path.waypoints
         leaves_room = self._traits.leaves_room
         first = proved_as_clear(path, world, room.kept) if leaves_room else proved(path, world, clearance=room.kept)
         if first.proven:
             self.reason = ""
             return first
-        if self._ruled or self._problem.constraints:
+        if self._ruled or self._problem.constraints:  # a detour might break them
             return None
-        rng = np.random.default_rng(self._seed)
-        single = self._traits.one_joint
-        known = None if leaves_room else first.proof
-        repaired = with_detours(world, rows, clearance=room.kept, rng=rng, one_joint=single, proof=known)
+
+        repaired = with_detours(
+            world,
+            path.waypoints,
+            clearance=room.kept,
+            rng=np.random.default_rng(self._seed),
+            one_joint=self._traits.one_joint,
+            proof=None if leaves_room else first.proof,
+        )
         mended = None if repaired is None else proved(path_through(path, repaired), world, clearance=room.kept)
         if mended is None or not mended.proven:
             return None
@@ -148,9 +155,11 @@ class SecondCheck:
             self.rejected += 1
             self.reason = f"the path of {self._name} was rejected by the second check: {faults[0].reason}"
             return None
+
         self.reason = ""
         if not self.proves:
             return path
+
         self.open += 1
         if path.proven or self._proof == "preferred":
             self.best = path if self.best is None or _rank(path) < _rank(self.best) else self.best
