@@ -26,7 +26,8 @@ from rrtik_ompl.world.motion_queries import MotionQueries, decider, has_kernels,
 from rrtik_ompl.world.problem import usable_configurations
 from rrtik_ompl.world.world import World
 
-VERTICES, NEAR = 2000, 10
+VERTICES = 2000  # of a roadmap that is made for many queries
+NEAR = 10  # vertices with which a new one is joined
 SECONDS = 60.0  # that making one takes at most, where next to nothing is free
 MOST_VERTICES = 1_000_000
 FORMAT = 1
@@ -89,7 +90,8 @@ def graph_in(
     if not has_kernels(world, KERNELS):
         return PythonGraph(lower, upper, near=near, seed=seed, valid=checks.valid, motion_free=checks.motion_valid)
     ask = decider(world, checks.motion_valid_batch)
-    lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)
+    lower = np.maximum(lower, world.robot.lower)  # kernels know no place beyond the limits
+    upper = np.minimum(upper, world.robot.upper)
     return KernelGraph(world.motions, lower, upper, near=near, seed=seed, ask=ask)
 
 
@@ -130,7 +132,10 @@ class Roadmap:
             raise InputError(f"vertices must be {MOST_VERTICES} or less, got {vertices}")
         if keeps_constraints(world):  # no sample keeps them, and files say nothing of them
             raise InputError("world of a roadmap: it has path constraints, which a roadmap does not keep; use cbirrt")
-        self.near, self.world, self.seed = checked_near(near), world, whole_number(seed, "seed")
+
+        self.near = checked_near(near)
+        self.world = world
+        self.seed = whole_number(seed, "seed")
         self.graph = graph_in(world, *_box(world.robot), near=near, seed=self.seed, checks=world)
         self.grow(vertices)
 
@@ -192,8 +197,12 @@ class Roadmap:
         rows = self.graph.route(starts - turns, goals - turns, stop)
         if rows is None:
             return None
+
         rows = rows + turns
-        rows[0], rows[-1] = _nearest(starts, rows[0]), _nearest(goals, rows[-1])
+        first = _nearest(starts, rows[0])  # to the bit; by way of the turns it was rounded
+        last = _nearest(goals, rows[-1])
+        rows[0] = first
+        rows[-1] = last
         return rows
 
     def learn(self, path: Matrix) -> None:
@@ -218,7 +227,9 @@ class Roadmap:
         require(world, World, "world of a roadmap", "use World(robot, scene)")
         if robot_digest(world.robot) != robot_digest(self.world.robot):
             raise InputError(f"roadmap of robot '{self.world.robot.name}': the world is of another robot")
-        rows, edges = self.graph.rows, self.graph.edges
+
+        rows = self.graph.rows
+        edges = self.graph.edges
         free = world.valid_batch(rows) if len(rows) else np.zeros(0, dtype=bool)
         states = np.where(free[edges].all(axis=1), UNKNOWN, BLOCKED).astype(np.int32)
         return _restored(world, rows, edges, states, seed=self.seed, near=self.near)
@@ -230,7 +241,8 @@ class Roadmap:
             InputError: If the ending is another one or the file cannot be written.
         """
         known_ending(path, (".npz",), "file of a roadmap")
-        data, world = BytesIO(), self.world
+        data = BytesIO()
+        world = self.world
         numbers = {"format": FORMAT, "seed": self.seed, "near": self.near, "resolution": world.motion_resolution}
         names = {"robot": world.robot.name, "digest": world_digest(world.robot, world.bodies, world.pairs)}
         graph = {"rows": self.graph.rows, "edges": self.graph.edges, "states": self.graph.states.astype(np.int8)}
@@ -263,15 +275,19 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
     try:
         if (version := data.count("format")) != FORMAT:
             raise InputError(f"its format is {version}, not {FORMAT}")
-        digest, seed, near = str(data["digest"]), data.count("seed"), data.count("near")
+        digest = str(data["digest"])
+        seed = data.count("seed")
+        near = data.count("near")
         rows = finite_array(data["rows"], (None, world.robot.dof), "vertices")
-        edges, states = data.whole("edges"), data.whole("states")
+        edges = data.whole("edges")
+        states = data.whole("states")
         if not 1 <= near <= 100 or not _fit(edges, states, len(rows)):
             raise InputError("its edges make no sense")
         kept = finite_array(data["kept"], (2,), "kept").tolist() if "kept" in data else [0.0, NOT_PROVING]
         same_checks = positive(data["resolution"], "resolution") == world.motion_resolution and kept == _kept(world)
     except InputError as error:
         raise InputError(f"{path}: is no roadmap of robot '{world.robot.name}': {error}") from error
+
     known = edges.astype(np.int32), states.astype(np.int32)
     found = world_digest(world.robot, world.bodies, world.pairs)
     if digest == found and same_checks:

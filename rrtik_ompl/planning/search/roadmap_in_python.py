@@ -37,8 +37,11 @@ class PythonGraph:
         valid: Callable[[Vector], bool],
         motion_free: MotionFree,
     ) -> None:
-        self._box, self._near, self._rng = (lower, upper), near, np.random.default_rng(seed)
-        self._valid, self._motion_free = valid, motion_free
+        self._box = (lower, upper)
+        self._near = near
+        self._rng = np.random.default_rng(seed)
+        self._valid = valid
+        self._motion_free = motion_free
         self._rows: Matrix = np.empty((0, len(lower)))
         self._edges: list[tuple[int, int]] = []
         self._states: list[int] = []
@@ -106,19 +109,23 @@ class PythonGraph:
 
     def route(self, starts: Matrix, goals: Matrix, stop: Stop) -> Matrix | None:
         """The shortest path on the roadmap from a start to a goal, shape (k, n); None if there is none in time."""
-        mapped, edges = self.size, len(self._edges)
-        ends = np.concatenate([starts, goals])
-        for k, row in enumerate(ends):
+        mapped = self.size
+        edges = len(self._edges)
+        for k, row in enumerate(np.concatenate([starts, goals])):
             self._add_near(row, mapped)
-            for start in range(len(starts) if k >= len(starts) else 0):
-                self._join(mapped + start, mapped + k)
+            if k >= len(starts):  # a goal, to which each start may go straight
+                for start in range(len(starts)):
+                    self._join(mapped + start, mapped + k)
         found = self._search(range(mapped, mapped + len(starts)), goals, stop)
         path = None if found is None else self._rows[found].copy()
+
+        # starts and goals are no part of the roadmap: all that was added for them is taken away, the last first
         while len(self._edges) > edges:
             for vertex in self._edges.pop():
                 self._leaving[vertex].pop()
             self._states.pop()
-        self._rows, self._leaving = self._rows[:mapped], self._leaving[:mapped]
+        self._rows = self._rows[:mapped]
+        self._leaving = self._leaving[:mapped]
         return path
 
     def statistics(self) -> dict[str, int | float]:
@@ -136,9 +143,11 @@ class PythonGraph:
             _, cost, vertex, edge = heapq.heappop(heap)
             if vertex in came or (edge != ROOT and self._blocked(edge)):
                 continue
+
             came[vertex] = edge
             if vertex >= self.size - len(goals):
                 return self._traced(vertex, came)
+
             for leaving in self._leaving[vertex]:
                 head = self._other(leaving, vertex)
                 if head not in came:

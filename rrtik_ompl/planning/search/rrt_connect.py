@@ -55,7 +55,9 @@ class RrtConnect:
     ) -> None:
         self.trees = ConfigurationTree(starts), ConfigurationTree(goals)
         self.iterations = 0
-        self._rules, self._motion_free, self._rng = rules, motion_free, rng
+        self._rules = rules
+        self._motion_free = motion_free
+        self._rng = rng
         self._side = 1  # of the tree that grew last
         self._limit = np.inf if rules.max_iterations is None else rules.max_iterations
 
@@ -70,15 +72,19 @@ class RrtConnect:
         Args:
             stop: Called before every sample and every edge; true ends the search.
         """
-        rules, motion_free = self._rules, self._motion_free
-        lower, extent = rules.lower, rules.upper - rules.lower
+        rules = self._rules
+        motion_free = self._motion_free
+        lower = rules.lower
+        extent = rules.upper - rules.lower
         while not stop() and self.iterations < self._limit:
             self.iterations += 1
             side = self._side = self._next_side()
-            growing, other = self.trees[side], self.trees[1 - side]
+            growing = self.trees[side]
+            other = self.trees[1 - side]
             vertex = extend(growing, lower + extent * self._rng.random(len(lower)), rules, motion_free)
             if vertex is None:
                 continue
+
             met = reach(other, growing.row(vertex), rules, motion_free, stop)
             if met is not None:
                 ends = (vertex, met) if side == 0 else (met, vertex)

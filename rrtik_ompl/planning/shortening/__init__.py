@@ -169,6 +169,7 @@ def shorten(
     if stop is not None:
         called(stop, "stop")
     single = _single(path, method, one_joint) or rules is not None
+
     require(problem, Problem, "problem of a path to shorten")
     one_of(METHODS, method, "shortening method")
     if seconds is not None:
@@ -178,6 +179,7 @@ def shorten(
     whole_number(seed, "seed")
     _refuse(path, problem)
     check_route_clearance(problem.world, clearance, path.waypoints)
+
     if single and not path.one_joint_at_a_time:
         raise InputError("path to shorten: it moves several joints at once, so one_joint cannot be kept")
     if single and not METHODS[method].can_keep_moves:
@@ -226,16 +228,20 @@ def _in_forms(
     head, tail = parts
     rules = wishes.rules
     single = wishes.one_joint or chosen.keeps_moves
-    traits = {"leaves_room": chosen.leaves_room, "samples": chosen.samples}
-    acceptance = Acceptance(path, problem, wishes, one_joint=single, **traits)
+    acceptance = Acceptance(
+        path, problem, wishes, one_joint=single, leaves_room=chosen.leaves_room, samples=chosen.samples
+    )
+
     for form in acceptance.forms():
         task, found = _run(chosen, form, head, replace(wishes, budget=wishes.budget.part(form.share)), single)
         rows = np.vstack([found, tail])
         if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
             continue
+
         shorter = acceptance.accepted(path_through(path, rows))
         if shorter is None:
             continue
+
         counted = 1.0 if single else weights_of(problem.robot)
         if chosen.keeps_moves or task.rank(shorter.waypoints * counted) <= task.rank(path.waypoints * counted):
             return shorter
@@ -252,6 +258,7 @@ def _run(chosen: Method, form: Form, route: Matrix, wishes: Wishes, single: bool
     on_better = wishes.on_better
     if on_better is not None:
         wishes = replace(wishes, on_better=lambda rows: on_better(weighted.back(rows, route[[0, -1]])))
+
     task = Task(weighted.problem.world, wishes)
     return task, weighted.back(chosen.run(weighted.there(route), task, weighted.problem), route[[0, -1]])
 

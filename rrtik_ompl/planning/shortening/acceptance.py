@@ -10,12 +10,11 @@ from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.planning.moves.clearance_levels import roomiest
 from rrtik_ompl.planning.shortening.task import Wishes
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import keeping, proved_as_clear, room_between
+from rrtik_ompl.world.kept_clearance import Room, keeping, proved_as_clear, room_between
 from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.proven_motions import proven_motions
 from rrtik_ompl.world.route_check import violations_of
-from rrtik_ompl.world.world import World
 
 SPARE = 2.5e-4  # [m] beyond the clearance that searches keep if the ends have it: chords of timed motions need 0.1 mm
 
@@ -67,6 +66,7 @@ class Acceptance:
         self._samples = samples
         room = roomiest if leaves_room else room_between
         self._room = room(problem.world, path.waypoints[[0, -1]], wishes.clearance)
+
         known = path.proven_in(problem.world) and self._keeps(path)
         self.input = path if known else self._proved(path)
         self._input_keeps = self._keeps(self.input)
@@ -81,36 +81,36 @@ class Acceptance:
         dense = densely_checked(self._problem)
         if self._leaves_room:
             return [Form(dense, dense.world, 1.0)]
-        found = []
-        wider = 0.0 if self._room is None else min(self._room.searched, self._room.kept + SPARE)
-        if self._room is not None and self._samples:
-            roomy = keeping(dense.world, wider)
-            proving = keeping(dense.world, wider, proven=self._room.kept)
-            found = [self._sampled(dense, roomy, 0.7), self._sampled(dense, proving, self._last)]
-        elif self._room is not None:
-            found = [Form(dense, proven_motions(dense.world, wider, self.input.waypoints), self._last)]
+
+        found = [] if self._room is None else self._roomy_forms(dense, self._room)
         if not self._input_keeps:
             found.append(Form(dense, dense.world, 1.0))
         return found
 
-    @property
-    def _last(self) -> float:
-        """The share of the last form that leaves room."""
-        return 1.0 if self._input_keeps else 0.5
+    def _roomy_forms(self, dense: Problem, room: Room) -> list[Form]:
+        """Those that leave room; where the input does not keep the clearance, with time left for one that need not."""
+        wider = min(room.searched, room.kept + SPARE)
+        last = 1.0 if self._input_keeps else 0.5
+        if not self._samples:
+            return [Form(dense, proven_motions(dense.world, wider, self.input.waypoints), last)]
 
-    def _sampled(self, dense: Problem, world: World, share: float) -> Form:
-        return Form(dense.with_world(world), world, share)
+        roomy = keeping(dense.world, wider)
+        proving = keeping(dense.world, wider, proven=room.kept)
+        return [Form(dense.with_world(roomy), roomy, 0.7), Form(dense.with_world(proving), proving, last)]
 
     def accepted(self, shorter: JointPath) -> JointPath | None:
         """The path, with what is proven of it and with detours where it needs them, or None."""
         proved = self._proved(shorter)
         if self._keeps(proved):
             return proved
+
         if self._room is not None and not self._one_joint:
             rng = np.random.default_rng(self._seed)
             rows = with_detours(self._problem.world, shorter.waypoints, clearance=self._room.kept, rng=rng)
             if rows is not None:
                 return self._proved(path_through(shorter, rows))
+
+        # the clearance cannot be had: a path that is no worse than the input in what is proven will do
         if self._leaves_room and proved.proven:
             return proved
         if self._input_keeps or (self.input.proven and not proved.proven):

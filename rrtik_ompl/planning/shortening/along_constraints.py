@@ -31,21 +31,27 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
     tables = held_tables(world.robot, world.constraints)
     if tables is None:
         return route
+
     lower, upper = _box(world, route)
     search = ConstrainedSearch(motions, tables.held, lower, upper, shortest=tables.shortest)
     ask = decider(world, world.motion_valid_batch)
-    rng, failures = np.random.default_rng(task.seed), 0
+    rng = np.random.default_rng(task.seed)
+
+    failures = 0
     pair = (0, len(route) - 1)
     for _ in range(TRIES):
         if failures >= PATIENCE or len(route) < 3 or task.expired():
             break
+
         i, j = pair
         way = search.connect(route[i], route[j], ask=ask) if j > i + 1 else None
         task.asked += int(search.statistics()["motions"])
         failures += 1
         if way is not None and route_length(way) < route_length(route[i : j + 1]) - SHORTER:
-            route, failures = np.vstack([route[:i], way, route[j + 1 :]]), 0
+            route = np.vstack([route[:i], way, route[j + 1 :]])
+            failures = 0
             task.report(route)
+
         first, second = rng.integers(len(route), size=2)
         pair = int(min(first, second)), int(max(first, second))
     return route

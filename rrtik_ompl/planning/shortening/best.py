@@ -35,6 +35,7 @@ def best_in_time(route: Matrix, task: Task) -> Matrix:
     world = task.kernel_world
     if len(route) < 3 or world is None or not has_kernels(world, layout.KERNELS):
         return _without_kernels(route, task)
+
     best = _best_start(route, task, world)
     rounds = idle = 0
     while not task.expired() and idle < IDLE_ROUNDS and (task.bounded or rounds < ROUNDS_WITHOUT_LIMIT):
@@ -69,7 +70,8 @@ def _cut(route: Matrix, task: Task, seed: int, tries: int, pull: float) -> Matri
 
 def _taut(route: Matrix, task: Task, world: KernelWorld, seed: int, checks: int) -> Matrix:
     """The route pulled taut, as far as a number of checks goes."""
-    work, before = Tightening(world.motions, route, seed=_seed(task, seed)), task.asked
+    work = Tightening(world.motions, route, seed=_seed(task, seed))
+    before = task.asked
 
     def stop() -> bool:
         task.asked = before + work.checks

@@ -58,16 +58,20 @@ class _Corners:
     """
 
     def __init__(self, task: Task, careful: bool) -> None:
-        self.task, self.careful, self.least = task, careful, 0.0
+        self.task = task
+        self.careful = careful
+        self.least = 0.0
         self._answers: dict[frozenset[bytes], bool] = {}
 
     def pulled(self, route: Matrix) -> Matrix:
         """Rounds of pulling and cutting, until the chords gain nothing more."""
-        rows, share = self._few(list(route)), FIRST_GAIN
+        rows = self._few(list(route))
+        share = FIRST_GAIN
         self.task.report(np.array(rows))
         for number in range(MAX_CORNER_ROUNDS):
             if self.task.expired():
                 break
+
             whole = _length(rows)
             self.least = share * whole
             rows = self._swept(rows, nearly_done=number > 0)
@@ -90,7 +94,9 @@ class _Corners:
 
     def _few(self, route: list[Vector]) -> list[Vector]:
         """From waypoint to waypoint, each the last one seen by bisection; as the first phase of retraction."""
-        rows, here, last = [route[0]], 0, len(route) - 1
+        rows = [route[0]]
+        here = 0
+        last = len(route) - 1
         while here < last:
             seen, hidden = (last, last) if self._free(route[here], route[last]) else (here + 1, last)
             while hidden - seen > 1:
@@ -102,7 +108,8 @@ class _Corners:
 
     def _swept(self, rows: list[Vector], *, nearly_done: bool) -> list[Vector]:
         """Every bend dropped or pulled to its corner, one after the other."""
-        rows, k = list(rows), 1
+        rows = list(rows)
+        k = 1
         while k < len(rows) - 1:
             a, bend, b = rows[k - 1 : k + 2]
             if _detour(a, bend, b) <= self.least:
@@ -126,7 +133,8 @@ class _Corners:
 
         Where the route is nearly done little is to be expected: the search then begins at the near end.
         """
-        way, rest = far - near, float(np.linalg.norm(far - near))
+        way = far - near
+        rest = float(np.linalg.norm(far - near))
 
         def visible(share: float) -> bool:
             return self._free(eye, near + share * way)
@@ -145,7 +153,8 @@ class _Corners:
 
     def _cut_off(self, rows: list[Vector]) -> list[Vector]:
         """Bends replaced by two where a chord across them is free and gains enough, and these two likewise."""
-        done, ahead = [rows[0]], rows[:0:-1]
+        done = [rows[0]]
+        ahead = rows[:0:-1]
         while len(ahead) > 1:
             chord = self._chord(done[-1], ahead[-1], ahead[-2])
             if chord is None:
@@ -159,15 +168,20 @@ class _Corners:
         sides = float(np.linalg.norm(a - bend)), float(np.linalg.norm(b - bend))
         if min(sides) == 0.0:
             return None
-        back, on = (a - bend) / sides[0], (b - bend) / sides[1]
+
+        back = (a - bend) / sides[0]
+        on = (b - bend) / sides[1]
         gain = 2.0 - float(np.linalg.norm(back - on))  # per distance from the bend
-        free, hidden = self.least / max(gain, 1e-300), min(sides)
+        free = self.least / max(gain, 1e-300)
+        hidden = min(sides)
         if free >= hidden or not self._free(bend + free * back, bend + free * on):
             return None
+
         while hidden > CHORD * free and gain * (hidden - free) > self.least:
             middle = min(float(np.sqrt(free * hidden)), 0.5 * (free + hidden))
             middle_free = self._free(bend + middle * back, bend + middle * on)
             free, hidden = (middle, hidden) if middle_free else (free, middle)
+
         ends = bend + free * back, bend + free * on
         return ends if self._part_free(a, ends[0]) and self._part_free(ends[1], b) else None
 
@@ -178,7 +192,8 @@ def _bracket(visible: Callable[[float], bool], first: float) -> tuple[float, flo
     while first < 1.0:
         if not visible(first):
             return seen, first
-        seen, first = first, 4.0 * first
+        seen = first
+        first *= 4.0
     return seen, 1.0
 
 
@@ -193,7 +208,8 @@ def _detour(a: Vector, bend: Vector, b: Vector) -> float:
 
 def _first_below(length: Callable[[float], float], wanted: float) -> float:
     """The smallest share, to a part in a million, at which a length that falls is as small as wanted; 1 if nowhere."""
-    low, high = 0.0, 1.0
+    low = 0.0
+    high = 1.0
     while high - low > 1e-6:
         middle = 0.5 * (low + high)
         if length(middle) > wanted:

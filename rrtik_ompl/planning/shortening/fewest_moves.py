@@ -84,20 +84,24 @@ def fewest_moves(
         )
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
+
     kept = MoveRules.of_robot(world.robot) if rules is None else rules
     budget = Budget() if budget is None else budget
     work = _Work(rows, world, kept, rounds, budget)
+    levels = clearance_levels(world, rows[[0, -1]], clearance)
+
     best = rows
     bound = lower_bound(rows[0], rows[-1])
-    taken = False
-    levels = clearance_levels(world, rows[[0, -1]], clearance)
+    taken = False  # whether `best` is from a level that keeps more: a later one has to save a move then
     for level in levels:
         if taken and (transitions(best) == bound or budget.over()):
             break
         search = work.improved(level, best)
         bound = max(bound, search.bound)
         if search.route is not None and transitions(search.route) <= transitions(best) - taken:
-            best, taken = search.route, True
+            best = search.route
+            taken = True
+
     if transitions(best) > bound and rounds > 0 and not budget.over():
         best, bound = work.finer(levels, best, bound)
     return MovesFound(best, transitions(best), bound)
@@ -153,7 +157,9 @@ class _Work:
         found = grids.route([ends], merge_moves(best, tolerance=0.0), bound)
         if found is None:
             return best, bound
-        search = self.improved(levels[found[1]], found[0])
+
+        route, level = found
+        search = self.improved(levels[level], route)
         return (best if search.route is None else search.route), max(bound, search.bound)
 
 
@@ -168,7 +174,8 @@ def least_moves(problem: Problem) -> int:
     Raises:
         InputError: If the goal is of another kind.
     """
-    world, ends = problem.world, _ends(problem, "least_moves")
+    world = problem.world
+    ends = _ends(problem, "least_moves")
     search = MoveSearch(ends[:1], ends[1:], *turning_limits(world.robot, ends), world.motion_valid_batch)
     search.try_corner_routes()
     if search.proven or search.bound == lower_bound(ends[0], ends[1]):  # met, or too many corners
@@ -189,14 +196,17 @@ def grid_route(problem: Problem, step: float) -> Matrix | None:
     Raises:
         InputError: If there are more joints, the goal is of another kind, or the grid would be too large.
     """
-    world, ends = problem.world, _ends(problem, "grid_route")
+    world = problem.world
+    ends = _ends(problem, "grid_route")
     if world.robot.dof > 3:
         raise InputError(f"grid_route: expected at most 3 joints, got {world.robot.dof}")
     positive(step, "grid_route: step")
+
     lower, upper = turning_limits(world.robot, ends)
     size = float(np.prod((upper - lower) / step + 2.0))
     if size > MAX_CELLS:
         raise InputError(f"grid_route: {size:.1e} cells are too many (at most {MAX_CELLS:.0e}); use a larger step")
+
     limits = zip(lower, upper, ends.T, strict=True)
     values = [np.union1d(np.linspace(low, high, int((high - low) / step) + 1), both) for low, high, both in limits]
     lattice = MoveLattice(values, world.motion_valid_batch, np.ones(world.robot.dof))

@@ -18,7 +18,9 @@ from rrtik_ompl.world.motion_queries import decider
 TRIES = 400  # where there is no end to the time
 PATIENCE = 2000  # tries without gain that end the search where there is one
 TRIES_PER_CALL = 64  # of the kernel, until the task may end it
-WAYPOINTS, PULLS = 0.5, 0.3  # what shortcuts do beyond the published random cut: see the kernel
+# what shortcuts do beyond the published random cut: see the kernel
+WAYPOINTS = 0.5  # share of ends that are waypoints
+PULLS = 0.3  # share of tries that pull a waypoint
 
 
 def random_cut(route: Matrix, task: Task, *, tries: int = TRIES) -> Matrix:
@@ -35,6 +37,7 @@ def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) ->
     limit = NO_LIMIT if task.bounded else tries
     if task.kernel_world is None or len(route) < 3:
         return _plain(route, task, limit, share)
+
     for asking in (False, True):
         search = kernel_search(route, task, seed=2 * task.seed + asking, share=share, pull=pull, asking=asking)
         run(search, task, limit)
@@ -58,11 +61,12 @@ def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: f
 
 def run(search: ShortcutSearch, task: Task, tries: int, patience: int = PATIENCE) -> None:
     """Let a search work until its tries, its patience or the time is up."""
-    before, known = task.asked, task.listened
+    before = task.asked
+    listened = task.listened
 
     def stop() -> bool:
         task.asked = before + search.tries
-        if known:
+        if listened:
             task.report(search.waypoints)
         return task.expired()
 
@@ -73,7 +77,8 @@ def run(search: ShortcutSearch, task: Task, tries: int, patience: int = PATIENCE
 
 def _plain(route: Matrix, task: Task, tries: int, share: float) -> Matrix:
     """The loop without kernels."""
-    rng, failures = np.random.default_rng(task.seed), 0
+    rng = np.random.default_rng(task.seed)
+    failures = 0
     route = without_repeats(route)
     for _ in range(tries):
         if task.expired() or failures >= PATIENCE or len(route) < 3:
@@ -93,7 +98,9 @@ def _one_cut(route: Matrix, task: Task, rng: np.random.Generator, share: float) 
     i, j = (min(int(np.searchsorted(places, p, side="right")) - 1, len(route) - 2) for p in (first, second))
     if i == j:
         return None
-    a, b = _point(route, places, i, first), _point(route, places, j, second)
+
+    a = _point(route, places, i, first)
+    b = _point(route, places, j, second)
     cut = np.vstack([a[None], task.moves(a, b)])
     new = without_repeats(np.vstack([route[: i + 1], cut, route[j + 1 :]]))
     if task.rank(new) >= task.rank(route) or not task.free_batch(cut[:-1], cut[1:]).all():
@@ -110,6 +117,7 @@ def _place(places: Vector, rng: np.random.Generator, share: float) -> float:
 def _point(route: Matrix, places: Vector, edge: int, place: float) -> Vector:
     """The configuration at a place on an edge, never outside the box between its ends."""
     share = (place - places[edge]) / (places[edge + 1] - places[edge])
-    a, b = route[edge], route[edge + 1]
+    a = route[edge]
+    b = route[edge + 1]
     point: Vector = np.clip((1.0 - share) * a + share * b, np.minimum(a, b), np.maximum(a, b))
     return point

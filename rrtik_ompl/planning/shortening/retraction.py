@@ -33,8 +33,11 @@ def retract(route: Matrix, task: Task, *, step: float | None = None, fineness: f
     coarse = route_length(route) / STEPS if step is None else step
     if len(route) < 3 or coarse <= 0.0:
         return route
+
     route = without_repeats(route)
-    pivot, ahead, done = route[0], route[1:], [route[:1]]
+    pivot = route[0]
+    ahead = route[1:]
+    done = [route[:1]]
     while len(ahead) > 0 and not task.expired():
         seen = _last_visible(len(ahead), _seen_from(pivot, ahead, task))
         if seen == len(ahead) - 1:
@@ -43,10 +46,13 @@ def retract(route: Matrix, task: Task, *, step: float | None = None, fineness: f
         else:
             bend, rest = _one_bend(pivot, ahead[seen:], coarse, coarse / fineness, task)
             if not task.confirmed(_joined([pivot[None], bend], rest, task), route):
-                bend, rest = task.moves(pivot, ahead[seen]), ahead[seen + 1 :]
+                bend = task.moves(pivot, ahead[seen])
+                rest = ahead[seen + 1 :]
             done.append(bend)
-            pivot, ahead = bend[-1], rest
+            pivot = bend[-1]
+            ahead = rest
         task.report(_joined(done, ahead, task))
+
     found = without_repeats(_joined(done, ahead, task))
     return task.better(route, found) if task.confirmed(found, route) else route
 
@@ -65,6 +71,7 @@ def _one_bend(pivot: Vector, ahead: Matrix, coarse: float, fine: float, task: Ta
     seen = _last_visible(len(on_edge), _seen_from(pivot, on_edge, task), last_is_hidden=True)
     beyond = on_edge[seen + 1]
     rest = ahead[1:] if seen + 2 == len(on_edge) else np.vstack([beyond[None], ahead[1:]])
+
     sight_line = _divided(np.vstack([pivot[None], task.moves(pivot, on_edge[seen])]), fine)
     last = len(sight_line) - 1
     back = _last_visible(last + 1, lambda k: task.link(sight_line[last - k], beyond) is not None, last_is_hidden=True)
@@ -86,7 +93,8 @@ def _last_visible(count: int, visible: Callable[[int], bool], *, last_is_hidden:
     """
     if count == 1 or (not last_is_hidden and visible(count - 1)):
         return count - 1
-    seen, unseen = 0, count - 1
+    seen = 0
+    unseen = count - 1
     while unseen - seen > 1:
         middle = (seen + unseen) // 2
         if visible(middle):
@@ -100,6 +108,7 @@ def _divided(corners: Matrix, step: float) -> Matrix:
     """A polyline with further points, none farther than ``step`` from the next; its corners stay as they are."""
     counts = part_counts(corners, step)
     points, edges = subdivided(corners, counts)
-    a, b = corners[edges], corners[edges + 1]
+    a = corners[edges]
+    b = corners[edges + 1]
     divided: Matrix = np.clip(points, np.minimum(a, b), np.maximum(a, b))  # a joint that does not move stays to the bit
     return divided

@@ -14,7 +14,9 @@ def sequential_cut(route: Matrix, task: Task) -> Matrix:
 
     Waypoints are tried from the last one on back to the next, which needs no check.
     """
-    kept, pivot, last = [route[:1]], 0, len(route) - 1
+    kept = [route[:1]]
+    pivot = 0
+    last = len(route) - 1
     while pivot < last:
         found = task.first_link(route[pivot], route[last : pivot + 1 : -1])
         if found is None:

@@ -149,16 +149,19 @@ class Task:
 
         The first goal is checked alone, then twice as many together each time.
         """
-        first, count = 0, 1
+        first = 0
+        count = 1
         while first < len(goals) and not self.expired():
             paths = [self.moves(a, goal) for goal in goals[first : first + count]]
             starts = [np.vstack([a[None], path])[:-1] for path in paths]
             free = self.free_batch(np.vstack(starts), np.vstack(paths))
+
             ends = np.cumsum([len(path) for path in paths])
             for number, (end, path) in enumerate(zip(ends.tolist(), paths, strict=True)):
                 if free[end - len(path) : end].all():
                     return first + number, path
-            first, count = first + count, 2 * count
+            first += count
+            count *= 2
         return None
 
     def rank(self, route: Matrix) -> tuple[float, float]:

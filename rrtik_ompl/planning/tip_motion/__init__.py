@@ -270,6 +270,7 @@ def _begin(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> tuple[pin.S
     if not isinstance(q, pin.SE3) and dimensions(q) < 2:
         start = usable_configuration(world, q, "start")
         return robot.fk(start), start[None]
+
     begin = rigid(q, "start")
     found = solve_ik(robot, PoseGoal(begin), all=True, world=world, seed=seed)
     if not found.found:

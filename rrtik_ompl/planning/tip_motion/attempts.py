@@ -136,6 +136,7 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
     proof = world.prover.route(rows, clearance=way.kept(world)) if len(rows) > 1 else None
     if proof is not None and not proof.proven:
         return _cut(world, way, rows, shares, proof)
+
     fraction = float(shares[-1])
     if not reason and fraction >= 1.0 - SMALLEST_STEP:
         fraction = 1.0
@@ -145,8 +146,10 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
 def _cut(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> Attempt:
     """The part before the first place that is not proven, which is found by halving the motion."""
     gap = proof.unproven[0]
-    a, b = rows[gap.motion], rows[gap.motion + 1]
+    a = rows[gap.motion]
+    b = rows[gap.motion + 1]
     room = way.kept(world)
+
     good = 0.0
     bad = 1.0
     for _ in range(HALVINGS):
@@ -157,11 +160,12 @@ def _cut(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> 
         else:
             bad = middle
 
-    reason = why_blocked(world, a + good * (b - a), b, (gap.first, gap.second))
+    end = a + good * (b - a)
+    reason = why_blocked(world, end, b, (gap.first, gap.second))
     kept = rows[: gap.motion + 1]
     fraction = float(shares[gap.motion])
     if good > 0.0:
-        kept = np.vstack([kept, a + good * (b - a)])
+        kept = np.vstack([kept, end])
         fraction += good * float(shares[gap.motion + 1] - shares[gap.motion])
     known = world.prover.route(kept, clearance=room) if len(kept) > 1 else None
     return Attempt(kept, known, fraction, reason)

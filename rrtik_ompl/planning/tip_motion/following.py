@@ -23,15 +23,18 @@ from rrtik_ompl.planning.tip_motion.values import FIRST_STEP, MOST_ROWS, SMALLES
 
 def follow(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> Followed:
     """Follow a rail from a configuration at its beginning, shape (dof,), until its end or as far as possible."""
-    kernels, limb = library(rail_layout.KERNELS), limb_of(robot)
+    kernels = library(rail_layout.KERNELS)
+    limb = limb_of(robot)
     if kernels is None or limb is None:
         return follow_plainly(robot, rail, q, tolerance, leaning)
+
     aim = np.zeros((1, AIM_FLOATS))
     aim[0, POSITION_TOLERANCE] = rail_layout.ARRIVED * tolerance.deviation
     aim[0, CHORD_TOLERANCE] = rail_layout.ARRIVED * tolerance.chord
     aim[0, FREE_TURN] = NO_TURN
     call = KernelCall(limb, aim, robot.clamp(q)[None], rail_layout.NEWTON_STEPS, rail_layout.NEWTON_STEPS + 1)
     table = packed_rail(robot, rail, q, tolerance, leaning)
+
     kernels.follow(limb.address, call.address, table.address)
     count = table.count
     return Followed(table.q.reshape(-1, robot.dof)[:count].copy(), table.shares[:count].copy())

@@ -76,7 +76,8 @@ class Rail:
     def numbers(self) -> Vector:
         """The rail as kernels read it, see :mod:`rrtik_ompl.kernels.ik.rail_layout`."""
         row = np.zeros(RAIL_NUMBERS)
-        row[:9], row[9:12] = self.begin[:3, :3].ravel(), self.begin[:3, 3]
+        row[:9] = self.begin[:3, :3].ravel()
+        row[9:12] = self.begin[:3, 3]
         for place, vector in (
             (CENTRE, self.centre),
             (ARC_AXIS, self.arc_axis),
@@ -84,7 +85,9 @@ class Rail:
             (TURN_AXIS, self.turn_axis),
         ):
             row[place : place + 3] = vector
-        row[ARC_ANGLE], row[TURN_ANGLE], row[ARC_RADIUS] = self.arc_angle, self.turn_angle, self.arc_radius
+        row[ARC_ANGLE] = self.arc_angle
+        row[TURN_ANGLE] = self.turn_angle
+        row[ARC_RADIUS] = self.arc_radius
         return row
 
 
@@ -100,20 +103,25 @@ def arc_rail(T_begin: pin.SE3, T_end: pin.SE3, through: ArrayLike) -> Rail:
     Raises:
         InputError: If the three points lie on a line or coincide.
     """
-    a, c = T_begin.translation, T_end.translation
+    a = T_begin.translation
+    c = T_end.translation
     b = finite_array(through, (3,), "through")
-    first, second = b - a, c - a
+    first = b - a
+    second = c - a
     normal = np.cross(first, second)
     span = float(np.linalg.norm(first) * np.linalg.norm(second))
     if np.linalg.norm(normal) <= STRAIGHT * max(span, 1e-12) or np.linalg.norm(c - b) == 0.0:
         raise InputError(
             "arc: the tip, the point that it shall pass and its goal lie on a line; take another point, or straight()"
         )
+
     across = float(normal @ normal)
     to_centre = np.cross(np.dot(first, first) * second - np.dot(second, second) * first, normal) / (2.0 * across)
-    centre, unit = a + to_centre, normal / np.sqrt(across)
-    from_centre = a - centre, c - centre
-    angle = np.arctan2(unit @ np.cross(*from_centre), from_centre[0] @ from_centre[1]) % TAU
+    centre = a + to_centre
+    unit = normal / np.sqrt(across)
+    begin = a - centre
+    end = c - centre
+    angle = np.arctan2(unit @ np.cross(begin, end), begin @ end) % TAU
     axis, own = _turn_between(T_begin, T_end)
     return Rail(T_begin.homogeneous, np.zeros(3), axis, own, centre, unit, float(angle))
 
@@ -134,6 +142,8 @@ def screw_rail(T_begin: pin.SE3, T_end: pin.SE3, turns: int = 0) -> Rail:
                 f"turns={turns}: the goal is not turned against the tip, so whole turns have no axis; leave turns out"
             )
         return straight_rail(T_begin, T_end)
+
+    # the point of the line that is nearest to the origin, for the line does not move
     shift = T_end.translation - _turns(axis, np.array([angle]))[0] @ T_begin.translation
     along = float(axis @ shift) * axis
     rest = shift - along
@@ -157,6 +167,7 @@ def _turns(axis: Vector, angles: Vector) -> NDArray[np.float64]:
     """Rotations about a unit axis, shape (k,) -> (k, 3, 3)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
+    sine = np.sin(angles)[:, None, None]
+    cosine = np.cos(angles)[:, None, None]
     rotations: NDArray[np.float64] = np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
     return rotations

@@ -22,14 +22,18 @@ def why_stopped(robot: Robot, rail: Rail, followed: Followed) -> str:
     """Why the joints cannot follow a rail farther than they did: the joint at its limit, or the singular posture."""
     if len(followed.rows) >= MOST_ROWS:
         return f"the line takes more than {MOST_ROWS} configurations: allow more deviation"
-    q, scale = followed.rows[-1], np.repeat([1.0, metres_per_radian(robot)], 3)
+    q = followed.rows[-1]
+    scale = np.repeat([1.0, metres_per_radian(robot)], 3)
     plain = robot.jacobian(q)
-    jacobian, twist = plain * scale[:, None], rail.twist(float(followed.shares[-1])) * scale
-    held = np.zeros(robot.dof, dtype=bool)
+    jacobian = plain * scale[:, None]
+    twist = rail.twist(float(followed.shares[-1])) * scale
+
+    held = np.zeros(robot.dof, dtype=bool)  # one at its limit leaves its part to others, which may get to theirs
     while (pushed := _pushed(robot, q, jacobian, twist, held)).any():
         held |= pushed
     if held.any():
         return _limits(robot, q, held)
+
     values = np.linalg.svd(plain, compute_uv=False)
     missed = twist - jacobian @ (np.linalg.pinv(jacobian, CUT_OFF) @ twist)
     if np.linalg.norm(missed) > LOST * np.linalg.norm(twist) and len(values) < 6:
@@ -53,7 +57,8 @@ def _pushed(robot: Robot, q: Vector, jacobian: Vector, twist: Vector, held: Mask
     """Which joints at a limit a motion of the tip would drive beyond it, those held left out. Shape (dof,)."""
     change = np.zeros(robot.dof)
     change[~held] = np.linalg.pinv(jacobian[:, ~held], CUT_OFF) @ twist
-    low, high = q <= robot.lower + AT_LIMIT, q >= robot.upper - AT_LIMIT
+    low = q <= robot.lower + AT_LIMIT
+    high = q >= robot.upper - AT_LIMIT
     pushed: Mask = (low & (change < 0.0)) | (high & (change > 0.0))
     return pushed & ~held
 

@@ -26,12 +26,15 @@ from rrtik_ompl.planning.tip_motion.values import FIRST_STEP, MOST_ROWS, SMALLES
 
 def follow_plainly(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> Followed:
     """Follow a rail from a configuration at its beginning, shape (dof,), until its end or as far as possible."""
-    rows, shares, step = [robot.clamp(q)], [0.0], FIRST_STEP
+    rows = [robot.clamp(q)]
+    shares = [0.0]
+    step = FIRST_STEP
     while shares[-1] < 1.0 - SMALLEST_STEP and len(rows) < MOST_ROWS and step >= SMALLEST_STEP:
         left = 1.0 - shares[-1]
         tried = left if step >= left - SMALLEST_STEP else step
         trial = _correct(robot, rail, shares[-1] + tried, _guess(robot, rows, shares, tried, leaning), tolerance)
         far = np.inf if trial is None else _strayed(robot, rail, rows[-1], trial, (shares[-1], tried), tolerance)
+
         if trial is not None and far <= 1.0 - ROOM:
             rows.append(trial)
             shares.append(shares[-1] + tried)
@@ -56,7 +59,8 @@ def _correct(robot: Robot, rail: Rail, share: float, q: Vector, tolerance: Toler
     for k in range(NEWTON_STEPS + 1):
         tip, jacobian = (x[0] for x in robot.fk_jacobian_batch(q))
         error = _residual(aim, tip)
-        away, chord = np.linalg.norm(error[:3]), np.linalg.norm(error[3:])
+        away = np.linalg.norm(error[:3])
+        chord = np.linalg.norm(error[3:])
         if away <= ARRIVED * tolerance.deviation and chord <= ARRIVED * tolerance.chord:
             return q
         if k < NEWTON_STEPS:
@@ -89,10 +93,14 @@ def _strayed(
         return float(np.inf)
     share, step = at
     error = _residual(rail.poses(share + 0.5 * step)[0], robot.fk_batch(0.5 * (q + trial))[0])
+
     tip = tip_columns(robot)
     change = np.abs(tip.gain) @ np.abs(trial - q)
-    turning, slid = np.where(tip.prismatic, 0.0, change), change[tip.prismatic].sum()
-    turn, swept = turning.sum(), turning @ levers_of(robot)
+    turning = np.where(tip.prismatic, 0.0, change)
+    slid = change[tip.prismatic].sum()
+    turn = turning.sum()
+    swept = turning @ levers_of(robot)
+
     third = turn**2 * (swept + 3.0 * slid) + abs(step * rail.arc_angle) ** 3 * rail.arc_radius
     third_turn = turn**3 + abs(step * rail.turn_angle) ** 3
     distance = np.linalg.norm(error[:3]) + REMAINDER * third
