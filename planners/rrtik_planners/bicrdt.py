@@ -32,8 +32,11 @@ class BiCRDT(OneJointPlanner):
 
     def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`OneJointPlanner.between`."""
-        rules, seed = self.options.growth(*self.bounds(), starts[0]), int(self.rng.integers(2**63))
-        limit, path = self.options.max_iterations, _common_row(starts, goals)
+        rules = self.options.growth(*self.bounds(), starts[0])
+        seed = int(self.rng.integers(2**63))
+        limit = self.options.max_iterations
+        path = _common_row(starts, goals)
+
         trees: CrdtSearch | TwoTreeSearch
         if has_kernels(self._world, KERNELS, within=np.vstack([starts, goals, rules.lower, rules.upper])):
             trees = CrdtSearch(self._world, rules, seed, limit, starts, goals)
@@ -42,6 +45,7 @@ class BiCRDT(OneJointPlanner):
         while path is None and trees.advance(ptc):
             met = _join(*trees.meeting())
             path = met if self.options.accepts(met) else None
+
         checker.checked_motions += trees.motions
         edges = trees.vertices - len(starts) - len(goals)
         graph = self.grown(lambda: trees.grown(0), lambda: trees.grown(1))
@@ -62,7 +66,9 @@ class TwoTreeSearch:
     def __init__(
         self, rules: CrdtRules, seed: int, limit: int | None, starts: Matrix, goals: Matrix, checker: MotionChecker
     ) -> None:
-        self._rules, self._limit, self._checker = rules, limit, checker
+        self._rules = rules
+        self._limit = limit
+        self._checker = checker
         self._stream = CrdtStream(seed)
         self._trees = CrdtTree(starts, rules), CrdtTree(goals, rules)
         self._growing = 0
@@ -92,12 +98,16 @@ class TwoTreeSearch:
 
     def _step(self) -> bool:
         """One iteration; whether the trees have met."""
-        number, self._growing = self._growing, 1 - self._growing
-        growing, other = self._trees[number], self._trees[1 - number]
+        number = self._growing
+        self._growing = 1 - self._growing
+        growing = self._trees[number]
+        other = self._trees[1 - number]
+
         target = self._stream.uniform(self._rules.lower, self._rules.upper)
         grown = growing.extend(target, self._checker, self._stream, exactly=False)
         if grown.outcome is Outcome.TRAPPED:
             return False
+
         meeting = other.extend(growing.vertex(grown.vertex), self._checker, self._stream)
         ends = grown.vertex, meeting.vertex
         self._met = ends if number == 0 else ends[::-1]

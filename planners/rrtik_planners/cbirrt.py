@@ -64,13 +64,17 @@ class CBiRRT(SafePlanner):
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
         world = self._world
-        motions, tables = None, None
+        motions = None
+        tables = None
         if keeps_constraints(world):
-            motions, tables = world.free_motions, held_tables(world.robot, world.constraints)
+            motions = world.free_motions
+            tables = held_tables(world.robot, world.constraints)
             if motions is None or tables is None:
                 raise InputError("path constraints need searches in kernels: install numba")
         elif has_kernels(world, KERNELS):
-            motions, tables = world.motions, held_tables(world.robot, HeldRegions(()))
+            motions = world.motions
+            tables = held_tables(world.robot, HeldRegions(()))  # of no regions: an RRT-Connect
+
         if motions is None or tables is None:
             rules = python_rules(self.bounds(), self.range, None, self.max_iterations, turning=self.turning())
             return search_in_python(self, starts, goals, rules, checker, ptc)
@@ -90,14 +94,19 @@ class CBiRRT(SafePlanner):
         search = ConstrainedSearch(motions, tables.held, lower, upper, range_=self.range, shortest=shortest)
         ask = decider(self._world, checker.motion_valid_batch)
         limit = NO_LIMIT if self.max_iterations is None else self.max_iterations
-        seed, first = self.rng.bit_generator.random_raw(), min(limit, PLAIN_SAMPLES)
+        seed = self.rng.bit_generator.random_raw()
+
+        first = min(limit, PLAIN_SAMPLES)
         path = search.solve(starts, goals, seed, ask=ask, stop=ptc, max_iterations=first)
         reason = "" if path is not None or first == limit or ptc() else _separation(self._world, starts, goals)
         if path is None and not reason and first < limit:
             path = search.go_on(limit, ask=ask, stop=ptc)
+
         counts = search.statistics()
         checker.checked_motions += int(counts["motions"])
-        counts |= {"edges": counts["vertices"] - len(starts) - len(goals)} | ({"separated": 1} if reason else {})
+        counts["edges"] = counts["vertices"] - len(starts) - len(goals)
+        if reason:
+            counts["separated"] = 1
         graph = self.grown(lambda: sound_tree(search.trees[0]), lambda: sound_tree(search.trees[1]))
         return SearchResult(path, counts, reason=reason, graph=graph)
 

@@ -87,8 +87,11 @@ class CRDT(OneJointPlanner):
         """See :meth:`OneJointPlanner.between`."""
         lower, upper = self.bounds()
         tolerance = self.goal_tolerance or GOAL_TOLERANCE_SHARE * float(np.linalg.norm(upper - lower))
-        rules, seed = self.options.growth(lower, upper, starts[0]), int(self.rng.integers(2**63))
-        limit, path = self.options.max_iterations, None
+        rules = self.options.growth(lower, upper, starts[0])
+        seed = int(self.rng.integers(2**63))
+        limit = self.options.max_iterations
+        path = None
+
         tree: CrdtSearch | OneTreeSearch
         if has_kernels(self._world, KERNELS, within=np.vstack([starts, goals, rules.lower, rules.upper])):
             tree = CrdtSearch(self._world, rules, seed, limit, starts, goals=goals, tolerance=tolerance)
@@ -97,12 +100,13 @@ class CRDT(OneJointPlanner):
         while path is None and tree.advance(ptc):
             found = tree.ending()
             path = found if self.options.accepts(found) else None
+
         checker.checked_motions += tree.motions
         statistics = {"iterations": tree.iterations, "vertices": tree.vertices, "edges": tree.vertices - len(starts)}
-        if path is not None:
-            return SearchResult(path, statistics, graph=self.grown(lambda: tree.grown(0)))
-        nearest, distance = _nearest_to_goal(tree.tree(0), goals)
         graph = self.grown(lambda: tree.grown(0))
+        if path is not None:
+            return SearchResult(path, statistics, graph=graph)
+        nearest, distance = _nearest_to_goal(tree.tree(0), goals)
         return SearchResult(tree.branch(0, nearest), statistics, distance, graph=graph)
 
 
@@ -126,9 +130,13 @@ class OneTreeSearch:
         tolerance: float,
         checker: MotionChecker,
     ) -> None:
-        self._rules, self._limit, self._checker = rules, limit, checker
-        self._goals, self._tolerance = goals, tolerance
-        self._stream, self._tree = CrdtStream(seed), CrdtTree(starts, rules)
+        self._rules = rules
+        self._limit = limit
+        self._checker = checker
+        self._goals = goals
+        self._tolerance = tolerance
+        self._stream = CrdtStream(seed)
+        self._tree = CrdtTree(starts, rules)
         self._waiting = self._near_goals(0)
         self._ending = 0
         self.iterations = 0
@@ -147,6 +155,7 @@ class OneTreeSearch:
                 if extension.outcome is Outcome.REACHED:
                     self._ending = extension.vertex
                     return True
+
             if self.iterations == self._limit:
                 return False
             self.iterations += 1

@@ -62,7 +62,8 @@ class CrdtTree:
         self._coordinates = np.empty((roots.shape[1], capacity))
         self._parents: NDArray[np.int64] = np.full(capacity, ROOT, dtype=np.int64)
         self._coordinates[:, : len(roots)] = roots.T
-        self._rules, self._axes = rules, rules.axes.tolist()
+        self._rules = rules
+        self._axes = rules.axes.tolist()
         self.size = len(roots)
 
     def vertex(self, i: int) -> Vector:
@@ -107,17 +108,21 @@ class CrdtTree:
             exactly: Whether a leg shorter than the smallest move ends the extension, for the target would be missed;
                 otherwise it is left out.
         """
-        current, known = near, self.size
+        current = near
+        known = self.size
         for axis in self._axis_order(near, rng):
             here = self.vertex(current)
-            start, end = float(here[axis]), float(target[axis])
-            came_from = self._came_from(near, axis) if current == near else start
+            start = float(here[axis])
+            end = float(target[axis])
+            came_from = self._came_from(near, axis) if current == near else start  # only the first leg can turn back
             turn = _turn(came_from, start, end)
             if start == end:
                 continue
+
             too_short = _shortest_piece(turn, came_from, start, end) < self._rules.smallest_move[axis]
             if too_short and not exactly:
                 continue
+
             step = _moved(here, axis, end)
             if too_short or not _free(turn, _moved(here, axis, came_from), here, step, checker):
                 return Extension(Outcome.TRAPPED if self.size == known else Outcome.ADVANCED, current)
@@ -149,6 +154,7 @@ class CrdtTree:
         """Add the end of a leg; where it turns back along the edge to its vertex, rewrite parents."""
         if turn is Turn.ONWARD:
             return self._add(step, current)
+
         parent = int(self._parents[current])
         if turn is Turn.BACK:
             return parent

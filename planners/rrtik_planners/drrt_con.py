@@ -61,7 +61,8 @@ class DRRTCon(SafePlanner):
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        core, graph = self._core, None
+        core = self._core
+        graph = None
         reused = core is not None and core.path is not None and self._from_kept(core, starts, goals, checker, ptc)
         if core is None or not reused:
             fresh = self._new()
@@ -69,6 +70,7 @@ class DRRTCon(SafePlanner):
             graph = self._trees(fresh)
             if core is None or found:  # a path that is blocked now is of more use to the next call than none
                 core = self._core = fresh
+
         path = self._asked(core, checker, ptc)
         statistics = {"iterations": core.connect.samples, "repairs": core.repairs, "reused": int(reused)}
         return SearchResult(path, statistics, graph=graph if path is None else None)
@@ -88,6 +90,7 @@ class DRRTCon(SafePlanner):
             refused = ~checker.motion_valid_batch(path[:-1], path[1:])
             if not refused.any():
                 return path
+
             core.path = _with_points(path, refused, 0.5 * core.max_edge)
             if ptc() or not (core.check_path(checker) or core.repair(checker, ptc)):
                 return None
@@ -105,7 +108,8 @@ class DRRTCon(SafePlanner):
     def _new(self) -> DrrtCon:
         lower, upper = self.bounds()
         max_edge, _ = connect_lengths(lower, upper, self.range, None, turning=self.turning())
-        seed, world = int(self.rng.integers(2**63)), self._world
+        seed = int(self.rng.integers(2**63))
+        world = self._world
         if is_conservative(world) and has_kernels(world, *LIBRARIES):
             return DrrtCon(KernelConnect(world, lower, upper, max_edge, seed, NO_LIMIT), max_edge)
         return DrrtCon(PythonConnect(lower, upper, max_edge, seed, NO_LIMIT), max_edge)

@@ -88,6 +88,7 @@ class FastRRTConnect(SafePlanner):
         if not has_kernels(world, KERNELS):
             rules = python_rules(self.bounds(), *self._lengths, max_iterations, turning=self.turning())
             return search_in_python(self, starts, goals, rules, checker, ptc)
+
         with self._kernels(world) as kernels:
             path = kernels.solve(
                 starts,
@@ -110,6 +111,7 @@ class FastRRTConnect(SafePlanner):
         self._bounds = bounds
         if self.bound is not None or self.max_iterations is None or not has_kernels(self._world, KERNELS):
             return [None] * len(ends)
+
         drawn = [int(np.random.default_rng(seed).bit_generator.random_raw()) for seed in seeds]
         with self._kernels(self._world) as kernels:
             return [_result_of(found) for found in solve_each(kernels, ends, drawn, self.max_iterations)]
@@ -136,7 +138,8 @@ class FastRRTConnect(SafePlanner):
 
     def _made(self, world: KernelWorld, lower: Vector, upper: Vector) -> ConnectSearch:
         range_, domain = connect_lengths(lower, upper, *self._lengths, turning=self.turning())
-        lower, upper = np.maximum(lower, world.robot.lower), np.minimum(upper, world.robot.upper)  # unknown to kernels
+        lower = np.maximum(lower, world.robot.lower)  # kernels know no place beyond the limits
+        upper = np.minimum(upper, world.robot.upper)
         return ConnectSearch(world.motions, lower, upper, range_=range_, domain=domain)
 
 

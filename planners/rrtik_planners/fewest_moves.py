@@ -30,7 +30,8 @@ from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 from rrtik_planners.one_joint_planner import OneJointPlanner
 
-SEARCHES, MAX_IMPROVEMENT_ROUNDS = 5, 10
+SEARCHES = 5  # of BiCRDT, the best of which is improved
+MAX_IMPROVEMENT_ROUNDS = 10
 BRIEF_ITERATIONS = 1000  # of BiCRDT, before it is started anew
 SAMPLED_ITERATIONS = 20_000  # of RRT-Connect
 FEW_NODES = 256  # of a lattice, where each motion is checked by itself
@@ -128,6 +129,7 @@ class FewestMoves(OneJointPlanner):
         world = self._world
         if not isinstance(world, World):
             return self._found(_Question(starts, goals, checker, ptc))
+
         self._prove = remembered(world, self._movable(starts), ptc)
         best: SearchResult | None = None
         levels = clearance_levels(world, starts[:1], self.clearance)
@@ -138,6 +140,7 @@ class FewestMoves(OneJointPlanner):
                 continue
             found = self._bounded(asked, starts, goals, checker, patient=number == len(levels) - 1)
             best = found if best is None else _fewer(best, found)
+
         assert best is not None
         if best.path is None or best.statistics["gap"] == 0 or self.rounds == 0 or ptc():
             return best
@@ -171,14 +174,17 @@ class FewestMoves(OneJointPlanner):
             Budget(int(self.rng.integers(2**63)), stop=ptc),
         )
         pairs = [(start, goal) for start in starts for goal in goals]
+
         bound = int(best.statistics["lower_bound"])
         if len(starts) == len(goals) == 1:
             moves = transitions(path)
             bound = max(bound, reach_bound(self._world, self._movable(starts), starts[0], goals[0], moves, ptc))
             best = replace(best, statistics={**best.statistics, "lower_bound": bound, "gap": moves - bound})
+
         found = grids.route(pairs, merge_moves(path, tolerance=0.0), bound)
         if found is None:
             return best
+
         route, number = found
         asked = self._asked(starts, goals, levels, number, ptc)._replace(known=route)
         return _fewer(best, self._bounded(asked, starts, goals, checker))
@@ -191,6 +197,7 @@ class FewestMoves(OneJointPlanner):
         checker.checked_motions += asked.checker.checked_motions
         if found.path is None or len(asked.goals) == len(goals):
             return found
+
         plain = min(lower_bound(start, goal) for start in starts for goal in goals)
         bound = min(int(found.statistics["lower_bound"]), plain)
         counts = {"lower_bound": bound, "gap": transitions(found.path) - bound}
@@ -201,7 +208,7 @@ class FewestMoves(OneJointPlanner):
 
     def _found(self, asked: _Question, *, patient: bool = True) -> SearchResult:
         """What is found; without patience it is given up if quick routes are not found."""
-        frozen, world = self.options.staying, self._world
+        world = self._world
         moves = MoveSearch(
             asked.starts,
             asked.goals,
@@ -209,12 +216,13 @@ class FewestMoves(OneJointPlanner):
             asked.checker.motion_valid_batch,
             budget=Budget(int(self.rng.integers(2**63)), stop=asked.stop),
             costs=self.options.joint_costs,
-            frozen=frozen,
+            frozen=self.options.staying,
             smallest_move=self.options.smallest_move,
             most_nodes=FEW_NODES if world is None else MOST_NODES,
             prove=self._prove,
             all_free=None if asked.level is None or world is None else world.motion_valid_batch,
         )
+
         moves.try_corner_routes()
         iterations = 0
         if asked.known is None:
@@ -223,6 +231,7 @@ class FewestMoves(OneJointPlanner):
             moves.offer(asked.known)
         if moves.route is None:
             return SearchResult(None, {"iterations": iterations})
+
         grids_follow = asked.level is not None
         rounds = rounds_before(self.rounds, self._movable(asked.starts)) if grids_follow else self.rounds
         moves.improve(rounds)
@@ -233,10 +242,12 @@ class FewestMoves(OneJointPlanner):
         """Offer the routes of several runs of BiCRDT, or others if it finds none; returns its iterations."""
         level = asked.level
         world = self._world if level is None else level.searched
-        iterations, seeds = 0, self.rng.integers(2**31, size=self.searches).tolist()
+        iterations = 0
+        seeds = self.rng.integers(2**31, size=self.searches).tolist()
         for seed in seeds:
             if moves.proven or asked.stop():
                 return iterations
+
             found = self._bicrdt(world, seed, BRIEF_ITERATIONS).search(*asked.ends)
             iterations += int(found.statistics.get("iterations", 0))
             if found.path is not None:
@@ -245,6 +256,7 @@ class FewestMoves(OneJointPlanner):
                 route = self._converted(world, seed, asked)
                 if route is not None:
                     _offer(moves, route, level)
+
         if moves.route is None and patient:
             found = self._bicrdt(world, seeds[0], None).search(*asked.ends)
             iterations += int(found.statistics.get("iterations", 0))

@@ -16,7 +16,8 @@ from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, S
 from rrtik_ompl.world.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
 
-STEP, STRIDE = 0.15, 0.6  # [rad]
+STEP = 0.15  # [rad] of CONNECT, the first one
+STRIDE = 0.6  # [rad] of the exploration, the longest one
 
 
 class IKURT(TipSeeker):
@@ -68,17 +69,22 @@ class IKURT(TipSeeker):
             raise InputError(f"jacobian: expected true or false, got {jacobian!r}")
         self.step = None if step is None else positive(step, "step")
         self.stride = None if stride is None else positive(stride, "stride")
-        self.jacobian, self.most_vertices = jacobian, most_vertices
+        self.jacobian = jacobian
+        self.most_vertices = most_vertices
         self.metres_per_radian = None if metres_per_radian is None else positive(metres_per_radian, "metres_per_radian")
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        metric, radian = self._metric(goals), self.radian()
-        step, stride = self.step or STEP * radian, self.stride or STRIDE * radian
+        metric = self._metric(goals)
+        radian = self.radian()
+        step = self.step or STEP * radian
+        stride = self.stride or STRIDE * radian
         options = Options(step, stride, self.jacobian, self.most_vertices)
+
         validity = IkurtValidity(checker.valid_batch, checker.motion_valid_batch, ptc)
         search = BatchedSearch(metric, options, *self.bounds(), validity, self.rng, starts)
         path = search.run()
+
         counts = {"connects": search.connects, "restarts": search.restarts, "vertices": search.vertices}
         result = self.result(metric, search.tree, path, counts, checker)
         if path is None and isinstance(metric, TipMetric):

@@ -70,13 +70,14 @@ class IKURTPublished(TipSeeker):
         if isinstance(self._world, World) and self.goal is not None:
             metric = TipMetric.published(self._world.robot, self.targets(), start, self.mu)
             threshold = THRESHOLD_ANGLE if metric.metres_per_radian else THRESHOLD_REACH * reach(self._world.robot)
+
         steps = Steps(self.step or STEP * radian, self.threshold or threshold, self.accuracy or metric.radius)
         search = PublishedSearch(metric, steps, *self.bounds(), checker.motion_valid, ptc, self.rng, start)
         vertex = search.run()
+
+        path = None if vertex is None else search.tree.branch(vertex)
         counts = {"connects": search.connects, "vertices": search.tree.size}
-        result = self.result(
-            metric, search.tree, None if vertex is None else search.tree.branch(vertex), counts, checker
-        )
+        result = self.result(metric, search.tree, path, counts, checker)
         if vertex is None and isinstance(metric, TipMetric):
             nearest = search.tree.q[search.tree.distance.argmin()]
             return replace(result, reason=f"the goal was not reached; {misses(metric, nearest, 'the nearest vertex')}")

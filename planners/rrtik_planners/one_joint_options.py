@@ -47,10 +47,12 @@ class OneJointOptions(MoveRules):
         frozen = self.frozen_joints
         if not frozen:
             return starts, goals
+
         for start in starts:
             fitting = (goals[:, frozen] == start[frozen]).all(axis=1)
             if fitting.any():
                 return starts[(starts[:, frozen] == start[frozen]).all(axis=1)], goals[fitting]
+
         joint = next(k for k in frozen if starts[0, k] != goals[0, k])
         raise InputError(
             f"frozen_joints: joint '{self._names[joint]}' must not move, but it is at {starts[0, joint]:.9g} at the "
@@ -65,7 +67,8 @@ class OneJointOptions(MoveRules):
     def growth(self, lower: Vector, upper: Vector, start: Vector) -> CrdtRules:
         """How trees grow within bounds, shapes (n,), if the joints that stay are where they are at a start."""
         scale = self.joint_costs / (upper - lower) if self.scale_by_range else self.joint_costs
-        lower, upper = lower.copy(), upper.copy()
+        lower = lower.copy()
+        upper = upper.copy()
         lower[self.staying] = upper[self.staying] = start[self.staying]
         return CrdtRules(lower, upper, scale, self.smallest_move, self.joint_costs.min() / self.joint_costs)
 

@@ -71,26 +71,37 @@ class RestartShorten(FastRRTConnect):
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        course: list[tuple[float, float]] = []
-        begun, best = time.perf_counter(), np.inf
+        course: list[tuple[float, float]] = []  # seconds, and the length of the best path from then on
+        begun = time.perf_counter()
+        best = np.inf
         found = last = self._first(starts, goals, checker, ptc)
-        least = np.linalg.norm(starts[:, None] - goals[None], axis=2).min()
-        plans, idle, iterations = 1, 0, int(last.statistics["iterations"])
+        least = np.linalg.norm(starts[:, None] - goals[None], axis=2).min()  # no path is shorter
+        plans = 1
+        idle = 0  # plans in a row that gained nothing
+        iterations = int(last.statistics["iterations"])
+
         while found.path is not None:
             if last.path is not None:
                 if not course:
                     best = route_length(last.path)
                     course.append((time.perf_counter() - begun, best))
+
                 route = self._shortened(last.path, best, plans, checker, ptc)
                 length = route_length(route)
                 if length < best * (1.0 - GAIN) and self.stands(route, checker):
-                    idle, best, found = 0, length, replace(last, path=route)
+                    idle = 0
+                    best = length
+                    found = replace(last, path=route)
                     course.append((time.perf_counter() - begun, length))
+
             if idle >= self.patience or ptc() or best <= least * (1.0 + GAIN):
                 break
-            plans, idle = plans + 1, idle + 1
+
+            plans += 1
+            idle += 1
             last = self.another(starts, goals, best, idle, checker, ptc)
             iterations += int(last.statistics["iterations"])
+
         counts = {**found.statistics, "iterations": iterations, "plans": plans}
         return replace(found, statistics=counts, progress=tuple(course))
 
@@ -128,7 +139,9 @@ class RestartShorten(FastRRTConnect):
             checker.checked_motions += task.asked if motions is self._world else 0
             if not self.stands(found, checker):  # parts of free motions, asked otherwise
                 break
-            path, length = found, route_length(found)
+
+            path = found
+            length = route_length(found)
             if length > WORTH * best or length > before * (1.0 - SETTLED) or ptc():
                 break
             before = length

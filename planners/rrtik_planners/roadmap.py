@@ -63,15 +63,19 @@ class RoadmapPlanner(SafePlanner):
         graph = self._new_graph(checker, ptc) if known is None else known.graph
         find, learn = (graph.route, graph.learn) if known is None else (known.route, known.learn)
         before = graph.statistics()
-        path, asked = find(starts, goals, ptc), 0
+
+        path = find(starts, goals, ptc)
+        asked = 0
         if path is None and not ptc():
             found, asked = self._connected(starts, goals, ptc)
             if found is not None:
                 learn(found)
                 path = find(starts, goals, ptc)
                 path = found if path is None else path
+
         counts = graph.statistics()
-        counts["motions"] -= before["motions"] if known is not None else 0
+        if known is not None:
+            counts["motions"] -= before["motions"]  # of queries before
         if isinstance(graph, KernelGraph):
             checker.checked_motions += int(counts["motions"])
         checker.checked_motions += asked
@@ -80,8 +84,7 @@ class RoadmapPlanner(SafePlanner):
     def _connected(self, starts: Matrix, goals: Matrix, ptc: Stop) -> tuple[Matrix | None, int]:
         """A path of RRT-Connect, shape (k, n), or None; and how many motions that took."""
         seed = int(self.rng.integers(2**31))
-        si, world = self.getSpaceInformation(), self._world
-        planner = FastRRTConnect(si, world=world, seed=seed)
+        planner = FastRRTConnect(self.getSpaceInformation(), world=self._world, seed=seed)
         _, rows = planner.solve_rows(starts, goals, self.bounds(), ptc, checked=True)
         if planner.failure is not None:
             raise PlannerError(planner.failure.summary)

@@ -62,12 +62,16 @@ class TipSeeker(SafePlanner):
     ) -> SearchResult:
         """The path found, else that to the vertex nearest to the goal; with the error of the tip at its end."""
         nearest = int(tree.distance.argmin())
-        path, exact, tip = tree.branch(nearest) if found is None else found, found is not None, {}
+        path = tree.branch(nearest) if found is None else found
+        exact = found is not None
+
+        tip: dict[str, float] = {}
         if isinstance(metric, TipMetric):
             away, angle = metric.errors(path[-1])
             tip = {"position_error": float(away), "orientation_error": float(angle)}
         elif exact:
             path, exact = _ended(path, metric.goals, checker)
+
         difference = 0.0 if exact else max(float(tree.distance[nearest]), LEAST_DIFFERENCE)
         return SearchResult(
             path, {**counts, "metric_evaluations": metric.evaluations, **tip}, difference, graph=self.grown(tree.grown)
