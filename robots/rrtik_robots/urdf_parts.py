@@ -31,7 +31,8 @@ class Part:
 
 def tube(start: Point, end: Point, radius: float, colour: str = "", *, capsule: bool = False) -> Part:
     """A cylinder from ``start`` to ``end`` [m], or the capsule with its cap centres there."""
-    a, b = np.array(start), np.array(end)
+    a = np.array(start)
+    b = np.array(end)
     x, y, z = b - a
     yaw, pitch = (0.0, 0.0) if x == y == 0.0 and z > 0.0 else (np.arctan2(y, x), np.arctan2(np.hypot(x, y), z))
     shape = f'<cylinder radius="{number(radius)}" length="{number(float(np.linalg.norm(b - a)))}"/>'

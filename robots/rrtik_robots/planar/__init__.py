@@ -67,6 +67,7 @@ def _arm(
     at_most(len(sizes) + 1, MOST_JOINTS, f"robot '{name}': joints")
     if len(sizes) == 0 or (sizes <= 0.0).any():
         raise InputError(f"{name}: lengths must be one or more numbers greater than 0, got {sizes.tolist()}")
+
     given = [(-180.0, 180.0)] * len(sizes) if limits_deg is None else limits_deg
     limits = np.radians(finite_array(given, (len(sizes), 2), f"{name}: limits_deg"))
     rows = [

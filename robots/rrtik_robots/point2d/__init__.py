@@ -45,7 +45,8 @@ def point2d(
     """
     size = max(not_negative(radius, "point2d: radius"), SMALLEST_RADIUS)
     (left, right), (bottom, top) = finite_array(bounds, (2, 2), "point2d: bounds").tolist()
-    ball, disc = Solid(Sphere(size), pin.SE3.Identity(), SLATE), Solid(Cylinder(size, 0.1 * size), colour=SLATE)
+    ball = Solid(Sphere(size), pin.SE3.Identity(), SLATE)
+    disc = Solid(Cylinder(size, 0.1 * size), colour=SLATE)
     tree = Tree(
         "point2d",
         [Link("base"), Link("carriage"), Link("disc", (ball,), (disc,))],

@@ -107,6 +107,7 @@ def _cut(name: str, joints: int, lengths: Mapping[str, float] | None, tip: str, 
         (size["a3"], -RIGHT, size["d4"], 0.05),
         (0.0, RIGHT, 0.0, 0.045),
     ][:joints]
+
     geometry = PumaGeometry(base=0.0, a2=size["a2"], a3=size["a3"], d3=-size["d3"], d4=size["d4"])
     end = DhRow(a=size["a3"], alpha=-RIGHT, d=size["d4"]) if joints == 3 else DhRow(alpha=-RIGHT, d=size["d7"])
     tool = pin.SE3(pin.rpy.rpyToMatrix(end.alpha, 0.0, 0.0), np.array([end.a, 0.0, 0.0]))

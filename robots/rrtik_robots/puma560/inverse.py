@@ -49,7 +49,8 @@ class PumaGeometry:
 
 def pose_form(geometry: PumaGeometry) -> AnalyticSolver:
     """The six-joint arm. With the wrist straight (family ``wrist``) theta4 is free, and theta6 follows it."""
-    solve, near = partial(puma_branches, geometry), partial(nearness, geometry)
+    solve = partial(puma_branches, geometry)
+    near = partial(nearness, geometry)
     numbers = (geometry.base, geometry.a2, geometry.d3, geometry.forearm, float(np.arctan2(geometry.d4, geometry.a3)))
     return AnalyticSolver("tip", "pose", BRANCHES, ("wrist",), (3,), solve, near, kernel="ball_arm", numbers=numbers)
 
@@ -78,24 +79,44 @@ def puma_branches(
         slack: Sine of theta5 up to which the wrist counts as straight, if more than rounding.
         _: Limits are not used: theta6 can take every direction, so that no theta4 inside its limits is lost.
     """
-    numbers, count = np.ascontiguousarray(poses.transpose(1, 2, 0)), len(poses)
+    numbers = np.ascontiguousarray(poses.transpose(1, 2, 0))
+    count = len(poses)
     u, v, w, p = numbers[:3].transpose(1, 0, 2)
+
     arm, real = _arm(g, p[0], p[1], p[2] - g.base)
     q = np.empty((6, 2, 2, 2, count))
     q[:3] = arm[:, :, :, None]
-    c1, s1 = np.cos(arm[0]), np.sin(arm[0])
-    c23, s23 = np.cos(arm[1] + arm[2]), np.sin(arm[1] + arm[2])
+
+    # the tip's axis w in the frame of the forearm: theta4 turns axis 5 normal to it, theta5 is its tilt
+    c1 = np.cos(arm[0])
+    s1 = np.sin(arm[0])
+    c23 = np.cos(arm[1] + arm[2])
+    s23 = np.sin(arm[1] + arm[2])
     forward = w[0] * c1 + w[1] * s1
-    x, y, z = forward * c23 + w[2] * s23, w[1] * c1 - w[0] * s1, w[2] * c23 - forward * s23
+    x = forward * c23 + w[2] * s23
+    y = w[1] * c1 - w[0] * s1
+    z = w[2] * c23 - forward * s23
+
     sine = np.hypot(x, y)
     straight = sine < max(SINGULAR, slack)
     theta4 = np.where(straight, 0.0 if near is None else near[:, 3], np.arctan2(-y, -x))
-    c4, s4 = np.cos(theta4), np.sin(theta4)
-    ax, ay, az = -s4 * c23 * c1 - c4 * s1, -s4 * c23 * s1 + c4 * c1, -s4 * s23  # the axis of joint 5, backwards
-    theta6 = np.arctan2(ax * u[0] + ay * u[1] + az * u[2], ax * v[0] + ay * v[1] + az * v[2])
     theta5 = np.arctan2(sine, z)
-    q[3, :, :, 0], q[4, :, :, 0], q[5, :, :, 0] = theta4, theta5, theta6
-    q[3, :, :, 1], q[4, :, :, 1], q[5, :, :, 1] = _opposite(theta4), -theta5, _opposite(theta6)
+
+    # the axis of joint 5, backwards
+    c4 = np.cos(theta4)
+    s4 = np.sin(theta4)
+    ax = -s4 * c23 * c1 - c4 * s1
+    ay = -s4 * c23 * s1 + c4 * c1
+    az = -s4 * s23
+    theta6 = np.arctan2(ax * u[0] + ay * u[1] + az * u[2], ax * v[0] + ay * v[1] + az * v[2])
+
+    q[3, :, :, 0] = theta4
+    q[4, :, :, 0] = theta5
+    q[5, :, :, 0] = theta6
+    q[3, :, :, 1] = _opposite(theta4)  # the wrist flipped
+    q[4, :, :, 1] = -theta5
+    q[5, :, :, 1] = _opposite(theta6)
+
     singular = (straight & real).any(axis=(0, 1)).astype(np.uint8)
     both = np.repeat(real[:, :, None], 2, axis=2)
     return Branches(q.reshape(6, 8, count).transpose(2, 1, 0), both.reshape(8, count).T, singular)
@@ -117,13 +138,19 @@ def five_joint_branches(g: PumaGeometry, tool: float, poses: Numbers, *_: object
     real, and its residual says how far off it is.
     """
     arm = arm_branches(g, poses @ np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, -tool], [0, 0, 0, 1.0]]))
-    theta1, forearm = arm.q[..., 0], arm.q[..., 1] + arm.q[..., 2]
-    c1, s1, c, s = np.cos(theta1), np.sin(theta1), np.cos(forearm), np.sin(forearm)
-    (ux, uy, uz), (vx, vy, vz), (_, _, wz) = poses[:, :3, :3].transpose(2, 1, 0)[..., None]
-    wx, wy = poses[:, 0, 2, None], poses[:, 1, 2, None]
+    theta1 = arm.q[..., 0]
+    forearm = arm.q[..., 1] + arm.q[..., 2]
+    c1 = np.cos(theta1)
+    s1 = np.sin(theta1)
+    c = np.cos(forearm)
+    s = np.sin(forearm)
+    (ux, uy, uz), (vx, vy, vz), (wx, wy, wz) = poses[:, :3, :3].transpose(2, 1, 0)[..., None]
+
     # the columns in the frame of the forearm, turned so that they are Rz(theta4) Ry(-theta5)
-    v_ahead, v_aside = vx * c1 + vy * s1, vy * c1 - vx * s1
+    v_ahead = vx * c1 + vy * s1
+    v_aside = vy * c1 - vx * s1
     u_down, v_down, w_down = (-s * (x * c1 + y * s1) - c * z for x, y, z in ((ux, uy, uz), (vx, vy, vz), (wx, wy, wz)))
+
     theta4 = np.arctan2(s * vz - c * v_ahead, -v_aside)
     theta5 = np.arctan2(u_down, w_down)
     q = np.concatenate([arm.q, np.stack([theta4, theta5], axis=2)], axis=2)
@@ -137,8 +164,10 @@ def _arm(g: PumaGeometry, x: Vector, y: Vector, z: Vector) -> tuple[Numbers, NDA
     side = np.arctan2(g.d3, radius)
     heading = np.arctan2(y, x)
     upper, turn, real = two_links(g.a2, g.forearm, np.stack([radius, -radius]), np.stack([z, z]))
+
     q = np.empty((3, 2, 2, len(x)))
-    q[0, 0], q[0, 1] = wrapped(heading + side), wrapped(heading + np.pi - side)
+    q[0, 0] = wrapped(heading + side)
+    q[0, 1] = wrapped(heading + np.pi - side)
     q[1] = upper.transpose(1, 0, 2)
     q[2] = wrapped(turn.transpose(1, 0, 2) - np.arctan2(g.d4, g.a3))
     clear = square >= -REACH_TOLERANCE

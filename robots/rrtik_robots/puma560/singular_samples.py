@@ -23,8 +23,12 @@ def singular_configurations(robot: Robot, case: str, count: int, rng: np.random.
     """
     if case not in CASES:
         raise UnknownNameError("singular case", case, CASES, where=robot.name)
-    (a2, a3, d4), found = (ROWS_560[1][0], ROWS_560[2][0], ROWS_560[3][2]), np.zeros((0, 6))
-    bend = np.arctan2(d4, a3)
+
+    a2 = ROWS_560[1][0]
+    a3 = ROWS_560[2][0]
+    d4 = ROWS_560[3][2]
+    bend = np.arctan2(d4, a3)  # minus theta3 where the elbow is stretched
+    found = np.zeros((0, 6))
     while len(found) < count:
         Q = rng.uniform(robot.lower, robot.upper, (4 * count, 6))
         if "elbow" in case:

@@ -36,8 +36,10 @@ def psi_interval(
     scale = np.maximum(2.0 * g.a4 * np.sqrt(square), 1e-300)
     most = (square + g.a4**2 - (g.a2 - g.a3) ** 2) / scale
     least = (square + g.a4**2 - (g.a2 + g.a3) ** 2) / scale
+
     exists = (least <= 1.0 + REACH_TOLERANCE) & (most >= -1.0 - REACH_TOLERANCE)
-    low, high = np.arccos(np.clip(most, -1.0, 1.0)), np.arccos(np.clip(least, -1.0, 1.0))
+    low = np.arccos(np.clip(most, -1.0, 1.0))
+    high = np.arccos(np.clip(least, -1.0, 1.0))
     return np.arctan2(height, x), low, high, exists
 
 
@@ -109,10 +111,14 @@ def psi_within_rounding(
     """
     centre, low, high, exists = psi_interval(g, radius, height)
     psi = centre + np.stack([low, -low, high, -high])
-    c, s = np.cos(psi), np.sin(psi)
+    c = np.cos(psi)
+    s = np.sin(psi)
+
+    # for each psi the length of the axis in the plane that changes x and z least, each by its own measure
     weight = (SINGULAR / room) ** 2
     length = np.maximum((weight * x * c + z * s) / (weight * c * c + s * s), 0.0)
     cost = np.maximum(np.abs(length * c - x) / room, np.abs(length * s - z) / SINGULAR)
+
     best = np.argmin(cost, axis=0)[None]
     psi, moved, least = (np.take_along_axis(each, best, axis=0)[0] for each in (psi, length * c, cost))
     return psi, moved, exists & (least <= 1.0)
@@ -146,7 +152,8 @@ def _ends(g: TitanGeometry, w: Matrix, height: Vector, shape: tuple[int, ...]) -
     """Values of theta1 at which psi is at an end of its intervals, or is free; shape (10, 2, 2, m)."""
     centre, low, high, _ = psi_interval(g, np.zeros_like(height), height)
     psi = centre + np.stack([low, -low, high, -high])
-    flat, heading = np.hypot(w[0], w[1]), np.arctan2(w[1], w[0])
+    flat = np.hypot(w[0], w[1])
+    heading = np.arctan2(w[1], w[0])
     with np.errstate(divide="ignore", invalid="ignore"):
         away = np.arccos(np.clip(w[2] / (np.tan(psi) * flat), -1.0, 1.0))
     away = np.where(np.isfinite(away), away, 0.0)

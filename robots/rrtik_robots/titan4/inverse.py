@@ -34,7 +34,8 @@ def closed_form(geometry: TitanGeometry) -> AnalyticSolver:
     axis (family ``shoulder``) theta1 is: the representatives have the nearest values that the arm can reach, inside
     its limits wherever it can do so there.
     """
-    solve, near = partial(titan_branches, geometry), partial(nearness, geometry)
+    solve = partial(titan_branches, geometry)
+    near = partial(nearness, geometry)
     numbers = (geometry.a1, geometry.a2, geometry.a3, geometry.a4, geometry.d6)
     return AnalyticSolver(
         "grip_point", "pose", BRANCHES, FAMILIES, (0, 1), solve, near, kernel="parallel_axes", numbers=numbers
@@ -60,26 +61,32 @@ def titan_branches(
     numbers = np.ascontiguousarray(poses.transpose(1, 2, 0))
     w = numbers[:3, 2]
     target = Target(numbers[:3, 0], w, numbers[:3, 3] - g.d6 * w)
+
     distance = np.hypot(target.p[0], target.p[1])
     on_axis = distance < max(SINGULAR, slack)
     c1, s1 = target.p[:2] / np.where(on_axis, 1.0, distance)
     x, h = in_plane(target, c1, s1)
     normal = h < np.maximum(np.minimum(SINGULAR + ROUNDING / np.maximum(distance, SINGULAR), NORMAL), slack)
+
     direction = SIGMA * np.stack([x, w[2]])[:, None] / np.where(normal, 1.0, h)  # cosine and sine of psi, (2, 2, m)
-    cosines, sines = np.stack([direction[0], -direction[0]]), np.stack([direction[1], direction[1]])
+    cosines = np.stack([direction[0], -direction[0]])
+    sines = np.stack([direction[1], direction[1]])
     front = np.arctan2(target.p[1], target.p[0])
     theta1 = np.stack([front, np.where(front > 0.0, front - np.pi, front + np.pi)])[:, None]
     turn = np.stack([np.stack([c1, -c1]), np.stack([s1, -s1])])[:, :, None]
     q, real = completed(g, target, theta1, turn, cosines, sines)
     odd = np.flatnonzero(on_axis | normal | ((h < UNSURE) & ~real.all(axis=(0, 1, 2))))
     horizontal = np.abs(w[2]) < max(SINGULAR, slack)  # then the arm plane can be turned normal to the gripper axis
-    singular = ((normal | (on_axis & horizontal)) * np.uint8(1) + on_axis * np.uint8(2)).astype(np.uint8)
+    any_psi = normal | (on_axis & horizontal)
+    singular = (any_psi * np.uint8(1) + on_axis * np.uint8(2)).astype(np.uint8)
+
     if len(odd):
         wanted = np.zeros((len(odd), 6)) if near is None else near[odd]
         q[..., odd], real[..., odd] = _representatives(g, target.rows(odd), on_axis[odd], normal[odd], wanted)
         if limits is not None:
-            where = Singular(on_axis[odd], (normal | (on_axis & horizontal))[odd], wanted)
+            where = Singular(on_axis[odd], any_psi[odd], wanted)
             q[..., odd], real[..., odd] = moved_inside(g, target.rows(odd), where, limits, q[..., odd], real[..., odd])
+
     count = len(poses)
     return Branches(q.reshape(6, 8, count).transpose(2, 1, 0), real.reshape(8, count).T, singular)
 
@@ -96,18 +103,22 @@ def _representatives(
     theta1 = np.broadcast_to((front + np.array([0.0, np.pi])[:, None])[:, None], (2, 2, len(near))).copy()
     theta1[..., on_axis] = nearest_azimuth(g, target.w[:, on_axis], target.p[2, on_axis], theta1[..., on_axis])
     theta1 = wrapped(theta1)
+
     turn = np.stack([np.cos(theta1), np.sin(theta1)])
     x, h = in_plane(target, *turn)
     psi = np.arctan2(SIGMA * target.w[2], SIGMA * x)
     any_psi = np.where(on_axis, h < SINGULAR, normal)
     wanted = np.where(any_psi, near[:, 1:4].sum(axis=1) + np.array([0.0, np.pi])[:, None], psi)
+
     radius = target.p[0] * turn[0] + target.p[1] * turn[1]
     free, _ = nearest_psi(g, radius, target.p[2], wanted)
     close = any_psi | (np.abs(wrapped(free - psi)) * h < SINGULAR)
+
     room = np.clip(SINGULAR / np.maximum(np.hypot(*target.p[:2]), SINGULAR), SINGULAR, MAX_SHIFT)
     height = np.broadcast_to(target.p[2], x.shape)
     other, moved, fits = psi_within_rounding(g, radius, height, SIGMA * x, SIGMA * target.w[2], room)
     fits &= ~close & (h < UNSURE)
+
     theta1 = np.where(fits, _turned_to(target, theta1, SIGMA * moved), theta1)
     psi = np.where(close, free, np.where(fits, other, psi))
     return completed(g, target, theta1, np.stack([np.cos(theta1), np.sin(theta1)]), np.cos(psi), np.sin(psi))
@@ -115,6 +126,7 @@ def _representatives(
 
 def _turned_to(target: Target, theta1: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
     """The azimuth nearest to ``theta1`` at which the gripper axis has the part x along the arm plane."""
-    flat, heading = np.hypot(*target.w[:2]), np.arctan2(target.w[1], target.w[0])
+    flat = np.hypot(*target.w[:2])
+    heading = np.arctan2(target.w[1], target.w[0])
     away = np.arccos(np.clip(x / np.maximum(flat, SINGULAR), -1.0, 1.0))
     return wrapped(heading + np.copysign(away, wrapped(theta1 - heading)))

@@ -94,17 +94,23 @@ def _yaw_housing(g: TitanGeometry) -> list[Part]:
 
 
 def _gripper(g: TitanGeometry) -> list[Part]:
-    palm, tip = 0.195, g.d6 + 0.048
+    palm = 0.195
+    tip = g.d6 + 0.048
     parts = [
         tube((0.115, 0.0, 0.0), (palm - 0.02, 0.0, 0.0), 0.053, "dark"),
         box((0.05, 0.05, 0.095), (palm - 0.005, 0.0, 0.0), "titanium"),
     ]
     for side in (1.0, -1.0):
-        root, bend, end = (palm, side * 0.036), (0.6 * palm + 0.4 * tip, side * 0.052), (tip, side * 0.014)
-        parts += [_bar(root, bend, 0.034, 0.024, "titanium"), _bar(bend, end, 0.030, 0.020, "titanium")]
-        middle = (0.45 * bend[0] + 0.55 * tip, side * 0.024)
-        parts += [_bar(middle, (tip, side * 0.006), 0.024, 0.008, "dark")]
-        parts += [tube((palm, -0.024, side * 0.036), (palm, 0.024, side * 0.036), 0.014, "chrome")]
+        root = (palm, side * 0.036)
+        bend = (0.6 * palm + 0.4 * tip, side * 0.052)
+        end = (tip, side * 0.014)
+        pad = (0.45 * bend[0] + 0.55 * tip, side * 0.024)
+        parts += [
+            _bar(root, bend, 0.034, 0.024, "titanium"),
+            _bar(bend, end, 0.030, 0.020, "titanium"),
+            _bar(pad, (tip, side * 0.006), 0.024, 0.008, "dark"),
+            tube((palm, -0.024, side * 0.036), (palm, 0.024, side * 0.036), 0.014, "chrome"),
+        ]
     return parts
 
 
@@ -125,7 +131,8 @@ def _actuator(start: Point, gland: Point, end: Point, radius: float) -> list[Par
 
 def _bar(start: tuple[float, float], end: tuple[float, float], width: float, height: float, colour: str) -> Part:
     """A flat bar between two points (x, z) of the gripper's plane."""
-    (x0, z0), (x1, z1) = start, end
+    x0, z0 = start
+    x1, z1 = end
     length = float(np.hypot(x1 - x0, z1 - z0))
     centre = ((x0 + x1) / 2, 0.0, (z0 + z1) / 2)
     return box((length, width, height), centre, colour, pitch=-float(np.arctan2(z1 - z0, x1 - x0)))

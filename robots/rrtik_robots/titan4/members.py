@@ -61,7 +61,8 @@ def moved_inside(
         The same two, as far as there are such members.
     """
     bounds = _turns(limits)
-    moved, reached = q.copy(), real.copy()
+    moved = q.copy()
+    reached = real.copy()
     fits = real & _inside(q, bounds)
     todo = np.flatnonzero(~fits.all(axis=(0, 1, 2)) & (where.on_axis | where.any_psi))
     for begin in range(0, len(todo), ROWS):
@@ -90,17 +91,20 @@ def _inside(q: Numbers, limits: Limits) -> Mask:
 def _nearest(g: TitanGeometry, target: Target, where: Singular, limits: Limits) -> tuple[Numbers, Mask]:
     """Of each branch the nearest member inside the limits, shape (6, 2, 2, 2, m), and whether there is any."""
     count = len(where.near)
-    q, cost = np.zeros((6, 2, 2, 2, count)), np.full((2, 2, 2, count), np.inf)
+    q = np.zeros((6, 2, 2, 2, count))
+    cost = np.full((2, 2, 2, count), np.inf)
     for rows, curve in (
         (np.flatnonzero(where.on_axis), _turned_members),
         (np.flatnonzero(where.any_psi), _pitched_members),
     ):
         if len(rows) == 0:
             continue
+
         part = target.rows(rows)
         theta1, psi, distance = curve(g, part, where.rows(rows), limits)
         members, real = completed(g, part, theta1, np.stack([np.cos(theta1), np.sin(theta1)]), np.cos(psi), np.sin(psi))
         inside = real & _inside(members, limits)
+
         for side in range(2):
             away = np.where(inside, distance[side][:, :, None], np.inf)
             best = np.argmin(away, axis=0)[None]
@@ -121,8 +125,11 @@ def _turned_members(
         theta1 and psi of k members, shape (k, 2, m), the second axis the way of the wrist; and how far they are from
         what front and back are wanted to be [rad], shape (2, k, 2, m).
     """
-    (wx, wy, wz), height = target.w, target.p[2]
-    flat, heading = np.maximum(np.hypot(wx, wy), SINGULAR), np.arctan2(wy, wx)
+    wx, wy, wz = target.w
+    height = target.p[2]
+    flat = np.maximum(np.hypot(wx, wy), SINGULAR)
+    heading = np.arctan2(wy, wx)
+
     psi = psi_at(g, np.zeros_like(height), height, limits)
     right = np.full((1, len(height)), np.pi / 2)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -133,6 +140,7 @@ def _turned_members(
     own = np.broadcast_to(_pair(limits, 0), (2, len(height)))
     away = np.concatenate([pitched, -pitched, -yaw, np.pi + yaw, right, -right])
     theta1 = wrapped(_with_middles(np.concatenate([heading + away, rolled, rolled + np.pi, own])))
+
     x = wx * np.cos(theta1) + wy * np.sin(theta1)
     follows = np.arctan2(SIGMA * wz, SIGMA * x[:, None])
     both = np.broadcast_to(theta1[:, None], follows.shape)
@@ -144,19 +152,24 @@ def _pitched_members(
     g: TitanGeometry, target: Target, where: Singular, limits: Limits
 ) -> tuple[Numbers, Numbers, Numbers]:
     """With the gripper axis normal to the arm plane: psi is free, and theta1 has two values. As `_turned_members`."""
-    (px, py, height), (wx, wy, _) = target.p, target.w
+    px, py, height = target.p
+    wx, wy, _ = target.w
     first = np.where(where.on_axis, np.arctan2(wy, wx) + np.pi / 2, np.arctan2(py, px))
     theta1 = wrapped(first + SIDES)
-    c1, s1 = np.cos(theta1), np.sin(theta1)
+    c1 = np.cos(theta1)
+    s1 = np.sin(theta1)
     axis = _yaw_axes(target, limits)[:, :, None]
     rolled = np.arctan2(-(axis[0] * c1 + axis[1] * s1), np.broadcast_to(axis[2], (2, *c1.shape)))
+
     wanted = where.near[:, 1:4].sum(axis=1) + SIDES
     stops = psi_at(g, px * c1 + py * s1, np.broadcast_to(height, c1.shape), limits)
     psi = _with_middles(np.concatenate([stops, rolled]))
     psi = np.concatenate([psi, np.broadcast_to(wanted[:, None], (2, *psi.shape[1:]))])
+
     shape = (psi.shape[0] * 2, 2, psi.shape[-1])
     psi = np.broadcast_to(psi.reshape(shape[0], 1, -1), shape)
     both = np.broadcast_to(np.tile(theta1, (shape[0] // 2, 1))[:, None], shape)
+
     front = np.where(where.on_axis, where.near[:, 0], first)
     turned = np.abs(wrapped(both - (front + SIDES)[:, None, None]))
     other_side = ~where.on_axis & (turned > np.pi / 2)  # theta1 is not free: the members of the other branch
@@ -171,7 +184,8 @@ def _pair(limits: Limits, joint: int) -> Matrix:
 
 def _yaw_axes(target: Target, limits: Limits) -> Numbers:
     """Axis 5 where theta6 is at a limit, for theta6 is its angle from u about the gripper axis; shape (3, 2, m)."""
-    theta6, across = _pair(limits, 5), np.cross(target.w, target.u, axis=0)
+    theta6 = _pair(limits, 5)
+    across = np.cross(target.w, target.u, axis=0)
     axis: Numbers = np.cos(theta6) * target.u[:, None] - np.sin(theta6) * across[:, None]
     return axis
 

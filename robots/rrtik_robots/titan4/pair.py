@@ -41,7 +41,8 @@ def two_titan4(*, apart: float = APART, tip: str = "left_grip_point", base_pose:
         InputError: If the distance or the tip makes no sense.
     """
     single = read_srdf(read_text(FOLDER / "titan4.srdf"), "titan4.srdf")
-    states, rates = single.postures(None), read_joint_limits(FOLDER / "joint_limits.yaml", JOINTS)
+    states = single.postures(None)
+    rates = read_joint_limits(FOLDER / "joint_limits.yaml", JOINTS)
     limits: dict[str, JointLimits] = {f"{side}{joint}": rates[joint] for side in SIDES for joint in JOINTS}
     return robot_from_urdf_text(
         two_titan4_urdf(length(apart, "apart")),
@@ -64,13 +65,13 @@ def two_titan4_urdf(apart: float = APART) -> str:
     pair = Element("robot", name="two_titan4")
     SubElement(pair, "link", name="frame")
     for side, y in zip(SIDES, (0.5 * apart, -0.5 * apart), strict=True):
-        single = fromstring(titan4_urdf())
-        for element in single:
+        for element in fromstring(titan4_urdf()):
             if element.tag != "material":
                 _rename(element, side)
                 pair.append(element)
-            elif side == SIDES[0]:
+            elif side == SIDES[0]:  # both arms share them
                 pair.append(element)
+
         mount = SubElement(pair, "joint", name=f"{side}mount", type="fixed")
         SubElement(mount, "parent", link="frame")
         SubElement(mount, "child", link=f"{side}base")

@@ -58,14 +58,20 @@ def completed(
         Joint values, shape (6, k, 2, 2, m), elbow up and down in the last axis but one, and whether each is real,
         shape (k, 2, 2, m).
     """
-    (ux, uy, uz), (px, py, pz), (c1, s1) = target.u, target.p, turn
+    ux, uy, uz = target.u
+    px, py, pz = target.p
+    c1, s1 = turn
     s5 = target.w[1] * c1 - target.w[0] * s1
     c5 = SIGMA * in_plane(target, c1, s1)[1]
+
     shoulder, elbow, real = two_links(g.a2, g.a3, px * c1 + py * s1 - g.a1 - g.a4 * cosines, pz - g.a4 * sines)
-    along, across = ux * c1 + uy * s1, uy * c1 - ux * s1
+    along = ux * c1 + uy * s1
+    across = uy * c1 - ux * s1
+
     q = np.empty((6, len(theta1), 2, 2, theta1.shape[-1]))
     q[0] = theta1[:, :, None]
-    q[1], q[2] = np.moveaxis(shoulder, 0, 2), np.moveaxis(elbow, 0, 2)
+    q[1] = np.moveaxis(shoulder, 0, 2)
+    q[2] = np.moveaxis(elbow, 0, 2)
     q[3] = wrapped(np.arctan2(sines, cosines)[:, :, None] - q[1] - q[2])
     q[4] = np.arctan2(s5, c5)[:, :, None]
     roll = np.arctan2(s5 * (along * cosines + uz * sines) - c5 * across, uz * cosines - along * sines)

@@ -11,7 +11,8 @@ from rrtik_robots.titan4.geometry import TitanGeometry
 
 RIGHT = np.pi / 2
 AT_LIMIT = 1e-12  # [rad], rounding
-FEWEST, ROUNDS = 1_000, 10_000  # postures drawn at a time, and how often before giving up
+FEWEST = 1_000  # postures that are drawn at a time
+ROUNDS = 10_000  # of drawing, before giving up
 CASES = ("generic", "elbow", "wrist", "shoulder", "elbow wrist", "shoulder wrist", "case 1", "case 2", "all psi")
 
 
@@ -27,6 +28,7 @@ def singular_configurations(case: str, count: int, rng: np.random.Generator, g: 
     geometry = TitanGeometry() if g is None else g
     if case not in CASES:
         raise UnknownNameError("singular case", case, CASES, where="titan4")
+
     Q = rng.uniform(-np.pi, np.pi, (count, 6))
     if "shoulder" in case:
         Q = _on_axis(geometry, Q, None, rng)
@@ -53,7 +55,8 @@ def configurations_inside(
         UnknownNameError: If there is no such case.
         InputError: If hardly any posture of the case is inside the limits.
     """
-    low, high = limits[0] - AT_LIMIT, limits[1] + AT_LIMIT
+    low = limits[0] - AT_LIMIT
+    high = limits[1] + AT_LIMIT
     found = np.zeros((0, 6))
     for _ in range(ROUNDS):
         Q = singular_configurations(case, max(count, FEWEST), rng, g)

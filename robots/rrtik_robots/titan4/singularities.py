@@ -18,8 +18,10 @@ def nearness(g: TitanGeometry, Q: Matrix) -> dict[str, Vector]:
     ``elbow``: stretched or folded, the border of the workspace. ``wrist``: gripper axis normal to the arm plane, which
     is case 3. ``shoulder``: wrist point on the azimuth axis. ``case 1``: axis 5 on axis 1. ``case 2``: axis 6 on it.
     """
-    radius, psi = np.abs(wrist_radius(g, Q)), Q[:, 1:4].sum(axis=1)
-    wrist, tilt = np.abs(np.cos(Q[:, 4])), np.cos(Q[:, 4]) * np.sin(psi)
+    radius = np.abs(wrist_radius(g, Q))
+    psi = Q[:, 1:4].sum(axis=1)
+    wrist = np.abs(np.cos(Q[:, 4]))
+    tilt = np.cos(Q[:, 4]) * np.sin(psi)
     return {
         "elbow": np.abs(np.sin(Q[:, 2])),
         "wrist": wrist,
@@ -32,7 +34,9 @@ def nearness(g: TitanGeometry, Q: Matrix) -> dict[str, Vector]:
 
 def wrist_radius(g: TitanGeometry, Q: Matrix) -> Vector:
     """Signed distance of the wrist point from the azimuth axis, in the arm plane [m], shape (m,)."""
-    shoulder, elbow, psi = Q[:, 1], Q[:, 1] + Q[:, 2], Q[:, 1:4].sum(axis=1)
+    shoulder = Q[:, 1]
+    elbow = Q[:, 1] + Q[:, 2]
+    psi = Q[:, 1:4].sum(axis=1)
     radius: Vector = g.a1 + g.a2 * np.cos(shoulder) + g.a3 * np.cos(elbow) + g.a4 * np.cos(psi)
     return radius
 

@@ -60,12 +60,16 @@ class Camera:
     def sees(self, points: ArrayLike) -> Mask:
         """Which points, shape (m, 3) in the base frame, it can bring into its picture. Shape (m,)."""
         half = np.tan(np.radians(self.diagonal_deg) / 2.0) / np.hypot(self.aspect, 1.0)
-        middle, to_points = self.target - self.position, np.asarray(points, dtype=np.float64) - self.position
+        middle = self.target - self.position
+        to_points = np.asarray(points, dtype=np.float64) - self.position
+
         distance = np.linalg.norm(to_points, axis=1)
         heading = np.arctan2(to_points[:, 1], to_points[:, 0]) - np.arctan2(middle[1], middle[0])
         pan = np.abs(wrapped(heading))
         tilt = np.abs(_elevation(to_points) - _elevation(middle[None]))
-        wide, high = np.arctan(half * self.aspect), np.arctan(half)
+
+        wide = np.arctan(half * self.aspect)
+        high = np.arctan(half)
         aimed = (pan <= wide + np.radians(self.pan_deg)) & (tilt <= high + np.radians(self.tilt_deg))
         seen: Mask = aimed & (distance >= self.nearest) & (distance <= self.farthest)
         return seen
@@ -107,6 +111,7 @@ class EffectiveWorkspace:
         targets = finite_array(poses, (None, 4, 4), "poses")
         found = solutions(self.robot, targets, check=False)
         q = found.branches
+
         room = np.minimum(q - self.robot.lower, self.robot.upper - q).min(axis=2) >= self.margin
         fits = np.array(found.valid & room)
         fits[fits] = self._clear(q[fits])
@@ -126,7 +131,8 @@ class EffectiveWorkspace:
     def _slice(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Points at which the gripper can be used straight ahead in the arm plane at one of ``PITCHES_DEG``."""
         flat = points.reshape(-1, 3)
-        heading, pitch = np.arctan2(flat[:, 1], flat[:, 0])[:, None], np.radians(PITCHES_DEG)[None]
+        heading = np.arctan2(flat[:, 1], flat[:, 0])[:, None]
+        pitch = np.radians(PITCHES_DEG)[None]
         poses = gripper_poses(flat[:, None], heading, pitch).reshape(-1, 4, 4)
         inside = self.contains(self._base() @ poses).reshape(*points.shape[:-1], len(PITCHES_DEG))
         return np.asarray(inside.any(axis=-1), dtype=np.bool_)
@@ -196,10 +202,23 @@ def gripper_poses(points: ArrayLike, heading: ArrayLike, pitch: ArrayLike) -> ND
     c, s, cp, sp = (f(np.asarray(a, dtype=np.float64)) for a in (heading, pitch) for f in (np.cos, np.sin))
     shape = np.broadcast_shapes(np.shape(points)[:-1], np.shape(c), np.shape(cp))
     poses = np.zeros((*shape, 4, 4))
-    poses[..., 0, 0], poses[..., 1, 0], poses[..., 2, 0] = -c * sp, -s * sp, cp + 0.0 * c  # u
-    poses[..., 0, 1], poses[..., 1, 1] = s, -c  # v
-    poses[..., 0, 2], poses[..., 1, 2], poses[..., 2, 2] = c * cp, s * cp, sp + 0.0 * c  # w
-    poses[..., :3, 3], poses[..., 3, 3] = points, 1.0
+
+    # u
+    poses[..., 0, 0] = -c * sp
+    poses[..., 1, 0] = -s * sp
+    poses[..., 2, 0] = cp + 0.0 * c
+
+    # v, horizontal
+    poses[..., 0, 1] = s
+    poses[..., 1, 1] = -c
+
+    # w, the approach axis
+    poses[..., 0, 2] = c * cp
+    poses[..., 1, 2] = s * cp
+    poses[..., 2, 2] = sp + 0.0 * c
+
+    poses[..., :3, 3] = points
+    poses[..., 3, 3] = 1.0
     return poses
 
 
