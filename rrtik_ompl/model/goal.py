@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Mask, Vector, finite_array, frozen, positive, rows_of
-from rrtik_ompl.base.choices import FrameAxis
+from rrtik_ompl.base.choices import FrameAxis, one_of
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.base.poses import rigid, rotation_angles
@@ -26,6 +26,7 @@ from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.model.tip_distance import metres_per_radian
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
+AXES: tuple[FrameAxis, ...] = get_args(FrameAxis)
 NO_BOX = frozen([0.0, 0.0, 0.0])
 MOST_GOALS = 100_000  # of a set
 
@@ -112,7 +113,7 @@ class PositionGoal(Target):
 
     def tightened(self, share: float) -> PositionGoal:
         """The same point with that share of the tolerance."""
-        return PositionGoal(self.position, share * self.tolerance)
+        return PositionGoal(self.position, positive(share, "share of the tolerance") * self.tolerance)
 
     def region(self) -> TaskRegion:
         """The point in any orientation."""
@@ -162,7 +163,8 @@ class PoseGoal(Target):
 
     def tightened(self, share: float) -> PoseGoal:
         """The same pose with that share of the tolerances."""
-        return PoseGoal(self.T_world_tip, share * self.position_tolerance, share * self.orientation_tolerance)
+        part = positive(share, "share of the tolerances")
+        return PoseGoal(self.T_world_tip, part * self.position_tolerance, part * self.orientation_tolerance)
 
     def region(self) -> TaskRegion:
         """The pose alone."""
@@ -171,9 +173,9 @@ class PoseGoal(Target):
     def freed(self, axis: FrameAxis | None, box: Vector) -> TaskRegion:
         """The pose with a free turn about an axis of its frame, and a box of positions there, side lengths [m]."""
         bounds = np.zeros((6, 2))
-        bounds[:3] = np.outer(box, [-0.5, 0.5])
+        bounds[:3] = np.outer(finite_array(box, (3,), "goal box"), [-0.5, 0.5])
         if axis is not None:
-            bounds[3 + "xyz".index(axis)] = -np.pi, np.pi
+            bounds[3 + AXES.index(one_of(AXES, axis, "axis of a free turn"))] = -np.pi, np.pi
         return TaskRegion(self.T_world_tip, bounds, pin.SE3.Identity(), *self.tolerances)
 
     def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
@@ -211,7 +213,7 @@ class GoalSet(TipGoal):
         if not goals or not all(isinstance(goal, GoalPart) for goal in goals):
             kinds = "a list of at least one pose or position or region of the tip"
             raise InputError(f"goal: a set is {kinds}; of configurations plan to each, or take PoseGoal(robot.fk(q))")
-        if free_rotation_axis is not None and str(free_rotation_axis) not in ("x", "y", "z"):
+        if free_rotation_axis is not None and str(free_rotation_axis) not in AXES:
             raise InputError(f"goal free_rotation_axis must be x, y or z, got {free_rotation_axis!r}; or a TaskRegion")
 
         sides = finite_array(box, (3,), "goal box")
@@ -238,8 +240,9 @@ class GoalSet(TipGoal):
 
     def alone(self, number: int) -> TipGoal:
         """One of its parts as a goal of its own: of a pose that may be turned, but not shifted, a set of one."""
-        member = self.members[number]
-        part = self.parts[number]
+        place = self._place(number)
+        member = self.members[place]
+        part = self.parts[place]
         if part is member or self.box.any():
             return part
         return GoalSet([member], self.free_rotation_axis)

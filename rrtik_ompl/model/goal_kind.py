@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Mask, Vector, finite_array
+from rrtik_ompl.base.arrays import Mask, Vector, finite_array, whole_number
 from rrtik_ompl.base.choices import FrameAxis
-from rrtik_ompl.base.errors import require
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.tip_distance import metres_per_radian
 
@@ -95,8 +95,19 @@ class TipGoal(Goal):
         raise NotImplementedError
 
     def alone(self, number: int) -> TipGoal:
-        """One of its parts as a goal of its own."""
-        return self.parts[number]
+        """One of its parts as a goal of its own.
+
+        Raises:
+            InputError: If there is no part of that number.
+        """
+        return self.parts[self._place(number)]
+
+    def _place(self, number: int) -> int:
+        """The number of one of its parts, checked."""
+        place = whole_number(number, "number of a part of a goal")
+        if place >= len(self.parts):
+            raise InputError(f"goal: it has {len(self.parts)} parts, counted from 0, and no part {place}")
+        return place
 
 
 class GoalPart(TipGoal):

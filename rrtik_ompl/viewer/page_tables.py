@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inspect import getmodule
 from types import ModuleType
 
 import numpy as np
@@ -45,7 +46,7 @@ def layout_numbers() -> dict[str, dict[str, int]]:
 
     def numbers(module: ModuleType) -> dict[str, int]:
         named = {name: value for name, value in vars(module).items() if name.isupper() and type(value) is int}
-        own = [each for each in vars(module).values() if holds_table(each) and each.__module__ == module.__name__]
+        own = [each for each in vars(module).values() if holds_table(each) and getmodule(each) is module]
         return named | {name.upper(): place for record in own for name, place in record.places.items()}
 
     return {name: numbers(module) for name, module in LAYOUTS.items()}

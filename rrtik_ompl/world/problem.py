@@ -144,7 +144,12 @@ class Problem:
         return self.with_world(self.world.with_accuracy(accuracy))
 
     def with_world(self, world: World) -> Problem:
-        """The same start and goal in another form of the same world; neither is checked again."""
+        """The same start and goal in another form of the same world; neither is checked again.
+
+        Raises:
+            InputError: If it is no world.
+        """
+        require(world, World, "world of a problem", "use World(robot, scene)")
         return changed(self, settings=world.settings, world=world)
 
     def reached(self, q: ArrayLike) -> bool:

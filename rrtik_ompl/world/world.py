@@ -399,7 +399,12 @@ class World(Judge):
         return self.prover.route(self._rows(waypoints, 2), clearance=kept, slack=spare, seconds=limit)
 
     def has_proven(self, proof: Proof) -> bool:
-        """Whether a proof covers every motion, keeps what the world keeps, and was made by a form of the world."""
+        """Whether a proof covers every motion, keeps what the world keeps, and was made by a form of the world.
+
+        Raises:
+            InputError: If it is no proof.
+        """
+        require(proof, Proof, "proof", "use world.prove(waypoints)")
         return proof.proven and proof.clearance >= self._settings.kept and self.prover.made(proof)
 
     def violations(self, waypoints: ArrayLike, *, resolution: float | None = None) -> tuple[Violation, ...]:

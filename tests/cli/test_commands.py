@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -308,6 +309,7 @@ def test_ctrl_c_exits_130_says_so_and_leaves_no_file(tmp_path):
         while more := os.read(terminal, 1000):
             shown += more.decode()
     os.close(terminal)
+    shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown)  # the progress is taken away, by moves of the cursor
     assert process.wait(timeout=30) == 130
     assert shown.count("rrtik: ") == 1
     assert shown.splitlines()[-1].startswith("rrtik: interrupted")
