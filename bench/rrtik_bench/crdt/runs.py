@@ -15,7 +15,7 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import route_length, single_joint, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_cut, double_axis_cut
-from rrtik_ompl.planning.moves.axis_cut_rounds import axis_cut_rounds, route_rank
+from rrtik_ompl.planning.moves.axis_cut_rounds import axis_cut_rounds
 from rrtik_ompl.world.problem import Problem
 
 STAGES = ("raw", "pass 1", "pass 2", "extra rounds")
@@ -88,12 +88,6 @@ def sound(problem: Problem, route: np.ndarray) -> bool:
     ends = (route[0] == problem.start).all() and problem.goal.distance(problem.robot, route[-1:]).max() == 0.0
     valid = not JointPath.of(problem.world.robot, route).violations(problem.world)
     return bool(ends and valid and single_joint(route))
-
-
-def best_of_groups(runs: list[RouteRun], stage: int, size: int) -> list[np.ndarray]:
-    """Restarts: the best route of a stage in each group of ``size`` runs with seeds of their own."""
-    groups = [runs[i : i + size] for i in range(0, len(runs) - size + 1, size)]
-    return [min((run.routes[stage] for run in group), key=route_rank) for group in groups]
 
 
 def share(items: list[Any], wanted: Callable[[Any], bool]) -> float:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from rrtik_bench.sensing.tables import NOISE
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
@@ -117,11 +116,3 @@ def in_view(places: Sequence[Any]) -> bool:
         if (pixels < 0.0).any() or (pixels > np.array([CAMERA.width, CAMERA.height]) - 1.0).any():
             return False
     return True
-
-
-def noisy_poses(place: Any, count: int, seed: int, sigma: float = NOISE) -> list[list[CornerPose | None]]:
-    """The published model of a sensor: corners of one marker with independent noise [pixels], no picture at all."""
-    camera, rng = published_camera(), np.random.default_rng(seed)
-    pixels = camera.project(square_corners(SIDE) @ place.rotation.T + place.translation)
-    noise = sigma * rng.standard_normal((count, 4, 2))
-    return [[pose_of_square(camera, pixels + each, SIDE, sigma)] for each in noise]

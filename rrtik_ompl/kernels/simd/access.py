@@ -15,9 +15,9 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from rrtik_ompl.kernels.layout import ALIGNMENT, DOUBLE_BYTES, INT_BYTES
+from rrtik_ompl.kernels.layout import ALIGNMENT, INT_BYTES
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined
-from rrtik_ompl.kernels.simd.lanes import DOUBLE, INDEX, LANES, SINGLE, WHOLE, field, pointer, set_field
+from rrtik_ompl.kernels.simd.lanes import DOUBLE, INDEX, LANES, SINGLE, WHOLE, pointer
 
 _FIELD_BYTES = 8
 
@@ -118,15 +118,6 @@ def member_reader(place: int, size: int) -> Any:
     return intrinsic(lambda typingctx, table, number: (types.int64(types.int64, types.int64), emit))
 
 
-def part_reader(offset: int) -> Any:
-    """Function (record) that finds what lies ``offset`` bytes behind its beginning."""
-
-    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.add(args[0], _constant(offset), flags=("nsw",))
-
-    return intrinsic(lambda typingctx, record: (types.int64(types.int64), emit))
-
-
 def _row_reader(size: int) -> Any:
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         array, width, number = args
@@ -136,13 +127,6 @@ def _row_reader(size: int) -> Any:
 
 
 int_row = _row_reader(INT_BYTES)  # function (array, width, number): finds a row of ``width`` int32
-double_row = _row_reader(DOUBLE_BYTES)  # the same of float64
-
-
-@inlined
-def count_up(table: int, place: int) -> None:
-    """Add 1 to a field."""
-    set_field(table, place, field(table, place) + 1)
 
 
 def _emit_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
