@@ -46,12 +46,12 @@ class ArmCache:
     def covers_of(self, bodies: Sequence[Body]) -> tuple[Spheres, ...]:
         """Spheres around and inside all bodies of a world, those of the robot's links first."""
         others = bodies[len(self.covers) :]
-        known: dict[tuple[int, bool], Spheres] = {}  # those of one size share a geometry
+        spheres_of_key: dict[tuple[int, bool], Spheres] = {}  # those of one size share a geometry
         keys = [(id(body.geometry), body.joint > 0) for body in others]
         for key, body in zip(keys, others, strict=True):
-            if key not in known:
-                known[key] = _spheres(body)
-        return (*self.covers, *(known[key] for key in keys))
+            if key not in spheres_of_key:
+                spheres_of_key[key] = _spheres(body)
+        return (*self.covers, *(spheres_of_key[key] for key in keys))
 
     def pack(self, bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres], *, share: bool = True) -> FastWorld:
         """The tables of a world.
@@ -93,7 +93,7 @@ def _spheres(body: Body) -> Spheres:
 
 def strokes(robot: Robot) -> Vector:
     """How far the limits let each joint of the chain go from its zero, shape (joints,); 0 for continuous joints."""
-    ends = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
-    ends = np.where(np.isfinite(ends), ends, 0.0)
-    reached: Vector = np.abs(robot.chain.gain) @ ends + np.abs(robot.chain.offset) + SLIDING_MARGIN
-    return reached
+    largest_values = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
+    largest_values = np.where(np.isfinite(largest_values), largest_values, 0.0)
+    reach: Vector = np.abs(robot.chain.gain) @ largest_values + np.abs(robot.chain.offset) + SLIDING_MARGIN
+    return reach

@@ -80,7 +80,10 @@ class Arrangement:
         return Containment(self.bodies.whole, self.checked, [outer for outer, _ in self.covers()])
 
     def moved(self, name: str, pose: ArrayLike | pin.SE3) -> tuple[Arrangement, tuple[int, ...]]:
-        """The arrangement with an obstacle elsewhere, and the numbers of its bodies.
+        """The arrangement with an obstacle elsewhere.
+
+        Returns:
+            That arrangement, and the numbers of the obstacle's bodies.
 
         Raises:
             UnknownNameError: If there is no obstacle of that name.
@@ -90,30 +93,30 @@ class Arrangement:
         if name not in numbers.obstacles:
             raise UnknownNameError("obstacle", name, numbers.obstacles)
 
-        place = numbers.obstacles[name]
-        obstacle = changed(self.scene.obstacles[place], pose=rigid(pose, f"pose of '{name}'"))
+        index = numbers.obstacles[name]
+        obstacle = changed(self.scene.obstacles[index], pose=rigid(pose, f"pose of '{name}'"))
         placements = numbers.placements(obstacle)
 
         bodies = self.bodies
         for number, placement in placements.items():
             bodies = bodies.with_(number, replace(bodies[number], placement=placement))
 
-        still = numbers.standing(None if self.always_colliding else placements)
+        pairs_at_rest = numbers.standing(None if self.always_colliding else placements)
         other = replace(
             self,
-            scene=exchanged(self.scene, place, obstacle),
+            scene=exchanged(self.scene, index, obstacle),
             bodies=bodies,
-            always_colliding=_touching(self.robot, bodies, still),
+            always_colliding=_touching(self.robot, bodies, pairs_at_rest),
         )
         return other, tuple(placements)
 
-    def with_room(self, room: float) -> Items[Body]:
-        """The bodies, obstacles with that much more margin [m]."""
-        if room == 0.0:
+    def with_room(self, clearance: float) -> Items[Body]:
+        """The bodies, with a clearance [m] added to the margins of obstacles."""
+        if clearance == 0.0:
             return self.bodies
         return Items(
             tuple(
-                replace(body, margin=body.margin + room) if body.kind == "obstacle" else body
+                replace(body, margin=body.margin + clearance) if body.kind == "obstacle" else body
                 for body in self.bodies.whole
             )
         )
@@ -154,39 +157,45 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Numbers:
-    """Where the obstacles of a scene stand among its obstacles and bodies."""
+    """Where the obstacles of a scene stand among its obstacles and bodies.
+
+    Attributes:
+        obstacles: Index of each obstacle in the scene, by its name.
+        bodies: Numbers of the bodies of each obstacle, by its name.
+        fixed: For each body the pairs that it is in and of which no body ever moves.
+    """
 
     obstacles: dict[str, int]
     bodies: dict[str, list[int]]
-    fixed: dict[int, list[tuple[int, int]]]  # pairs of each body that both never move
+    fixed: dict[int, list[tuple[int, int]]]
 
     @classmethod
     def of(cls, obstacles: Sequence[Obstacle], bodies: Sequence[Body], standing: Pairs) -> Numbers:
         """Those of a scene."""
-        numbers: dict[str, list[int]] = {}
+        body_numbers: dict[str, list[int]] = {}
         for k, body in enumerate(bodies):
             if body.kind == "obstacle":
-                numbers.setdefault(body.name, []).append(k)
+                body_numbers.setdefault(body.name, []).append(k)
 
-        fixed: dict[int, list[tuple[int, int]]] = {}
+        pairs_of_body: dict[int, list[tuple[int, int]]] = {}
         for pair in standing:
             for k in pair:
-                fixed.setdefault(k, []).append(pair)
+                pairs_of_body.setdefault(k, []).append(pair)
 
-        return cls({each.name: k for k, each in enumerate(obstacles)}, numbers, fixed)
+        return cls({each.name: k for k, each in enumerate(obstacles)}, body_numbers, pairs_of_body)
 
     def placements(self, obstacle: Obstacle) -> dict[int, pin.SE3]:
         """Where the bodies of an obstacle are, by their numbers."""
-        here = obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, 0.0)
+        pose = obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, 0.0)
         return {
-            number: here * part.placement
+            number: pose * part.placement
             for number, part in zip(self.bodies[obstacle.name], pieces(obstacle.shape), strict=True)
         }
 
     def standing(self, moved: Iterable[int] | None) -> Pairs:
-        """Of the pairs that never move those of some bodies; all of them where nobody names bodies."""
+        """Of the pairs that never move those with one of some bodies, given by numbers; all of them if None."""
         if moved is None:
-            return tuple(dict.fromkeys(pair for own in self.fixed.values() for pair in own))
+            return tuple(dict.fromkeys(pair for pairs in self.fixed.values() for pair in pairs))
         return tuple(pair for k in moved for pair in self.fixed.get(k, ()))
 
 

@@ -61,56 +61,61 @@ def clearance_on(world: World, course: Course) -> ClearanceCurve:
     proof = course.prove(None)
     unproven = tuple(gap.motion for gap in proof.unproven)
 
-    kept, pairs = _kept_at(world, course.at(course.motions, course.shares))
-    certain = kept[~np.isin(course.motions, unproven)]
+    levels, pairs = _proven_levels(world, course.at(course.motions, course.shares))
+    levels_of_proven = levels[~np.isin(course.motions, unproven)]
 
-    lacking = int(np.searchsorted(LEVELS, proof.clearance)) - 1  # the last level below what is to be kept, or -1
-    gaps = [(gap, lacking) for gap in proof.unproven]
-    gaps += _nearer(course, int(certain.min()), set(unproven)) if certain.size else []
+    # The last level below what is to be kept, or -1.
+    level_of_unproven = int(np.searchsorted(LEVELS, proof.clearance)) - 1
+    gaps = [(gap, level_of_unproven) for gap in proof.unproven]
+    gaps += _nearest_of_proven(course, int(levels_of_proven.min()), set(unproven)) if levels_of_proven.size else []
     gaps = [(gap, level) for gap, level in gaps if np.isfinite(gap.share)]
 
     if gaps:
         motions = np.array([gap.motion for gap, _ in gaps])
         shares = np.array([gap.share for gap, _ in gaps])
-        more, _ = _kept_at(world, course.at(motions, shares))
-        kept = np.append(kept, np.minimum(more, [level for _, level in gaps]))
+        levels_of_gaps, _ = _proven_levels(world, course.at(motions, shares))
+        levels = np.append(levels, np.minimum(levels_of_gaps, [level for _, level in gaps]))
         pairs = (*pairs, *((gap.first, gap.second) for gap, _ in gaps))
 
         motions = np.append(course.motions, motions)
         shares = np.append(course.shares, shares)
 
         order = np.lexsort((shares, motions))
-        kept = kept[order]
+        levels = levels[order]
         pairs = tuple(pairs[k] for k in order)
         course = replace(course, motions=motions[order], shares=shares[order])
 
-    distances = LEVELS[np.maximum(kept, 0)]
+    distances = LEVELS[np.maximum(levels, 0)]
     return ClearanceCurve(course.motions, frozen(course.shares), frozen(distances), pairs, unproven)
 
 
-def _nearer(course: Course, least: int, unproven: set[int]) -> list[tuple[Gap, int]]:
+def _nearest_of_proven(course: Course, level_of_places: int, unproven: set[int]) -> list[tuple[Gap, int]]:
     """Where the proven pieces are nearest, and the level that is proven there; nothing if all keep what places keep.
 
     Args:
         course: The course.
-        least: Number of the level that all places on proven pieces keep.
+        level_of_places: Number of the level that all places on proven pieces keep.
         unproven: Numbers of the pieces that are not proven free.
+
+    Returns:
+        The places at which the next level above the proven one is not kept, and the number of the proven level.
     """
     gaps: list[Gap] = []
-    proven = 0
-    refused = least + 1
-    tried = least
+    proven_level = 0
+    refused_level = level_of_places + 1
+    tried_level = level_of_places
 
-    while refused - proven > 1:
-        short = [gap for gap in course.prove(float(LEVELS[tried])).unproven if gap.motion not in unproven]
-        if short:
-            refused = tried
-            gaps = short
+    while refused_level - proven_level > 1:
+        proof = course.prove(float(LEVELS[tried_level]))
+        gaps_of_level = [gap for gap in proof.unproven if gap.motion not in unproven]
+        if gaps_of_level:
+            refused_level = tried_level
+            gaps = gaps_of_level
         else:
-            proven = tried
-        tried = (proven + refused) // 2
+            proven_level = tried_level
+        tried_level = (proven_level + refused_level) // 2
 
-    return [(gap, proven) for gap in gaps]
+    return [(gap, proven_level) for gap in gaps]
 
 
 def places_along(world: World, waypoints: Matrix) -> tuple[NDArray[np.int64], Vector, Matrix]:
@@ -129,31 +134,31 @@ def places_along(world: World, waypoints: Matrix) -> tuple[NDArray[np.int64], Ve
 
 def distances_at(world: World, places: Matrix) -> Vector:
     """What each configuration, shape (m, dof), is proven to keep from obstacles, of the distances told apart [m]."""
-    return np.asarray(LEVELS[np.maximum(_kept_at(world, places)[0], 0)])
+    return np.asarray(LEVELS[np.maximum(_proven_levels(world, places)[0], 0)])
 
 
 def _between(rows: Matrix, motions: NDArray[np.int64], shares: Vector) -> Matrix:
     """Configurations on the motions between waypoints, shape (m, dof)."""
-    found: Matrix = (1.0 - shares)[:, None] * rows[motions] + shares[:, None] * rows[motions + 1]
-    return found
+    configurations: Matrix = (1.0 - shares)[:, None] * rows[motions] + shares[:, None] * rows[motions + 1]
+    return configurations
 
 
-def _kept_at(world: World, places: Matrix) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
+def _proven_levels(world: World, places: Matrix) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
     """The largest level that each configuration, shape (m, dof), is proven to keep, -1 for none; the nearest pair."""
-    kept = np.full(len(places), -1)
-    refused = np.full(len(places), len(LEVELS))
+    proven_levels = np.full(len(places), -1)
+    refused_levels = np.full(len(places), len(LEVELS))
     pairs = [("", "")] * len(places)
 
-    while (open_ := np.flatnonzero(refused - kept > 1)).size:
-        tried = (kept[open_] + refused[open_]) // 2
-        for level in np.unique(tried).tolist():
-            group = open_[tried == level]
+    while (undecided := np.flatnonzero(refused_levels - proven_levels > 1)).size:
+        tried_levels = (proven_levels[undecided] + refused_levels[undecided]) // 2
+        for level in np.unique(tried_levels).tolist():
+            group = undecided[tried_levels == level]
             gaps = world.prover.still_gaps(places[group], clearance=float(LEVELS[level]))
-            far = np.ones(len(group), dtype=bool)
+            is_proven = np.ones(len(group), dtype=bool)
             for gap in gaps:
-                far[gap.motion] = False
+                is_proven[gap.motion] = False
                 pairs[group[gap.motion]] = (gap.first, gap.second)
-            kept[group[far]] = level
-            refused[group[~far]] = level
+            proven_levels[group[is_proven]] = level
+            refused_levels[group[~is_proven]] = level
 
-    return kept, tuple(pairs)
+    return proven_levels, tuple(pairs)

@@ -51,11 +51,15 @@ class CoalProof:
         self._robot = robot
         self._bodies = bodies
         self.packed = packed
-        own = [body.kind != "obstacle" for body in bodies]
-        meshes = np.array([mine and is_mesh(body.geometry) for mine, body in zip(own, bodies, strict=True)], dtype=bool)
-        hollow = np.array([mesh and not is_closed(bodies[k].geometry) for k, mesh in enumerate(meshes)], dtype=bool)
-        mixed = meshes[packed.bodies].any(axis=1) & ~hollow[packed.bodies].any(axis=1)
-        self.links: Mask = mixed & ~packed.beside_obstacle & ~_groups(packed)
+        is_of_arm = [body.kind != "obstacle" for body in bodies]
+        is_mesh_of_arm = np.array(
+            [of_arm and is_mesh(body.geometry) for of_arm, body in zip(is_of_arm, bodies, strict=True)], dtype=bool
+        )
+        is_open_mesh = np.array(
+            [mesh and not is_closed(bodies[k].geometry) for k, mesh in enumerate(is_mesh_of_arm)], dtype=bool
+        )
+        has_closed_mesh = is_mesh_of_arm[packed.bodies].any(axis=1) & ~is_open_mesh[packed.bodies].any(axis=1)
+        self.links: Mask = has_closed_mesh & ~packed.beside_obstacle & ~_groups(packed)
 
     def settle(self, motion: Matrix, pair: Numbers, place: Vector, again: Callable[[], object]) -> NDArray[np.int64]:
         """Compare links by coal until nothing is left open of a motion, shape (2, dof), or what it cannot settle.
@@ -71,62 +75,72 @@ class CoalProof:
         """
         margins = self.packed.table[layout.MARGINS]
         bodies = self.packed.bodies
-        sides = self.packed.sides
+        solids = self.packed.sides
 
-        kept = margins.copy()
-        told = list[list[int]]()
+        original_margins = margins.copy()
+        intervals_of_links = list[list[int]]()
         try:
             while pair[0] >= 0 and self.links[pair[0]]:
                 intervals = self._intervals(motion, int(pair[0]), float(place[0]))
                 if not intervals:
                     break
-                told += [[*sides[pair[0], ::2].tolist(), *interval] for interval in intervals]
+                intervals_of_links += [[*solids[pair[0], ::2].tolist(), *interval] for interval in intervals]
                 margins[self.links & (bodies == bodies[pair[0]]).all(axis=1)] = -FAR
                 again()
         finally:
-            margins[:] = kept
+            margins[:] = original_margins
 
-        return np.array(told, dtype=np.int64).reshape(-1, 4)
+        return np.array(intervals_of_links, dtype=np.int64).reshape(-1, 4)
 
     def logged(self, motion: Matrix, pair: Numbers, place: Vector, run: Callable[[], object]) -> Told:
         """What kernels tell while they prove a motion, and :meth:`settle` of it; arguments as there."""
-        told = [logged(self.packed, run)]
-        measured = self.settle(motion, pair, place, lambda: told.append(logged(self.packed, run)))
-        return told[-1], measured
+        logs = [logged(self.packed, run)]
+        intervals_of_links = self.settle(motion, pair, place, lambda: logs.append(logged(self.packed, run)))
+        return logs[-1], intervals_of_links
 
     def _intervals(self, motion: Matrix, row: int, place: float) -> list[tuple[int, int]]:
-        """Level and number of intervals that cover a motion, on each of which the bodies of a pair are apart.
+        """Intervals that cover a motion, on each of which the bodies of a pair are apart, found by bisection.
 
-        None of them if they are not apart in all of it. Where kernels gave up is looked at first.
+        Args:
+            motion: Its ends, shape (2, dof).
+            row: Of the pair in the table.
+            place: The share of the motion where kernels gave up, which is looked at first.
+
+        Returns:
+            Level and number of each interval; no interval if the two are not shown apart in all of the motion.
         """
         pair = [self._bodies[k] for k in self.packed.bodies[row].tolist()]
-        kept = float(self.packed.table[layout.MARGINS][row]) + DISTANCE_TOLERANCE
-        way = SPARE * float(approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0]))
-        if kept <= 0.0 or Containment((*pair,), ((0, 1),)).holds((0, 1), self._robot.chain.joint_frames(motion[:1])[0]):
+        required_gap = float(self.packed.table[layout.MARGINS][row]) + DISTANCE_TOLERANCE
+        approach = SPARE * float(approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0]))
+        if required_gap <= 0.0:  # they may overlap, and coal measures surfaces alone
+            return []
+        if Containment((*pair,), ((0, 1),)).holds((0, 1), self._robot.chain.joint_frames(motion[:1])[0]):
             return []
 
-        def room(share: float) -> float:
-            return _gap(self._robot, pair, motion[0] + share * (motion[1] - motion[0])) - kept
+        def spare_at(share: float) -> float:
+            """How much more than they must the two are apart at a share of the motion [m]."""
+            return _gap(self._robot, pair, motion[0] + share * (motion[1] - motion[0])) - required_gap
 
-        if room(place) <= 0.0:
+        if spare_at(place) <= 0.0:
             return []
 
-        told = list[tuple[int, int]]()
-        open_ = [(0, 0)]
-        looks = 0
-        while open_ and looks < MOST:
-            level, number = open_.pop()
-            looks += 1
+        intervals = list[tuple[int, int]]()
+        undecided = [(0, 0)]
+        measured_count = 0
+        while undecided and measured_count < MOST:
+            level, number = undecided.pop()
+            measured_count += 1
             width = 0.5**level
-            spare = room((number + 0.5) * width)
-            if spare <= 0.0 or (spare <= 0.5 * way * width and level == DEEPEST):
+            spare = spare_at((number + 0.5) * width)
+            apart_on_interval = spare > 0.5 * approach * width
+            if spare <= 0.0 or (not apart_on_interval and level == DEEPEST):
                 return []
-            if spare > 0.5 * way * width:
-                told.append((level, number))
+            if apart_on_interval:
+                intervals.append((level, number))
             else:
-                open_ += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
+                undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
 
-        return [] if open_ else told
+        return [] if undecided else intervals
 
 
 def distance_between(robot: Robot, bodies: Sequence[Body], names: tuple[str, str], q: Vector) -> float:

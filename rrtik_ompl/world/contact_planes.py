@@ -24,16 +24,16 @@ from rrtik_ompl.model.robot import Robot
 def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, ends: Matrix) -> None:
     """Let the kernels try the planes of contacts first, where a motion begins or ends, shape (2, dof)."""
     frames = robot.chain.joint_frames(ends)
-    ways = packed.table[layout.WAYS].reshape(-1, 3)
+    normals_of_rows = packed.table[layout.WAYS].reshape(-1, 3)
     bases = packed.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_BASE]
-    known: dict[tuple[int, int], tuple[int, Vector]] = {}
+    normal_of_solids: dict[tuple[int, int], tuple[int, Vector]] = {}
 
     for row in packed.touching:
-        one, other = packed.sides[row, ::2].tolist()
-        if (one, other) not in known:
-            known[one, other] = _normal((bodies[other], bodies[one]), frames)
-        end, normal = known[one, other]
-        ways[row] = frames[end, bases[row], :3, :3].T @ normal
+        first, second = packed.sides[row, ::2].tolist()
+        if (first, second) not in normal_of_solids:
+            normal_of_solids[first, second] = _normal((bodies[second], bodies[first]), frames)
+        end, normal = normal_of_solids[first, second]
+        normals_of_rows[row] = frames[end, bases[row], :3, :3].T @ normal
 
 
 def _normal(pair: tuple[Body, Body], frames: Matrix) -> tuple[int, Vector]:
@@ -41,19 +41,19 @@ def _normal(pair: tuple[Body, Body], frames: Matrix) -> tuple[int, Vector]:
     if any(isinstance(body.geometry, CloudSolid) for body in pair):
         return 0, np.zeros(3)  # kernels look for their own
 
-    nearest = np.inf
-    where = 0
+    least_distance = np.inf
+    nearest_end = 0
     normal = np.zeros(3)
 
     for end in range(len(frames)):
         poses = (pin.SE3(frames[end, body.joint]) * body.placement for body in pair)
         first, second = (coal.Transform3s(pose.rotation, pose.translation) for pose in poses)
-        ends = around(pair[0].geometry), first, around(pair[1].geometry), second
+        solids = around(pair[0].geometry), first, around(pair[1].geometry), second
 
         result = coal.DistanceResult()
-        if coal.distance(*ends, coal.DistanceRequest(), result) < nearest:
-            nearest = result.min_distance
-            where = end
+        if coal.distance(*solids, coal.DistanceRequest(), result) < least_distance:
+            least_distance = result.min_distance
+            nearest_end = end
             normal = np.array(result.normal)
 
-    return where, normal
+    return nearest_end, normal

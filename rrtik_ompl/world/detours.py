@@ -44,22 +44,22 @@ def with_detours(
     Returns:
         A route of proven motions with the same ends, shape (m, dof); the given one if it is proven.
     """
-    known = world.prover.route(rows, clearance=clearance) if proof is None else proof
-    open_ = [gap.motion for gap in known.unproven]
+    given_proof = world.prover.route(rows, clearance=clearance) if proof is None else proof
+    unproven = [gap.motion for gap in given_proof.unproven]
 
     for _ in range(MOST_REPAIRS):
-        if not open_:
+        if not unproven:
             return rows
         if one_joint:
-            found = _sidestepped(world, rows, open_[0], clearance)
+            repair = _sidestepped(world, rows, unproven[0], clearance)
         else:
-            found = _repaired(world, rows, open_[0], clearance, rng)
-        if found is None:
+            repair = _repaired(world, rows, unproven[0], clearance, rng)
+        if repair is None:
             return None
 
-        grown = len(found.rows) - len(rows)
-        rows = found.rows
-        open_ = [motion + grown for motion in open_ if motion >= found.last]
+        added = len(repair.rows) - len(rows)
+        rows = repair.rows
+        unproven = [motion + added for motion in unproven if motion >= repair.last]
     return None
 
 
@@ -75,9 +75,9 @@ def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np
     for more in range(WIDER):
         first = max(motion - more, 0)
         last = min(motion + 1 + more, len(rows) - 1)
-        via = _via(world, rows[first : last + 1], clearance, rng)
-        if via is not None:
-            return Repair(np.vstack([rows[: first + 1], via, rows[last:]]), last)
+        waypoints = _waypoints_around(world, rows[first : last + 1], clearance, rng)
+        if waypoints is not None:
+            return Repair(np.vstack([rows[: first + 1], waypoints, rows[last:]]), last)
     return None
 
 
@@ -88,21 +88,21 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
     others = np.flatnonzero(a == b)
 
     sizes = np.array([sign * size for size in SIDESTEPS for sign in (1.0, -1.0)])
-    tried = np.zeros((len(sizes), len(others), len(a)))
-    tried[:, np.arange(len(others)), others] = sizes[:, None]
-    steps: Matrix = tried.reshape(-1, len(a))
+    offsets = np.zeros((len(sizes), len(others), len(a)))
+    offsets[:, np.arange(len(others)), others] = sizes[:, None]
+    sidesteps: Matrix = offsets.reshape(-1, len(a))
 
     proven = partial(world.prover.proven, clearance=clearance)
-    steps = steps[proven(a + steps, b + steps)]  # beside the move
-    steps = steps[proven(a + 0.0 * steps, a + steps)]  # out of its way
-    steps = steps[proven(b + steps, b + 0.0 * steps)]  # and back to it
+    sidesteps = sidesteps[proven(a + sidesteps, b + sidesteps)]  # beside the move
+    sidesteps = sidesteps[proven(a + 0.0 * sidesteps, a + sidesteps)]  # out of its way
+    sidesteps = sidesteps[proven(b + sidesteps, b + 0.0 * sidesteps)]  # and back to it
 
-    if len(steps) == 0:
+    if len(sidesteps) == 0:
         return None
-    return Repair(np.vstack([rows[: motion + 1], a + steps[0], b + steps[0], rows[motion + 1 :]]), motion + 1)
+    return Repair(np.vstack([rows[: motion + 1], a + sidesteps[0], b + sidesteps[0], rows[motion + 1 :]]), motion + 1)
 
 
-def _via(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
+def _waypoints_around(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
     """What to pass between the ends of a stretch, shape (0 or 1, dof), on proven motions; None if nothing is found."""
     a = stretch[0]
     b = stretch[-1]
@@ -112,7 +112,7 @@ def _via(world: World, stretch: Matrix, clearance: float, rng: np.random.Generat
 
     length = length_of(stretch)
     for size in SIZES:
-        points = _near(world, stretch, size * length, rng)
+        points = _points_near(world, stretch, size * length, rng)
         points = points[proven(points, points)]
         points = points[proven(a + 0.0 * points, points)]
         points = points[proven(points, b + 0.0 * points)]
@@ -123,12 +123,12 @@ def _via(world: World, stretch: Matrix, clearance: float, rng: np.random.Generat
     return None
 
 
-def _near(world: World, stretch: Matrix, size: float, rng: np.random.Generator) -> Matrix:
+def _points_near(world: World, stretch: Matrix, size: float, rng: np.random.Generator) -> Matrix:
     """Random points within the limits, about ``size`` from places spread over a stretch, shape (POINTS, dof)."""
     places = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(stretch, axis=0), axis=1)))
-    wanted = places[-1] * rng.uniform(0.0, 1.0, POINTS)
-    on = np.stack([np.interp(wanted, places, column) for column in stretch.T], axis=1)
-    ways = rng.normal(size=on.shape)
-    ways *= size / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-300)
-    near: Matrix = np.clip(on + ways, world.robot.lower, world.robot.upper)
-    return near
+    lengths_along = places[-1] * rng.uniform(0.0, 1.0, POINTS)
+    points_on = np.stack([np.interp(lengths_along, places, column) for column in stretch.T], axis=1)
+    offsets = rng.normal(size=points_on.shape)
+    offsets *= size / np.maximum(np.linalg.norm(offsets, axis=1, keepdims=True), 1e-300)
+    points: Matrix = np.clip(points_on + offsets, world.robot.lower, world.robot.upper)
+    return points

@@ -40,14 +40,14 @@ class ExactChecker:
 
     Attributes:
         solids: The bodies, and which of them must not touch.
-        room: What is kept from obstacles on top of their margins [m].
-        bodies: Those of ``solids``, obstacles with that room.
+        clearance: What is kept from obstacles on top of their margins [m].
+        bodies: Those of ``solids``, with the clearance in the margins of obstacles.
         tables: The checked pairs for the kernels; for one thread at a time.
         motions: Tables of motions that :func:`rrtik_ompl.kernels.search.motions.motion_table.motions_of` keeps.
     """
 
     solids: Arrangement
-    room: float
+    clearance: float
     bodies: Items[Body]
     tables: TakenTables
     motions: dict[tuple[bool, float], FastMotions] = field(default_factory=dict)
@@ -55,11 +55,11 @@ class ExactChecker:
 
     @classmethod
     @collector_waits
-    def of(cls, solids: Arrangement, room: float) -> ExactChecker:
-        """Checks of an arrangement, with some room [m] around obstacles."""
-        bodies = solids.with_room(room)
+    def of(cls, solids: Arrangement, clearance: float) -> ExactChecker:
+        """Checks of an arrangement that keep a clearance [m] from obstacles on top of their margins."""
+        bodies = solids.with_room(clearance)
         packed = arm_cache(solids.robot).pack(bodies.whole, solids.checked, solids.covers())
-        return cls(solids, room, bodies, TakenTables(packed), _data=working_memory(solids.robot.model))
+        return cls(solids, clearance, bodies, TakenTables(packed), _data=working_memory(solids.robot.model))
 
     @property
     def fast(self) -> FastWorld:
@@ -81,7 +81,7 @@ class ExactChecker:
             numbers: Of those that stand elsewhere.
         """
         bodies = solids.bodies
-        if self.room != 0.0:
+        if self.clearance != 0.0:
             bodies = self.bodies
             for number in numbers:
                 bodies = bodies.with_(number, replace(bodies[number], placement=solids.bodies[number].placement))
@@ -122,8 +122,10 @@ class ExactChecker:
             undecided = rows[answers == UNDECIDED]
             doubtful = self.fast.undecided_pairs(self._robot.chain.joint_values(undecided))
             configurations = pinocchio_rows(self._robot, undecided)
-            apart = [self._gaps(full, pairs) is not None for full, pairs in zip(configurations, doubtful, strict=True)]
-            free[answers == UNDECIDED] = apart
+            free[answers == UNDECIDED] = [
+                self._gaps(configuration, pairs) is not None
+                for configuration, pairs in zip(configurations, doubtful, strict=True)
+            ]
 
         if self.solids.in_contact:
             free[free] = self._contacts.proven(rows[free], rows[free])
@@ -179,34 +181,34 @@ class ExactChecker:
 
         doubtful = self.fast.undecided_pairs(self._robot.chain.joint_values(rows))
         travel = np.abs(end - start)
-        cleared: dict[tuple[int, int], Mask] = {}
+        places_apart: dict[tuple[int, int], Mask] = {}
         configurations = pinocchio_rows(self._robot, rows)
 
-        for place, full, pairs in zip(order.astype(int).tolist(), configurations, doubtful, strict=True):
-            left = [pair for pair in pairs if pair not in cleared or not cleared[pair][place]]
-            gaps = self._gaps(full, left) if left else []
+        for step, configuration, pairs in zip(order.astype(int).tolist(), configurations, doubtful, strict=True):
+            open_pairs = [pair for pair in pairs if pair not in places_apart or not places_apart[pair][step]]
+            gaps = self._gaps(configuration, open_pairs) if open_pairs else []
             if gaps is None:
                 return False
 
-            for pair, gap in zip(left, gaps, strict=True):
+            for pair, gap in zip(open_pairs, gaps, strict=True):
                 approach = float(self.solids.approaches()[pair] @ travel)  # [m] along the whole motion
-                certain = max(gap - DISTANCE_TOLERANCE, 0.0)
-                reach = int(min(steps * certain / approach, steps)) if approach > 0.0 else steps
-                mask = cleared.setdefault(pair, np.zeros(steps + 1, dtype=bool))
-                mask[max(place - reach, 0) : place + reach + 1] = True
+                certain_gap = max(gap - DISTANCE_TOLERANCE, 0.0)
+                steps_apart = int(min(steps * certain_gap / approach, steps)) if approach > 0.0 else steps
+                apart = places_apart.setdefault(pair, np.zeros(steps + 1, dtype=bool))
+                apart[max(step - steps_apart, 0) : step + steps_apart + 1] = True
 
         return True
 
-    def _gaps(self, full: Vector, pairs: list[tuple[int, int]]) -> list[float] | None:
+    def _gaps(self, configuration: Vector, pairs: list[tuple[int, int]]) -> list[float] | None:
         """Lower bounds of how far pairs of bodies are from touching [m], or None if two of them touch, by coal.
 
         Bodies touch that do not keep their margin.
 
         Args:
-            full: Pinocchio's configuration vector.
+            configuration: Pinocchio's configuration vector.
             pairs: Numbers of the bodies.
         """
-        pin.forwardKinematics(self._robot.model, self._data, full)
+        pin.forwardKinematics(self._robot.model, self._data, configuration)
         transforms: dict[int, Any] = {}
         gaps = []
         for i, j in pairs:
@@ -262,8 +264,9 @@ def distance(
 def one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:
     """Motions turned so that both directions of one are the same to the bit: the lexically smaller end first."""
     first_difference = (starts != ends).argmax(axis=1)[:, None]
-    turned = np.take_along_axis(starts, first_difference, axis=1) > np.take_along_axis(ends, first_difference, axis=1)
-    return np.where(turned, ends, starts), np.where(turned, starts, ends)
+    first_of_starts = np.take_along_axis(starts, first_difference, axis=1)
+    is_turned = first_of_starts > np.take_along_axis(ends, first_difference, axis=1)
+    return np.where(is_turned, ends, starts), np.where(is_turned, starts, ends)
 
 
 def spread_order(count: int) -> NDArray[np.float64]:

@@ -49,27 +49,27 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
 
 def rooms_between(world: World, ends: NDArray[np.float64], clearance: float | None) -> list[Room | None]:
     """:func:`room_between` for several pairs of configurations, shape (m, 2, dof), in a few calls."""
-    found: list[Room | None] = [None] * len(ends)
-    open_ = np.arange(len(ends))
+    rooms: list[Room | None] = [None] * len(ends)
+    undecided = np.arange(len(ends))
     for room in _rooms(world, clearance):
-        if len(open_) == 0:
+        if len(undecided) == 0:
             break
-        rows = ends[open_].reshape(-1, ends.shape[2])
-        kept = world.prover.proven(rows, rows, clearance=room.searched).reshape(-1, 2).all(axis=1)
-        for k in open_[kept].tolist():
-            found[k] = room
-        open_ = open_[~kept]
+        rows = ends[undecided].reshape(-1, ends.shape[2])
+        proven = world.prover.proven(rows, rows, clearance=room.searched).reshape(-1, 2).all(axis=1)
+        for k in undecided[proven].tolist():
+            rooms[k] = room
+        undecided = undecided[~proven]
 
-    return found
+    return rooms
 
 
 def _rooms(world: World, clearance: float | None) -> Iterator[Room]:
     """What may be kept, the most first."""
-    least = world.settings.kept
-    wanted = max(CLEARANCE if clearance is None else clearance, least)
-    halves = (wanted * 0.5**k for k in range(HALVINGS))
-    less = (half for half in halves if half > least)
-    for searched in chain((wanted + min(wanted, SPARE),), less, (least,)):
+    least_clearance = world.settings.kept
+    wanted = max(CLEARANCE if clearance is None else clearance, least_clearance)
+    halved = (wanted * 0.5**k for k in range(HALVINGS))
+    smaller = (half for half in halved if half > least_clearance)
+    for searched in chain((wanted + min(wanted, SPARE),), smaller, (least_clearance,)):
         yield Room(min(wanted, searched), searched)
 
 
@@ -89,11 +89,11 @@ def keeping(world: World, clearance: float, *, proven: float | None = None) -> W
         clearance: That motions keep in steps at least [m].
         proven: That they are proven to keep at least [m]; None if nothing needs be proven that the world does not ask.
     """
-    own = world.settings
-    inflation = max(clearance - own.clearance, own.inflation)
+    settings = world.settings
+    inflation = max(clearance - settings.clearance, settings.inflation)
     if proven is None:
         return form_of(world, inflation=inflation)
-    return form_of(world, inflation=inflation, proving=max(proven, own.proving or 0.0))
+    return form_of(world, inflation=inflation, proving=max(proven, settings.proving or 0.0))
 
 
 def leaving_room(world: World, room: Room) -> World:
@@ -102,9 +102,11 @@ def leaving_room(world: World, room: Room) -> World:
     No point of the arm moves between two of them farther than twice what is kept beyond ``room.kept``, so that what is
     thin is not stepped over: in between, too, obstacles are that far away [16].
     """
-    wider = keeping(world, room.searched)
+    with_clearance = keeping(world, room.searched)
     step = 2.0 * (room.searched - room.kept)
-    return form_of(wider, motion_resolution=step) if FINEST_RESOLUTION <= step < world.motion_resolution else wider
+    if FINEST_RESOLUTION <= step < world.motion_resolution:
+        return form_of(with_clearance, motion_resolution=step)
+    return with_clearance
 
 
 def check_clearance(world: World, clearance: float | None, ends: dict[str, Matrix]) -> None:
@@ -125,9 +127,11 @@ def check_clearance(world: World, clearance: float | None, ends: dict[str, Matri
     for what, q in ends.items():
         gap = next(iter(world.prover.route(q[None], clearance=wanted).unproven), None)
         if gap is not None and world.prover.proven(q[None], q[None], clearance=world.settings.kept)[0]:
-            most = 1e3 * _most(world, q, wanted)
+            largest = 1e3 * _largest_clearance(world, q, wanted)
             pair = f"'{gap.first}' and '{gap.second}'"
-            raise InputError(f"clearance: {what} cannot keep {1e3 * wanted:g} mm: {pair}; at most {most:.3f} mm here")
+            raise InputError(
+                f"clearance: {what} cannot keep {1e3 * wanted:g} mm: {pair}; at most {largest:.3f} mm here"
+            )
 
 
 def check_route_clearance(world: World, clearance: float | None, rows: Matrix) -> None:
@@ -144,34 +148,37 @@ def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> 
         clearance: Wanted [m]; None for a millimetre, or less if the ends have less, but not less than the world keeps.
     """
     room = room_between(world, rows[[0, -1]], clearance)
-    for kept in sorted({room.kept, world.settings.kept}, reverse=True) if room is not None else ():
-        if world.prover.route(rows, clearance=kept).proven:
-            yield kept
+    if room is None:
+        return
+    for candidate in sorted({room.kept, world.settings.kept}, reverse=True):
+        if world.prover.route(rows, clearance=candidate).proven:
+            yield candidate
 
 
 def proved(path: JointPath, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
     """As :meth:`rrtik_ompl.JointPath.proved`, of a path of the world's robot."""
-    kept = world.settings.kept if clearance is None else clearance
-    return path.with_proof(world.prover.route(path.waypoints, clearance=kept, seconds=seconds))
+    required_clearance = world.settings.kept if clearance is None else clearance
+    return path.with_proof(world.prover.route(path.waypoints, clearance=required_clearance, seconds=seconds))
 
 
 def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:
     """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
-    found = proved(path, world, clearance=clearance)
-    least = world.settings.kept
-    for kept in sorted({max(min(clearance, CLEARANCE), least), least} - {clearance}, reverse=True):
-        if found.proven:
+    proved_path = proved(path, world, clearance=clearance)
+    least_clearance = world.settings.kept
+    fallbacks = {max(min(clearance, CLEARANCE), least_clearance), least_clearance} - {clearance}
+    for smaller_clearance in sorted(fallbacks, reverse=True):
+        if proved_path.proven:
             break
-        found = proved(path, world, clearance=kept)
-    return found
+        proved_path = proved(path, world, clearance=smaller_clearance)
+    return proved_path
 
 
-def _most(world: World, q: Matrix, refused: float) -> float:
+def _largest_clearance(world: World, q: Matrix, refused: float) -> float:
     """The largest clearance that a configuration keeps [m], below one that it does not."""
     low = 0.0
     high = refused
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        kept = world.prover.proven(q[None], q[None], clearance=middle).all()
-        low, high = (middle, high) if kept else (low, middle)
+        proven = world.prover.proven(q[None], q[None], clearance=middle).all()
+        low, high = (middle, high) if proven else (low, middle)
     return low

@@ -68,32 +68,32 @@ class MovingWorld:
             raise InputError("world of a moving world: it has path constraints, which are not kept there; use .unheld")
 
         self._proving = world.settings.proving
-        self._room = world.settings.clearance
+        self._clearance = world.settings.clearance
         self.robot: Robot = world.robot
         self.weights = world.weights
         self.motion_resolution = world.motion_resolution
         self.scene = world.scene
         self.checked = 0
 
-        names = {o.name for o in self.scene.obstacles} if moving is None else set(moving)
-        roomy = [self._roomy(body, body.margin) for body in world.bodies]
-        self._bodies, pairs, self._copy = _with_copies(roomy, world.pairs, names, copies)
-        self._known = {o.name: o for o in self.scene.obstacles}
-        kept = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
+        names_that_move = {o.name for o in self.scene.obstacles} if moving is None else set(moving)
+        bodies = [self._with_clearance(body, body.margin) for body in world.bodies]
+        self._bodies, pairs, self._copy_of_body = _with_copies(bodies, world.pairs, names_that_move, copies)
+        self._first_obstacles = {o.name: o for o in self.scene.obstacles}
+        checked_pairs = tuple(p for p in pairs if any(self._bodies[i].joint > 0 for i in p))
         if not self_collision:
-            kept = tuple(p for p in kept if any(self._bodies[i].kind == "obstacle" for i in p))
+            checked_pairs = tuple(p for p in checked_pairs if any(self._bodies[i].kind == "obstacle" for i in p))
 
-        arm = arm_cache(self.robot)
-        self._fast = arm.pack(self._bodies, kept, arm.covers_of(self._bodies), share=self_collision)
+        cache = arm_cache(self.robot)
+        self._fast = cache.pack(self._bodies, checked_pairs, cache.covers_of(self._bodies), share=self_collision)
         self._motions: dict[tuple[bool, float], FastMotions] = {}
         self._inflation = [0.0] * len(self._bodies)
 
-        self._fixed = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
+        self._pairs_at_rest = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
 
-        first = tuple(roomy)  # copies, which come behind them, are not there yet
-        own = tuple(p for p in kept if max(p) < len(first))
-        self._prover = MovingProver(self.robot, first, own, always_colliding=bool(self.blocked))
+        first_bodies = tuple(bodies)  # copies, which come behind them, are not there yet
+        pairs_of_first = tuple(p for p in checked_pairs if max(p) < len(first_bodies))
+        self._prover = MovingProver(self.robot, first_bodies, pairs_of_first, always_colliding=bool(self.blocked))
 
     @property
     def fast(self) -> FastWorld | None:
@@ -124,25 +124,26 @@ class MovingWorld:
             UnknownNameError: If an inflation is given for what is no obstacle.
         """
         for scene in scenes:
-            _check_obstacles(scene, self._known)
+            _check_obstacles(scene, self._first_obstacles)
             check_held(scene, self.scene)
             if pairs_that_may_touch(scene) != pairs_that_may_touch(self.scene):
                 raise InputError("scene: other pairs may touch than before; make a new world")
         for name, metres in (inflation or {}).items():
-            if name not in self._known:
-                raise UnknownNameError("obstacle", name, self._known, where="inflation")
+            if name not in self._first_obstacles:
+                raise UnknownNameError("obstacle", name, self._first_obstacles, where="inflation")
             not_negative(metres, f"inflation: that of '{name}'")
 
-        places = [{o.name: o for o in scene.obstacles} for scene in scenes]
+        obstacles_of_copies = [{o.name: o for o in scene.obstacles} for scene in scenes]
         for k, body in enumerate(self._bodies):
             if body.kind != "obstacle":
                 continue
-            now = places[min(self._copy[k], len(places) - 1)][body.name]
-            solid = cloud_solid(now.shape) if isinstance(now.shape, PointCloud) else body.geometry
-            place = now.pose * body.within
-            stays = solid is body.geometry and np.array_equal(place.homogeneous, body.placement.homogeneous)
-            if not stays or now.margin + self._room != body.margin:
-                self._bodies[k] = self._roomy(replace(body, placement=place, geometry=solid), now.margin)
+            obstacle = obstacles_of_copies[min(self._copy_of_body[k], len(obstacles_of_copies) - 1)][body.name]
+            geometry = cloud_solid(obstacle.shape) if isinstance(obstacle.shape, PointCloud) else body.geometry
+            placement = obstacle.pose * body.within
+            unchanged = geometry is body.geometry and np.array_equal(placement.homogeneous, body.placement.homogeneous)
+            if not unchanged or obstacle.margin + self._clearance != body.margin:
+                moved = replace(body, placement=placement, geometry=geometry)
+                self._bodies[k] = self._with_clearance(moved, obstacle.margin)
             if inflation is not None and body.name in inflation:
                 self._inflation[k] = float(inflation[body.name])
 
@@ -177,7 +178,7 @@ class MovingWorld:
         free: Mask = self._fast.classify_edges(*sides, steps, resolve=False) == FREE
         free &= inside_limits(self.robot, A) & inside_limits(self.robot, B) & (not self.blocked)
         if self._proving is not None:  # beyond the clearance, which the margins of the bodies hold already
-            free[free] = self._prover.proven(A[free], B[free], clearance=self._proving - self._room)
+            free[free] = self._prover.proven(A[free], B[free], clearance=self._proving - self._clearance)
         return free
 
     def motions_proven(
@@ -190,32 +191,34 @@ class MovingWorld:
         """
         if inflation is None:
             return self._prover.proven(A, B, clearance=-less)
-        room = [inflation.get(b.name, own) for b, own in zip(self._bodies, self._inflation, strict=True)]
+        inflations = [inflation.get(b.name, usual) for b, usual in zip(self._bodies, self._inflation, strict=True)]
         blocked = bool(self.blocked)
-        self._prover.place(self._bodies, room, always_colliding=blocked)
+        self._prover.place(self._bodies, inflations, always_colliding=blocked)
         proven = self._prover.proven(A, B, clearance=-less)
         self._prover.place(self._bodies, self._inflation, always_colliding=blocked)
         return proven
 
-    def _roomy(self, body: Body, margin: float) -> Body:
+    def _with_clearance(self, body: Body, margin: float) -> Body:
         """A body that has a margin [m]; an obstacle with the clearance of the world on top of it."""
-        kept = margin + self._room
-        return body if body.kind != "obstacle" or kept == body.margin else replace(body, margin=kept)
+        total_margin = margin + self._clearance
+        if body.kind != "obstacle" or total_margin == body.margin:
+            return body
+        return replace(body, margin=total_margin)
 
     def base_apart(self, ways: Mapping[str, float]) -> bool:
         """Whether obstacles are apart from what never moves, and stay so even if they go as far as is said [m]."""
-        for pair in self._fixed:
-            part, solid = sorted((self._bodies[k] for k in pair), key=lambda body: body.kind == "obstacle")
-            way = ways.get(solid.name, 0.0)
-            if way > 0.0 and not far_apart(part, solid, way):
-                places = part.placement.homogeneous, solid.placement.homogeneous
-                if distance(part.geometry, places[0], solid.geometry, places[1], way) is None:
+        for pair in self._pairs_at_rest:
+            base_part, obstacle = sorted((self._bodies[k] for k in pair), key=lambda body: body.kind == "obstacle")
+            travel = ways.get(obstacle.name, 0.0)
+            if travel > 0.0 and not far_apart(base_part, obstacle, travel):
+                places = base_part.placement.homogeneous, obstacle.placement.homogeneous
+                if distance(base_part.geometry, places[0], obstacle.geometry, places[1], travel) is None:
                     return False
         return not self.blocked
 
     def _contact_of_base(self) -> str:
         """See ``blocked``; predicted places do not count, for nothing can be done about them."""
-        found = fixed_contact(self.robot, tuple(self._bodies), self._fixed)
+        found = fixed_contact(self.robot, tuple(self._bodies), self._pairs_at_rest)
         return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
 
 
@@ -223,27 +226,27 @@ class MovingProver(Prover):
     """Proofs among obstacles that are moved, from where they are now: their table is packed once, and written to."""
 
     _fixed = False
-    _room: Sequence[float] | None = None
+    _new_inflations: Sequence[float] | None = None
     _moved: MovedObstacles | None = None
 
-    def place(self, bodies: Sequence[Body], room: Sequence[float], *, always_colliding: bool) -> None:
+    def place(self, bodies: Sequence[Body], inflations: Sequence[float], *, always_colliding: bool) -> None:
         """Put obstacles where they are now; it costs nothing until something is to be proven.
 
         Args:
             bodies: As at the beginning, obstacles with other placements and margins.
-            room: For each body what is to be kept from it beside its margin [m]; read for obstacles.
+            inflations: For each body what is to be kept from it beside its margin [m]; read for obstacles.
             always_colliding: Whether an obstacle touches what never moves: then nothing is proven.
         """
         self.bodies = tuple(bodies)
-        self._room = room
+        self._new_inflations = inflations
         self.always_colliding = always_colliding
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
         if self._moved is None:
             self._moved = MovedObstacles(super()._packed_for(clearance, slack), self.bodies)
-        if self._room is not None:
-            self._moved.put(self.bodies, self._room)
-            self._room = None
+        if self._new_inflations is not None:
+            self._moved.put(self.bodies, self._new_inflations)
+            self._new_inflations = None
         return super()._packed_for(clearance, slack)
 
 
@@ -252,9 +255,9 @@ def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
     if {o.name for o in scene.obstacles} != known.keys():
         raise InputError(f"scene: expected the obstacles {', '.join(sorted(known))}, got {scene}")
     for obstacle in scene.obstacles:
-        before = known[obstacle.name].shape
-        clouds = before.sensed and type(before) is type(obstacle.shape)
-        if not clouds and not same_shape(obstacle.shape, before):
+        known_shape = known[obstacle.name].shape
+        both_clouds = known_shape.sensed and type(known_shape) is type(obstacle.shape)
+        if not both_clouds and not same_shape(obstacle.shape, known_shape):
             raise InputError(f"scene: '{obstacle.name}' has another shape than before; make a new world")
 
 
@@ -264,15 +267,15 @@ def check_held(scene: Scene, before: Scene) -> None:
     Raises:
         InputError: It names what is held.
     """
-    now = {item.name: item for item in scene.attached}
-    held = {item.name: item for item in before.attached}
-    if now.keys() != held.keys():
-        given = ", ".join(sorted(now)) or "nothing"
-        wanted = ", ".join(sorted(held)) or "nothing"
+    held_now = {item.name: item for item in scene.attached}
+    held_before = {item.name: item for item in before.attached}
+    if held_now.keys() != held_before.keys():
+        given = ", ".join(sorted(held_now)) or "nothing"
+        wanted = ", ".join(sorted(held_before)) or "nothing"
         raise InputError(f"scene: the arm held {wanted}, and now {given}; give scenes with the same attached objects")
 
-    for name, item in now.items():
-        if not _held_alike(item, held[name]):
+    for name, item in held_now.items():
+        if not _held_alike(item, held_before[name]):
             raise InputError(
                 f"scene: '{name}' is held otherwise than before; give scenes with the same attached objects"
             )
@@ -280,24 +283,24 @@ def check_held(scene: Scene, before: Scene) -> None:
 
 def _held_alike(first: AttachedObject, second: AttachedObject) -> bool:
     """Whether the arm holds the same in the same way."""
-    joined = first.link == second.link and set(first.allow) == set(second.allow)
-    kept = first.padding == second.padding and first.margin == second.margin
-    placed = np.allclose(first.pose.homogeneous, second.pose.homogeneous, rtol=0.0, atol=SAME_PLACE)
-    return joined and kept and placed and same_shape(first.shape, second.shape)
+    same_link = first.link == second.link and set(first.allow) == set(second.allow)
+    same_margins = first.padding == second.padding and first.margin == second.margin
+    same_place = np.allclose(first.pose.homogeneous, second.pose.homogeneous, rtol=0.0, atol=SAME_PLACE)
+    return same_link and same_margins and same_place and same_shape(first.shape, second.shape)
 
 
 def _with_copies(
-    first: Sequence[Body], known: Pairs, names: set[str], copies: int
+    first_bodies: Sequence[Body], pairs_of_first: Pairs, names: set[str], copies: int
 ) -> tuple[list[Body], list[tuple[int, int]], dict[int, int]]:
     """Bodies and pairs of a world with further copies of some obstacles, and which copy each body is."""
-    bodies = list(first)
-    pairs = list(known)
-    number = dict.fromkeys(range(len(bodies)), 0)
+    bodies = list(first_bodies)
+    pairs = list(pairs_of_first)
+    copy_of_body = dict.fromkeys(range(len(bodies)), 0)
 
-    for k, body in enumerate(first):
+    for k, body in enumerate(first_bodies):
         if body.kind == "obstacle" and body.name in names:
             for copy in range(1, copies):
-                number[len(bodies)] = copy
-                pairs += [(i, len(bodies)) for pair in known if k in pair for i in pair if i != k]
+                copy_of_body[len(bodies)] = copy
+                pairs += [(i, len(bodies)) for pair in pairs_of_first if k in pair for i in pair if i != k]
                 bodies.append(body)
-    return bodies, pairs, number
+    return bodies, pairs, copy_of_body

@@ -27,13 +27,20 @@ def contacts_along(world: World, waypoints: Matrix) -> tuple[PathContact, ...]:
 
 def contacts_at(world: World, at: Vector, places: Matrix) -> tuple[PathContact, ...]:
     """The contacts at configurations, shape (m, dof), that stand at places, shape (m,), in their order."""
-    bad = np.flatnonzero(~world.valid_batch(places))
-    touching = {int(k): found for k in bad if (found := world.contacts(places[k]))}
-    names = {k: frozenset(name for c in found for name in (c.first, c.second)) for k, found in touching.items()}
+    blocked = np.flatnonzero(~world.valid_batch(places))
+    contacts_of_place = {int(k): found for k in blocked if (found := world.contacts(places[k]))}
+    names_of_place = {
+        k: frozenset(name for c in found for name in (c.first, c.second)) for k, found in contacts_of_place.items()
+    }
+
+    def stretch(item: tuple[int, int]) -> tuple[int, frozenset[str]]:
+        """What is the same for blocked places that follow each other and at which the same bodies touch."""
+        count, place = item
+        return place - count, names_of_place[place]
 
     stretches = []
-    for (_, together), run in groupby(enumerate(touching), lambda item: (item[1] - item[0], names[item[1]])):
+    for (_, together), run in groupby(enumerate(contacts_of_place), stretch):
         numbers = [k for _, k in run]
-        deepest = min((touching[k][0] for k in numbers), key=lambda contact: contact.clearance)
+        deepest = min((contacts_of_place[k][0] for k in numbers), key=lambda contact: contact.clearance)
         stretches.append(PathContact(float(at[numbers[0]]), float(at[numbers[-1]]), deepest, together))
     return tuple(stretches)

@@ -30,21 +30,21 @@ Fault: TypeAlias = tuple[int, float, str]  # the piece, where on it, and what is
 def judged_path(rows: Matrix, world: World) -> Judged:
     """The verdict on a path, waypoints of shape (k, dof); if it is a single one, on the posture."""
     course = course_along(world, rows)
-    found, faults = judged_course(world, course, partial(_faults_of_path, world, rows))
+    judged, faults = judged_course(world, course, partial(_faults_of_path, world, rows))
 
-    unproven = found.verdict.unproven
+    unproven = judged.verdict.unproven
     text = doubt = ""
     if len(rows) == 1:
         text = f"the posture is {'not ' if unproven else ''}proven free"
-        found = replace(found, curve=None)
+        judged = replace(judged, curve=None)
     elif unproven:
         doubt = f"{len(unproven)} move{'s' * (len(unproven) != 1)} not proven free"
     else:
         text = "every move is proven free"
 
     where = [f"move {k + 1}: {reason}" for k, _, reason in faults or ()]
-    said = Verdict(not unproven, text, unproven, doubt)
-    return replace(found, verdict=with_reason(said, world, where, checked=faults is not None))
+    verdict = Verdict(not unproven, text, unproven, doubt)
+    return replace(judged, verdict=with_reason(verdict, world, where, checked=faults is not None))
 
 
 def judged_course(
@@ -65,8 +65,8 @@ def judged_course(
     except InputError:
         faults = None
 
-    looked = course if curve is None else curve
-    at = np.append(looked.motions + looked.shares, [piece + share for piece, share, _ in faults or ()])
+    places = course if curve is None else curve
+    at = np.append(places.motions + places.shares, [piece + share for piece, share, _ in faults or ()])
     at = _with_ends(world, course, np.unique(at))
     return Judged(verdict, curve, contacts_at(world, at, _configurations(course, at))), faults
 
@@ -74,18 +74,18 @@ def judged_course(
 def _with_ends(world: World, course: Course, at: Vector) -> Vector:
     """Places, shape (m,), and those at which what is not free begins or ends between them."""
     free = world.valid_batch(_configurations(course, at))
-    turns = np.flatnonzero(free[:-1] != free[1:])
+    changes = np.flatnonzero(free[:-1] != free[1:])
 
-    inside = np.where(free[turns], at[turns + 1], at[turns])
-    outside = np.where(free[turns], at[turns], at[turns + 1])
+    last_blocked = np.where(free[changes], at[changes + 1], at[changes])
+    last_free = np.where(free[changes], at[changes], at[changes + 1])
 
-    for _ in range(BISECTIONS if len(turns) else 0):
-        middle = 0.5 * (inside + outside)
-        ok = world.valid_batch(_configurations(course, middle))
-        inside = np.where(ok, inside, middle)
-        outside = np.where(ok, middle, outside)
+    for _ in range(BISECTIONS if len(changes) else 0):
+        middle = 0.5 * (last_blocked + last_free)
+        is_free = world.valid_batch(_configurations(course, middle))
+        last_blocked = np.where(is_free, last_blocked, middle)
+        last_free = np.where(is_free, middle, last_free)
 
-    return np.union1d(at, inside)
+    return np.union1d(at, last_blocked)
 
 
 def _configurations(course: Course, at: Vector) -> Matrix:
@@ -114,7 +114,7 @@ def _faults_of_path(world: World, rows: Matrix) -> list[Fault]:
     rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
     found = []
     for each in route_violations(world, rows, verification_resolution(world)):
-        way = rows[each.edge + 1] - rows[each.edge]
-        share = float((each.q - rows[each.edge]) @ way / max(float(way @ way), 1e-300))
+        motion = rows[each.edge + 1] - rows[each.edge]
+        share = float((each.q - rows[each.edge]) @ motion / max(float(motion @ motion), 1e-300))
         found.append((each.edge, min(max(share, 0.0), 1.0), each.reason))
     return found

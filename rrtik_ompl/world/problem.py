@@ -83,31 +83,37 @@ class Problem:
         require(planner, str | None, "planner of a problem", "use a name of list_planners()")
         start = world.robot.posture(start) if isinstance(start, str) else start
         goal = world.robot.posture(goal) if isinstance(goal, str) else goal
-        wanted = _goal_of(goal)
-        joints = {} if wanted.q is None else {"goal": wanted.q}
+        checked_goal = _goal_of(goal)
+        joints = {} if checked_goal.q is None else {"goal": checked_goal.q}
         ends = usable_configurations(world, {"start": start, **joints})
-        first = frozen(ends["start"])
+        checked_start = frozen(ends["start"])
 
-        known = world.settings.constraints
-        fresh = [each for each in listed(constraints, "path constraints") if each not in known]
-        held = held_regions(world.robot, world.scene, (*known, *fresh), first)
-        regions = tuple(each.region for each in held.regions)
+        known_regions = world.settings.constraints
+        new_regions = [each for each in listed(constraints, "path constraints") if each not in known_regions]
+        held_constraints = held_regions(world.robot, world.scene, (*known_regions, *new_regions), checked_start)
+        regions = tuple(each.region for each in held_constraints.regions)
         if regions:
             world = form_of(world, constraints=regions)
-            _keep(world.robot, held, first, "start")
+            _check_held(world.robot, held_constraints, checked_start, "start")
 
-        if isinstance(wanted, JointGoal):
-            _keep(world.robot, held, ends["goal"], "goal")
-            wanted = changed(wanted, q=frozen(_nearest_turn(world, first, ends["goal"])))
-        elif any(_of_a_path(part.freedom) for part in wanted.parts if part.freedom is not None):
+        if isinstance(checked_goal, JointGoal):
+            _check_held(world.robot, held_constraints, ends["goal"], "goal")
+            checked_goal = changed(checked_goal, q=frozen(_nearest_turn(world, checked_start, ends["goal"])))
+        elif any(_of_a_path(part.freedom) for part in checked_goal.parts if part.freedom is not None):
             raise InputError(
                 "goal region: frame, from_start and allowances are for path constraints; a goal is of the tip"
             )
 
-        if wanted.frames:
-            goal_regions(world.robot, world.scene, wanted)  # refuses links that do not exist
+        if checked_goal.frames:
+            goal_regions(world.robot, world.scene, checked_goal)  # refuses links that do not exist
 
-        values = {"settings": world.settings, "start": first, "goal": wanted, "name": name, "planner": planner}
+        values = {
+            "settings": world.settings,
+            "start": checked_start,
+            "goal": checked_goal,
+            "name": name,
+            "planner": planner,
+        }
         for field, value in values.items():
             object.__setattr__(self, field, value)
         object.__setattr__(self, "world", world)  # what has been asked already is asked again
@@ -159,7 +165,7 @@ class Problem:
 
 def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Problem:
     """A problem whose start, shape (dof,), and goal somebody has checked already; no joint may be continuous."""
-    known = {
+    values = {
         "settings": world.settings,
         "start": frozen(start),
         "goal": goal if isinstance(goal, JointGoal) else JointGoal(goal),
@@ -168,7 +174,7 @@ def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Prob
         "world": world,
     }
 
-    return restored(Problem, known)
+    return restored(Problem, values)
 
 
 def densely_checked(problem: Problem) -> Problem:
@@ -190,49 +196,50 @@ def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[s
         InputError: If one has the wrong number of joints or is not finite.
     """
     robot = world.robot
-    found = {}
+    configurations = {}
     for what, values in ends.items():
         q = robot.configuration(values, what)
         if fault := robot.limit_fault(q):
             raise ProblemError(f"{what}: {fault}", part=what)
-        found[what] = robot.onto_limits(q)
+        configurations[what] = robot.onto_limits(q)
 
-    rows = np.array(list(found.values()))
+    rows = np.array(list(configurations.values()))
     world = world.unheld
 
     # both opinions must agree, for the path through them will be certified by the second one
     for opinion in (world.checks.free, world.checks.certified):
-        for (what, q), free in zip(found.items(), opinion(rows).tolist(), strict=True):
+        for (what, q), free in zip(configurations.items(), opinion(rows).tolist(), strict=True):
             if not free:
-                raise _in_the_way(world, q, what)
-    return found
+                raise _not_free_error(world, q, what)
+    return configurations
 
 
-def _in_the_way(world: World, q: Vector, what: str) -> ProblemError:
+def _not_free_error(world: World, q: Vector, what: str) -> ProblemError:
     """Says what a start or a goal touches, or is too near to."""
     touching = world.contacts(q)
     if not touching:
-        return _not_touching(world, q, what)
+        return _not_proven_error(world, q, what)
 
     pairs = [(c.first, c.second) for c in touching]
-    still = {body.name for body in world.bodies if body.joint == 0}
-    fixed = [c for c in touching if {c.first, c.second} <= still]
-    if fixed:
+    names_at_rest = {body.name for body in world.bodies if body.joint == 0}
+    contacts_at_rest = [c for c in touching if {c.first, c.second} <= names_at_rest]
+    if contacts_at_rest:
         remedy = "no joint moves either; move the obstacle or the base, or allow the pair"
-        return ProblemError(f"{what} is in collision: {fixed[0]}; {remedy}", pairs, part=what)
+        return ProblemError(f"{what} is in collision: {contacts_at_rest[0]}; {remedy}", pairs, part=what)
 
     if touching and all(c.distance > 0.0 for c in touching):
-        thick = any(body.padding for body in world.bodies)
-        lower = "lower the margin" + (" or the padding" if thick else "")
-        remedy = f"move it or {lower}" + (", or allow the pair" if world.self_margin or thick else "")
+        any_padding = any(body.padding for body in world.bodies)
+        lower = "lower the margin" + (" or the padding" if any_padding else "")
+        remedy = f"move it or {lower}" + (", or allow the pair" if world.self_margin or any_padding else "")
         return ProblemError(f"{what} is too near: {world.explain(q)}; {remedy}", pairs, part=what)
 
     clouds = {each.name for each in world.scene.obstacles if each.shape.sensed}
-    own = ", take the arm's own points out by without_robot()," if any(clouds & set(pair) for pair in pairs) else ""
-    return ProblemError(f"{what} is in collision: {world.explain(q)}; move it{own} or allow the pair", pairs, part=what)
+    in_cloud = any(clouds & set(pair) for pair in pairs)
+    remedy = "move it" + (", take the arm's own points out by without_robot()," if in_cloud else "")
+    return ProblemError(f"{what} is in collision: {world.explain(q)}; {remedy} or allow the pair", pairs, part=what)
 
 
-def _not_touching(world: World, q: Vector, what: str) -> ProblemError:
+def _not_proven_error(world: World, q: Vector, what: str) -> ProblemError:
     """Says why a start or a goal is not free where nothing touches."""
     pairs = [(c.first, c.second) for c in world.too_near(q)]
     if pairs:
@@ -249,9 +256,9 @@ def _of_a_path(region: TaskRegion) -> bool:
     return bool(region.frame or region.from_start or region.position_allowance or region.orientation_allowance)
 
 
-def _keep(robot: Robot, held: HeldRegions, q: Vector, what: str) -> None:
-    if fault := held.explain(q):
-        remedy = contradiction(robot, held) or "move it, or widen the tolerance"
+def _check_held(robot: Robot, constraints: HeldRegions, q: Vector, what: str) -> None:
+    if fault := constraints.explain(q):
+        remedy = contradiction(robot, constraints) or "move it, or widen the tolerance"
         raise ProblemError(f"{what} breaks {fault}; {remedy}", part=what)
 
 

@@ -118,19 +118,23 @@ class Prover:
         values = self._joint_values(rows)
         count = len(rows) - 1
         sound = self._sound(rows, values)
-        between = None if sound is None else sound[:-1] & sound[1:]
+        ends_sound = None if sound is None else sound[:-1] & sound[1:]
 
-        gaps = self._gaps((rows, rows[1:]), (values, values[1:]), between, (clearance, slack), seconds)
-        places = [replace(gap, _measure=partial(self._distance, rows, gap)) for gap in gaps]
+        gaps = self._gaps((rows, rows[1:]), (values, values[1:]), ends_sound, (clearance, slack), seconds)
+        measured_gaps = [replace(gap, _measure=partial(self._distance, rows, gap)) for gap in gaps]
         if self.constraints is not None:
-            places = self._with_breaches(self.constraints, rows, places)
-        return Proof(count, clearance, tuple(places), self.margin, maker=self)
+            measured_gaps = self._with_breaches(self.constraints, rows, measured_gaps)
+        return Proof(count, clearance, tuple(measured_gaps), self.margin, maker=self)
 
     def _with_breaches(self, constraints: HeldRegions, rows: Matrix, gaps: list[Gap]) -> list[Gap]:
         """The gaps of a route, and a gap for each other motion of it that is not held."""
-        known = {gap.motion for gap in gaps}
-        left = np.flatnonzero(~constraints.route_held(rows)).tolist()
-        breaches = [Gap(k, float("nan"), constraints.why(rows[k], rows[k + 1]), "") for k in left if k not in known]
+        motions_with_gap = {gap.motion for gap in gaps}
+        not_held = np.flatnonzero(~constraints.route_held(rows)).tolist()
+        breaches = [
+            Gap(k, float("nan"), constraints.why(rows[k], rows[k + 1]), "")
+            for k in not_held
+            if k not in motions_with_gap
+        ]
         return sorted(gaps + breaches, key=lambda gap: gap.motion)
 
     def certificate(self, rows: Matrix, clearance: float) -> Certificate | None:
@@ -147,12 +151,12 @@ class Prover:
                 f"a certificate names planes of solids, and '{clouds[0]}' is a cloud; plan.proven says as much"
             )
 
-        told = self.logged(np.vstack([rows, rows]) if len(rows) == 1 else rows, clearance=clearance)
-        if told is None:
+        logs = self.logged(np.vstack([rows, rows]) if len(rows) == 1 else rows, clearance=clearance)
+        if logs is None:
             return None
 
         digests = robot_digest(self.robot), scene_digest(tuple(self.bodies), self.pairs)
-        motions = tuple(_entries(*each) for each in told)
+        motions = tuple(_entries(*each) for each in logs)
         return Certificate(self.robot.name, *digests, clearance, self.self_margin, frozen(rows), motions)
 
     def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[Told] | None:
@@ -164,19 +168,19 @@ class Prover:
 
         packed = self._packed_for(clearance, SPARE)
         coal = CoalProof(self.robot, self.bodies, packed)
-        told = list[Told]()
+        logs = list[Told]()
         pair = np.zeros(1, dtype=np.int32)
         place = np.zeros(1)
 
         for k in range(len(rows) - 1):
-            at = (values[k].ctypes.data, values[k + 1].ctypes.data, 1, pair.ctypes.data, place.ctypes.data)
-            run = partial(kernels.prove, ProofTable(packed.table.address), *at)
+            arguments = (values[k].ctypes.data, values[k + 1].ctypes.data, 1, pair.ctypes.data, place.ctypes.data)
+            run = partial(kernels.prove, ProofTable(packed.table.address), *arguments)
             if packed.touching:
                 suggest_planes(self.robot, self.bodies, packed, rows[k : k + 2])
-            told.append(coal.logged(rows[k : k + 2], pair, place, run))
+            logs.append(coal.logged(rows[k : k + 2], pair, place, run))
             if pair[0] != PROVEN:
                 return None
-        return told
+        return logs
 
     def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0) -> Mask:
         """Which of the motions starts[k] -> ends[k], shapes (m, dof), are proven free. Shape (m,)."""
@@ -189,9 +193,9 @@ class Prover:
         rows = np.concatenate([starts, ends])
         values = self._joint_values(rows)
         sound = self._sound(rows, values)
-        both = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
+        ends_sound = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
 
-        gaps = self._gaps((starts, ends), (values, values[len(starts) :]), both, (clearance, 0.0), None)
+        gaps = self._gaps((starts, ends), (values, values[len(starts) :]), ends_sound, (clearance, 0.0), None)
         mask[[gap.motion for gap in gaps]] = False
         if self.constraints is not None:
             mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
@@ -237,17 +241,22 @@ class Prover:
 
     def _sound(self, rows: Matrix, values: Matrix) -> Mask | None:
         """Which configurations are inside the limits and not too large for the bound on rounding; None for all."""
-        inside = inside_limits(self.robot, rows)
-        if inside.all() and (_joints(self.robot)[2] or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
+        within_limits = inside_limits(self.robot, rows)
+        if within_limits.all() and (_joints(self.robot)[2] or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
             return None
-        return np.asarray(inside & (np.abs(values) <= LARGEST_VALUE).all(axis=1))
+        return np.asarray(within_limits & (np.abs(values) <= LARGEST_VALUE).all(axis=1))
 
     def _gaps(
-        self, rows: Ends, values: Ends, sound: Mask | None, kept: tuple[float, float], seconds: float | None
+        self, rows: Ends, values: Ends, sound: Mask | None, distances: tuple[float, float], seconds: float | None
     ) -> list[Gap]:
-        """The motions from the first configurations to as many others that are not proven.
+        """The motions that are not proven.
 
-        ``values``: of all joints there. ``kept``: clearance and slack [m].
+        Args:
+            rows: Where they begin and where they end, shapes (m or more, dof) and (m, dof).
+            values: Of all joints there, shapes (m or more, joints) and (m, joints).
+            sound: For which motions the bound on rounding holds at both ends, shape (m,); None for all.
+            distances: To be kept [m]: the clearance, and the slack between all bodies.
+            seconds: When to stop; None for never. What was not looked at by then is not proven.
         """
         tails, heads = values
         count, joints = heads.shape
@@ -256,7 +265,7 @@ class Prover:
         if kernels is None or self.always_colliding:
             return [Gap(k, float("nan"), "", "") for k in range(count)]
 
-        packed = self._packed_for(*kept)
+        packed = self._packed_for(*distances)
         coal = self._coal_proof(packed)
         table = ProofTable(packed.table.address)
         pairs = np.full(count, NOT_LOOKED_AT, dtype=np.int32)
@@ -270,22 +279,22 @@ class Prover:
             sinks = written[0] + INT * first, written[1] + DOUBLE * first
             return int(kernels.prove(table, read[0] + skipped, read[1] + skipped, number, *sinks))
 
-        looked = 0
-        open_ = 0
-        at_once = 1 if packed.touching else MOTIONS_AT_ONCE  # planes of contacts are suggested for one motion
-        for first in range(0, count, at_once):
+        looked_at = 0
+        open_count = 0
+        batch = 1 if packed.touching else MOTIONS_AT_ONCE  # planes of contacts are suggested for one motion
+        for first in range(0, count, batch):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
             if packed.touching:
                 suggest_planes(self.robot, self.bodies, packed, np.stack([rows[0][first], rows[1][first]]))
-            number = min(at_once, count - first)
-            open_ += prove(first, number)
-            looked += number
+            number = min(batch, count - first)
+            open_count += prove(first, number)
+            looked_at += number
 
         if sound is not None:
             pairs[~sound] = NOT_LOOKED_AT
             places[~sound] = np.nan
-        elif open_ == 0 and looked == count:
+        elif open_count == 0 and looked_at == count:
             return []
 
         for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if coal.links[pairs[k]]):
@@ -295,7 +304,7 @@ class Prover:
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
         """The table, with a clearance and a slack to keep."""
-        packed = self.tables.get(self.bodies, self._made)
+        packed = self.tables.get(self.bodies, self._new_table)
         packed.keep(clearance, slack)
         return packed
 
@@ -305,7 +314,7 @@ class Prover:
             self._coal = CoalProof(self.robot, self.bodies, packed)
         return self._coal
 
-    def _made(self) -> ProofPairs:
+    def _new_table(self) -> ProofPairs:
         bodies = tuple(self.bodies)
         solids = of_each((body.geometry for body in bodies), convex_solids)
         return proof_pairs(self.robot.chain, bodies, self.pairs, solids, strokes(self.robot), fixed=self._fixed)
@@ -320,22 +329,22 @@ class Prover:
 def _joints(robot: Robot) -> tuple[Matrix, Vector, bool]:
     """How joint values follow from configurations, and whether the limits keep them below half the largest value."""
     gain = np.ascontiguousarray(robot.chain.gain.T)
-    ends = np.stack([robot.lower, robot.upper])
-    bounded = bool(np.isfinite(ends).all() and np.abs(robot.chain.joint_values(ends)).max() < 0.5 * LARGEST_VALUE)
+    limits = np.stack([robot.lower, robot.upper])
+    bounded = bool(np.isfinite(limits).all() and np.abs(robot.chain.joint_values(limits)).max() < 0.5 * LARGEST_VALUE)
     return gain, robot.chain.offset, bounded
 
 
-def _entries(told: ProofLog, measured: NDArray[np.int64]) -> MotionEntries:
+def _entries(log: ProofLog, measured_intervals: NDArray[np.int64]) -> MotionEntries:
     """What a verifier does not find by itself; a motion that stands still is one interval of level 0."""
-    intervals = told.intervals.copy()
+    intervals = log.intervals.copy()
     if len(intervals) and (intervals == intervals[0]).all():  # one interval alone is all of the motion
         intervals[:] = 0
 
-    links = (told.solids[:, None, ::2] == measured[None, :, :2]).all(axis=2).any(axis=1)
-    needed = ((intervals[:, 0] > 0) | told.normals.any(axis=1)) & ~links
+    settled_by_coal = (log.solids[:, None, ::2] == measured_intervals[None, :, :2]).all(axis=2).any(axis=1)
+    needed = ((intervals[:, 0] > 0) | log.normals.any(axis=1)) & ~settled_by_coal
 
-    whole = np.insert(measured[:, :2], [1, 2], -1, axis=1)
-    solids = np.vstack([told.solids[needed], whole])
-    intervals = np.vstack([intervals[needed], measured[:, 2:]])
-    normals = np.vstack([told.normals[needed], np.zeros((len(measured), 3))])
+    whole_links = np.insert(measured_intervals[:, :2], [1, 2], -1, axis=1)
+    solids = np.vstack([log.solids[needed], whole_links])
+    intervals = np.vstack([intervals[needed], measured_intervals[:, 2:]])
+    normals = np.vstack([log.normals[needed], np.zeros((len(measured_intervals), 3))])
     return MotionEntries(frozen(solids, np.int64), frozen(intervals, np.int64), frozen(normals))

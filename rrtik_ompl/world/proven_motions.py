@@ -69,8 +69,8 @@ class ProvenMotions(MotionQueries):
         ends = np.ascontiguousarray(B)
         answers = np.zeros(len(starts), dtype=np.int32)
         self.motions.make_ready()
-        at = starts.ctypes.data, ends.ctypes.data
-        self._kernels.judge(self.motions.address, *at, len(starts), answers.ctypes.data)
+        addresses = starts.ctypes.data, ends.ctypes.data
+        self._kernels.judge(self.motions.address, *addresses, len(starts), answers.ctypes.data)
         free: Mask = answers == FREE
         return free
 
@@ -84,7 +84,7 @@ def proven_motions(world: World, clearance: float, within: Matrix) -> MotionQuer
         within: Corners of a box of configurations within the limits, shape (m, n), in which all motions are.
     """
     known: object = world
-    kept = max(clearance, world.settings.clearance)
+    required_clearance = max(clearance, world.settings.clearance)
     if has_kernels(known, KERNELS, within=within):
-        return ProvenMotions(world, kept)
-    return keeping(world, 0.0, proven=kept)
+        return ProvenMotions(world, required_clearance)
+    return keeping(world, 0.0, proven=required_clearance)

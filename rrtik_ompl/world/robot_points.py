@@ -52,18 +52,18 @@ def without_robot(
     require(cloud, PointCloud, "cloud")
     require(robot, Robot, "robot", "use load_robot(name or file)")
     require(scene, Scene | None, "scene", "use Scene(obstacles, attached)")
-    kept = not_negative(bounded_array(margin, (), "margin"), "margin")
+    distance = not_negative(bounded_array(margin, (), "margin"), "margin")
 
-    place = pin.SE3.Identity() if pose is None else rigid(pose, "pose of a cloud")
+    cloud_pose = pin.SE3.Identity() if pose is None else rigid(pose, "pose of a cloud")
     frames = robot.joint_frames(robot.configuration(q)[None])[0]
 
-    held = [] if scene is None else [body for body in scene_bodies(robot, scene) if body.kind == "attached"]
-    bodies = (*link_bodies(robot), *held)
+    attached = [] if scene is None else [body for body in scene_bodies(robot, scene) if body.kind == "attached"]
+    bodies = (*link_bodies(robot), *attached)
 
     outside = np.ones(len(cloud.points), dtype=bool)
     for body, (balls, _) in zip(bodies, arm_cache(robot).covers_of(bodies), strict=True):
-        from_body = (pin.SE3(frames[body.joint]) * body.placement).actInv(place)
-        outside &= ~_on_body(cloud, from_body, body, balls, kept + body.padding)
+        from_body = (pin.SE3(frames[body.joint]) * body.placement).actInv(cloud_pose)
+        outside &= ~_on_body(cloud, from_body, body, balls, distance + body.padding)
     return cloud.only(outside, "without_robot")
 
 
@@ -72,17 +72,17 @@ def _on_body(cloud: PointCloud, from_body: pin.SE3, body: Body, balls: Matrix, m
     box = body.geometry.aabb_local
     reach = margin + cloud.radius
     points = cloud.points.astype(np.float64) @ from_body.rotation.T + from_body.translation
-    inside = (points >= np.array(box.min_) - reach) & (points <= np.array(box.max_) + reach)
-    near = np.flatnonzero(inside.all(axis=1))
+    in_box = (points >= np.array(box.min_) - reach) & (points <= np.array(box.max_) + reach)
+    candidates = np.flatnonzero(in_box.all(axis=1))
 
-    found = np.zeros(len(cloud.points), dtype=bool)
-    found[near] = len(balls) == 0  # what stands still and has a formula has no cover
+    is_on_body = np.zeros(len(cloud.points), dtype=bool)
+    is_on_body[candidates] = len(balls) == 0  # what stands still and has a formula has no cover
     for ball in balls:
-        close = np.linalg.norm(points[near] - ball[:3], axis=1) <= ball[3] + reach
-        found[near[close]] = True
+        close = np.linalg.norm(points[candidates] - ball[:3], axis=1) <= ball[3] + reach
+        is_on_body[candidates[close]] = True
 
-    here = coal.Transform3s()
-    for k in np.flatnonzero(found).tolist():
-        one = cloud_solid(PointCloud(points[k : k + 1], cloud.radius))
-        found[k] = cloud_gap((body.geometry, here, one, here), margin) is None
-    return found
+    at_origin = coal.Transform3s()
+    for k in np.flatnonzero(is_on_body).tolist():
+        ball_of_point = cloud_solid(PointCloud(points[k : k + 1], cloud.radius))
+        is_on_body[k] = cloud_gap((body.geometry, at_origin, ball_of_point, at_origin), margin) is None
+    return is_on_body

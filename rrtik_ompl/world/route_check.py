@@ -34,8 +34,8 @@ def verification_resolution(world: World) -> float:
 
 def violations_of(world: World, rows: Matrix, resolution: float | None = None) -> tuple[Violation, ...]:
     """As :meth:`rrtik_ompl.World.violations`, of waypoints that are trusted, shape (k, dof)."""
-    fine = verification_resolution(world) if resolution is None else resolution
-    return route_violations(world, np.vstack([rows, rows]) if len(rows) == 1 else rows, fine)
+    step = verification_resolution(world) if resolution is None else resolution
+    return route_violations(world, np.vstack([rows, rows]) if len(rows) == 1 else rows, step)
 
 
 def motion_taken(world: World, a: Vector, b: Vector) -> bool:
@@ -53,22 +53,22 @@ def as_it_stands(scene: Scene) -> str:
     return ", with moving obstacles as they stand at time 0 (replan and plan_in_time go by their motion)"
 
 
-def how_checked(world: World, rows: Matrix, known: Proof | None = None) -> str:
+def how_checked(world: World, rows: Matrix, given_proof: Proof | None = None) -> str:
     """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
-    proof = known
+    proof = given_proof
     if proof is None or not proof.proven or proof.clearance < world.settings.kept:
         proof = world.prover.route(rows, clearance=world.settings.kept)
 
     if proof.proven:
         margins = "its margins and " if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
-        kept = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""
-        return f"proven free at every configuration{kept}{as_it_stands(world.scene)}"
+        clearance = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""
+        return f"proven free at every configuration{clearance}{as_it_stands(world.scene)}"
 
-    sampled = len(proof.unproven)
+    unproven_count = len(proof.unproven)
     first = proof.unproven[0]
     where = f", first motion {first.motion + 1}" + (f" ('{first.first}' and '{first.second}')" if first.second else "")
     step = f"checked every {1e3 * verification_resolution(world):g} mm"
-    proven = f"{proof.motions - sampled} of {proof.motions} motions proven free"
+    proven = f"{proof.motions - unproven_count} of {proof.motions} motions proven free"
     return f"{proven}, the others {step}{where}{as_it_stands(world.scene)}"
 
 
@@ -84,10 +84,10 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
         InputError: If the path is too long for its checks.
     """
     if world.constraints is not None:
-        broken = _not_held(world.constraints, rows)
-        others = route_violations(world.unheld, rows, resolution)
-        edges = {violation.edge for violation in broken}
-        found = [*broken, *(violation for violation in others if violation.edge not in edges)]
+        breaches = _not_held(world.constraints, rows)
+        collisions = route_violations(world.unheld, rows, resolution)
+        edges = {violation.edge for violation in breaches}
+        found = [*breaches, *(violation for violation in collisions if violation.edge not in edges)]
         return tuple(sorted(found, key=lambda violation: violation.edge))
 
     counts = _steps(world, rows, resolution)
@@ -97,11 +97,11 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
             f"raise motion_resolution, or check whether the joint values are rad and m"
         )
 
-    open_ = np.flatnonzero(~world.prover.proven(rows[:-1], rows[1:], clearance=world.settings.kept))
+    unproven = np.flatnonzero(~world.prover.proven(rows[:-1], rows[1:], clearance=world.settings.kept))
     found = []
-    for run in np.split(open_, np.flatnonzero(np.diff(open_) > 1) + 1) if len(open_) else ():
+    for run in np.split(unproven, np.flatnonzero(np.diff(unproven) > 1) + 1) if len(unproven) else ():
         found += _sampled(world, rows, counts, run)
-    return tuple(found if world.settings.proving is None else _with_unproven(world, rows, open_, found))
+    return tuple(found if world.settings.proving is None else _with_unproven(world, rows, unproven, found))
 
 
 def _steps(world: World, rows: Matrix, resolution: float) -> Vector:
@@ -110,30 +110,32 @@ def _steps(world: World, rows: Matrix, resolution: float) -> Vector:
     return np.array([step_counts(a, b, world.weights, resolution)[0] for a, b in pairs], dtype=np.float64)
 
 
-def _with_unproven(world: World, rows: Matrix, open_: NDArray[np.int64], found: list[Violation]) -> Iterator[Violation]:
+def _with_unproven(
+    world: World, rows: Matrix, unproven: NDArray[np.int64], found: list[Violation]
+) -> Iterator[Violation]:
     """What was found, and each other motion that is not proven to keep what it must, of those given by numbers."""
-    broken = {violation.edge: violation for violation in found}
-    wanted = world.settings.proving or 0.0
-    proven = world.prover.proven(rows[open_], rows[open_ + 1], clearance=wanted)
-    for edge, enough in zip(open_.tolist(), proven.tolist(), strict=True):
-        if edge in broken:
-            yield broken[edge]
-        elif not enough:
+    violation_of_edge = {violation.edge: violation for violation in found}
+    clearance = world.settings.proving or 0.0
+    proven = world.prover.proven(rows[unproven], rows[unproven + 1], clearance=clearance)
+    for edge, is_proven in zip(unproven.tolist(), proven.tolist(), strict=True):
+        if edge in violation_of_edge:
+            yield violation_of_edge[edge]
+        elif not is_proven:
             yield Violation(edge, frozen(rows[edge]), not_proven(world))
 
 
 def not_proven(world: World) -> str:
     """What is said of a motion that has to be proven, and is not."""
-    wanted = 1e3 * (world.settings.proving or 0.0)
-    return f"not proven to keep {wanted:.4g} mm from every obstacle" if wanted else "not proven free"
+    millimetres = 1e3 * (world.settings.proving or 0.0)
+    return f"not proven to keep {millimetres:.4g} mm from every obstacle" if millimetres else "not proven free"
 
 
 def _not_held(constraints: HeldRegions, rows: Matrix) -> list[Violation]:
     """The motions that do not keep path constraints."""
-    left = np.flatnonzero(~constraints.route_held(rows))
-    ends = [rows[k] if constraints.explain(rows[k]) else rows[k + 1] for k in left]
+    edges = np.flatnonzero(~constraints.route_held(rows))
+    ends = [rows[k] if constraints.explain(rows[k]) else rows[k + 1] for k in edges]
     return [
-        Violation(int(k), frozen(q), constraints.why(rows[k], rows[k + 1])) for k, q in zip(left, ends, strict=True)
+        Violation(int(k), frozen(q), constraints.why(rows[k], rows[k + 1])) for k, q in zip(edges, ends, strict=True)
     ]
 
 
@@ -141,9 +143,10 @@ def _sampled(world: World, rows: Matrix, counts: Vector, run: NDArray[np.int64])
     """The violations of consecutive motions, whose numbers are given, checked in steps."""
     for part in in_parts(counts[run], AT_ONCE):
         edges = run[part]
-        dense, owners = subdivided(rows[edges[0] : edges[-1] + 2], counts[edges])
-        bad = np.flatnonzero(~world.checks.certified(dense))
-        bad = bad[(bad > 0) | (part[0] == 0)]  # the point at which a part begins is the last one of the part before
-        _, first = np.unique(owners[bad], return_index=True)
-        for k in bad[first]:
-            yield Violation(int(edges[owners[k]]), frozen(dense[k]), world.explain(dense[k]))
+        samples, owners = subdivided(rows[edges[0] : edges[-1] + 2], counts[edges])
+        refused = np.flatnonzero(~world.checks.certified(samples))
+        # The point at which a part begins is the last one of the part before.
+        refused = refused[(refused > 0) | (part[0] == 0)]
+        _, first = np.unique(owners[refused], return_index=True)
+        for k in refused[first]:
+            yield Violation(int(edges[owners[k]]), frozen(samples[k]), world.explain(samples[k]))

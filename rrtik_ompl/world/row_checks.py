@@ -66,8 +66,8 @@ class RowChecks:
     def certified(self, rows: Matrix) -> Mask:
         """Which rows, shape (m, dof), a second opinion calls free: proofs first, then coal. Shape (m,)."""
         mask = inside_limits(self.settings.robot, rows)
-        open_ = mask & ~self.prover.still_proven(rows, clearance=self.settings.clearance)
-        mask[open_] = self.certificate.free(rows[open_])
+        unproven = mask & ~self.prover.still_proven(rows, clearance=self.settings.clearance)
+        mask[unproven] = self.certificate.free(rows[unproven])
         return mask if self.constraints is None else mask & self.constraints.held(rows)
 
     @property

@@ -39,8 +39,14 @@ from rrtik_ompl.world.row_checks import RowChecks
 def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
     if constraints is not None:
         return PROVERS.of(solids, None).holding(constraints)
-    always = solids.always_colliding
-    return Prover(solids.robot, solids.bodies, solids.moving, self_margin=solids.self_margin, always_colliding=always)
+    always_colliding = solids.always_colliding
+    return Prover(
+        solids.robot,
+        solids.bodies,
+        solids.moving,
+        self_margin=solids.self_margin,
+        always_colliding=always_colliding,
+    )
 
 
 def _held_regions(robot: Robot, attached: tuple[AttachedObject, ...], regions: tuple[TaskRegion, ...]) -> HeldRegions:
@@ -49,7 +55,7 @@ def _held_regions(robot: Robot, attached: tuple[AttachedObject, ...], regions: t
 
 # What a world is made of, and what each part depends on: worlds that are made of the same values share them.
 ARRANGEMENTS = Shared(arranged)  # robot, scene, self_margin
-CHECKERS = Shared(ExactChecker.of)  # arrangement, room
+CHECKERS = Shared(ExactChecker.of)  # arrangement, clearance
 PROVERS = Shared(_prover_of)  # arrangement, held regions
 HELD = Shared(_held_regions)  # robot, what is attached, regions
 
@@ -327,12 +333,12 @@ class World(Judge):
         solids = ARRANGEMENTS.keep(moved, settings.robot, moved.scene, settings.self_margin)
 
         # These names hold the parts until the new world has found them.
-        free = PROVERS.of(checks.solids, None)
-        prover = free.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
+        unheld_prover = PROVERS.of(checks.solids, None)
+        prover = unheld_prover.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
         PROVERS.keep(prover, solids, None)
         checker = checks.checker.moved(solids, numbers)
         if checker is not None:
-            CHECKERS.keep(checker, solids, checker.room)
+            CHECKERS.keep(checker, solids, checker.clearance)
 
         return form_of(self, scene=solids.scene)
 
@@ -362,8 +368,8 @@ class World(Judge):
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
-        kept = self._settings.kept
-        return bool(self.prover.proven(self._rows(a, 1), self._rows(b, 1), clearance=kept)[0])
+        clearance = self._settings.kept
+        return bool(self.prover.proven(self._rows(a, 1), self._rows(b, 1), clearance=clearance)[0])
 
     def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float | None = None) -> Mask:
         """Which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole. Shape (m,).
@@ -371,8 +377,8 @@ class World(Judge):
         ``clearance`` [m] is kept from every obstacle on top of its margin, by default what the world keeps. What grazes
         an obstacle cannot be proven.
         """
-        kept = self._proven_clearance(clearance)
-        return self.prover.proven(*self._both_ends(A, B), clearance=kept)
+        required_clearance = self._proven_clearance(clearance)
+        return self.prover.proven(*self._both_ends(A, B), clearance=required_clearance)
 
     def prove(
         self,
@@ -393,10 +399,11 @@ class World(Judge):
         Raises:
             InputError: If there are no waypoints, one is no finite row of ``dof`` numbers, or a number is out of range.
         """
-        kept = self._proven_clearance(clearance)
-        spare = not_negative(slack, "slack")
-        limit = None if seconds is None else positive(seconds, "seconds")
-        return self.prover.route(self._rows(waypoints, 2), clearance=kept, slack=spare, seconds=limit)
+        required_clearance = self._proven_clearance(clearance)
+        required_slack = not_negative(slack, "slack")
+        time_limit = None if seconds is None else positive(seconds, "seconds")
+        rows = self._rows(waypoints, 2)
+        return self.prover.route(rows, clearance=required_clearance, slack=required_slack, seconds=time_limit)
 
     def has_proven(self, proof: Proof) -> bool:
         """Whether a proof covers every motion, keeps what the world keeps, and was made by a form of the world.
@@ -426,8 +433,8 @@ class World(Judge):
             >>> [each.edge for each in problem.world.violations([problem.start, problem.goal.q])]
             [0]
         """
-        fine = None if resolution is None else positive(resolution, "resolution", "give metres")
-        return violations_of(self, self._rows(waypoints, 2), fine)
+        step = None if resolution is None else positive(resolution, "resolution", "give metres")
+        return violations_of(self, self._rows(waypoints, 2), step)
 
     def judged(self, waypoints: ArrayLike) -> Judged:
         """What is said of the straight motions between waypoints, shape (k, dof), where they are drawn.
@@ -439,19 +446,19 @@ class World(Judge):
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
-        size = self.motion_resolution if resolution is None else positive(resolution, "resolution", "give metres")
-        return int(step_counts(self._rows(a, 1), self._rows(b, 1), self.weights, size)[0])
+        step = self.motion_resolution if resolution is None else positive(resolution, "resolution", "give metres")
+        return int(step_counts(self._rows(a, 1), self._rows(b, 1), self.weights, step)[0])
 
     def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
         """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
         rows = self._rows(q, 1)
-        kept = self.checks.checker.contacts_of_meshes_kept(rows)
-        pairs = tuple(pair for pair in self.pairs if pair not in kept) if kept else self.pairs
+        proven_pairs = self.checks.checker.contacts_of_meshes_kept(rows)
+        pairs = tuple(pair for pair in self.pairs if pair not in proven_pairs) if proven_pairs else self.pairs
         found = list(measured(self.bodies, pairs, self.robot.chain.joint_frames(rows)[0], near_only=True))
 
         if not found:
-            shared = not kept and self._settings.clearance == 0.0
-            certificate = self.checks.certificate if shared else Certificate(self.robot, self.bodies, pairs)
+            same_pairs = not proven_pairs and self._settings.clearance == 0.0
+            certificate = self.checks.certificate if same_pairs else Certificate(self.robot, self.bodies, pairs)
             found = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
         return tuple(sorted(found, key=lambda c: c.clearance))
 
@@ -478,10 +485,10 @@ class World(Judge):
         if self._settings.clearance == 0.0:
             return ()
         frames = self.robot.chain.joint_frames(self._rows(q, 1))[0]
-        roomy = self.checks.solids.with_room(self._settings.clearance).whole
-        near = measured(roomy, self.pairs, frames, near_only=True)
-        kept = (c for c in near if c.clearance + self._settings.clearance > 0.0)
-        return tuple(sorted(kept, key=lambda c: c.clearance))
+        bodies = self.checks.solids.with_room(self._settings.clearance).whole
+        contacts = measured(bodies, self.pairs, frames, near_only=True)
+        keeping_margin = (c for c in contacts if c.clearance + self._settings.clearance > 0.0)
+        return tuple(sorted(keeping_margin, key=lambda c: c.clearance))
 
     def explain(self, q: ArrayLike) -> str:
         """A line that says why q is not valid; "" if it is.
@@ -490,14 +497,14 @@ class World(Judge):
         the path constraint that q does not keep.
         """
         row = self._rows(q, 1)[0]
-        if fault := self.robot.limit_fault(row):
-            return fault
+        if limit_fault := self.robot.limit_fault(row):
+            return limit_fault
         if touching := self.contacts(row):
             return f"{touching[0]}{_and_more(touching)}"
-        if near := self.too_near(row):
-            wanted = f"nearer than the clearance of {1e3 * self._settings.clearance:.4g} mm asked for"
-            apart = f"'{near[0].first}' and '{near[0].second}' are {1e3 * near[0].distance:.4g} mm apart"
-            return f"{apart}, {wanted}{_and_more(near)}"
+        if too_near := self.too_near(row):
+            shortfall = f"nearer than the clearance of {1e3 * self._settings.clearance:.4g} mm asked for"
+            distance = f"'{too_near[0].first}' and '{too_near[0].second}' are {1e3 * too_near[0].distance:.4g} mm apart"
+            return f"{distance}, {shortfall}{_and_more(too_near)}"
         if self.constraints is not None and (breach := self.constraints.explain(row)):
             return breach
 
@@ -551,8 +558,8 @@ def _checks_of(settings: WorldSettings) -> RowChecks:
         warnings.warn(solids.doubts.pop(0), MeshWarning, stacklevel=3)
 
     checker = CHECKERS.of(solids, settings.clearance + settings.inflation)
-    held = HELD.of(robot, scene.attached, settings.constraints) if settings.constraints else None
-    return RowChecks(settings, solids, checker, PROVERS.of(solids, held), held)
+    constraints = HELD.of(robot, scene.attached, settings.constraints) if settings.constraints else None
+    return RowChecks(settings, solids, checker, PROVERS.of(solids, constraints), constraints)
 
 
 def _and_more(contacts: tuple[Contact, ...]) -> str:

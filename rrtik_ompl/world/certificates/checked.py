@@ -32,5 +32,5 @@ def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayL
     require(certificate, Certificate, "certificate")
     require(world, World, "world of a certificate")
     rows = number_rows(waypoints, "waypoints of a certificate")
-    least = not_negative(clearance, "clearance")
-    return verify.verify_certificate(certificate, world, rows, clearance=least)
+    required_clearance = not_negative(clearance, "clearance")
+    return verify.verify_certificate(certificate, world, rows, clearance=required_clearance)

@@ -35,93 +35,149 @@ ROUNDING = 1e-8  # [m] that every gap has to exceed beside all else
 LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which that is enough
 UNIT = 1e-9  # how far a normal may be from unit length, and from that of a half-space
 AT_ONCE = 20_000  # intervals, to bound memory
-_turned = partial(np.einsum, "nij,nj->ni")
+_rotated = partial(np.einsum, "nij,nj->ni")
 
 Numbers = NDArray[np.int64]
 Poses = tuple[NDArray[np.float64], Matrix]  # rotations, shape (n, 3, 3), and origins, shape (n, 3)
 
 
-class Side(NamedTuple):
-    """A solid of each body of a pair, on an interval of a motion."""
+class Entry(NamedTuple):
+    """A solid of each body of a pair, to be shown apart on an interval of a motion.
+
+    Attributes:
+        motion: Number of the motion, from 0.
+        pair: Number of the pair in ``Motions.pairs``.
+        first, second: Numbers of the solids in ``Motions.solids``, in the order of the pair.
+        begin: Where the interval begins, a share of the motion.
+        width: Of the interval, a share of the motion.
+    """
 
     motion: int
     pair: int
-    one: int
-    other: int
+    first: int
+    second: int
     begin: float
     width: float
 
+    @property
+    def solids_of_motion(self) -> tuple[int, int, int, int]:
+        """Motion, pair and both solids, whichever the interval."""
+        return self[:4]
+
 
 def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
-    """As :func:`rrtik_ompl.verify_certificate`, which refuses arguments of another kind first."""
+    """As :func:`rrtik_ompl.verify_certificate`, which refuses arguments of another kind first.
+
+    Returns:
+        The first fault in one line; "" if the certificate proves the path free.
+    """
     rows = np.ascontiguousarray(waypoints, dtype=np.float64)
+    if fault := _fault_of_header(certificate, world, rows, clearance):
+        return fault
+
+    # A single waypoint counts as a motion that stands still.
+    route = np.repeat(rows, 2, axis=0) if len(rows) == 1 else rows
+    return Motions(world, route, certificate.clearance).fault(certificate.motions)
+
+
+def _fault_of_header(certificate: Certificate, world: World, rows: Matrix, clearance: float) -> str:
+    """The first thing but its entries by which a certificate does not fit a path, rows of shape (k, dof); "" if none.
+
+    A version, robot, scene, clearance [m] or path of another kind, a contact of bodies that no joint moves (of which
+    entries say nothing), a waypoint that is out of bounds, or another number of motions.
+    """
     robot = world.robot
-    kept = certificate.clearance
-    moves = max(1, len(rows) - 1)
+    if certificate.version != VERSION:
+        return f"version {certificate.version} is not known here"
+    if certificate.robot_digest != robot_digest(robot):
+        return f"it is for another robot, '{certificate.robot}'"
+    if certificate.self_margin != world.self_margin:
+        return f"it is for another self margin, {certificate.self_margin:g} m"
+    if certificate.scene_digest != scene_digest(world.bodies, world.pairs):
+        return "it is for another scene"
+    if not max(0.0, clearance) <= certificate.clearance < np.inf:
+        return f"it is for a clearance of {certificate.clearance:g} m, not {clearance:g} m"
 
-    standing = tuple(pair for pair in world.pairs if all(world.bodies[k].joint == 0 for k in pair))
-    touching = fixed_contact(robot, world.bodies, standing)  # a matter of coal, and of no motion
+    if not np.array_equal(rows, certificate.waypoints):  # to the bit, but for the sign of a zero
+        return "it is for another path: waypoints differ"
 
-    same = np.array_equal(rows, certificate.waypoints)  # to the bit, but for the sign of a zero
-    fits = same and len(rows) > 0 and rows.shape[1] == robot.dof and bool(robot.within_limits(rows).all())
-    sound = fits and bool((np.abs(robot.joint_values(rows)) <= LARGEST_VALUE).all())
+    pairs_at_rest = tuple(pair for pair in world.pairs if all(world.bodies[k].joint == 0 for k in pair))
+    touching = fixed_contact(robot, world.bodies, pairs_at_rest)
+    if touching is not None:
+        return f"{' and '.join(map(repr, touching))} touch and never move"
 
-    faults = {
-        f"version {certificate.version} is not known here": certificate.version != VERSION,
-        f"it is for another robot, '{certificate.robot}'": certificate.robot_digest != robot_digest(robot),
-        f"it is for another self margin, {certificate.self_margin:g} m": certificate.self_margin != world.self_margin,
-        "it is for another scene": certificate.scene_digest != scene_digest(world.bodies, world.pairs),
-        f"it is for a clearance of {kept:g} m, not {clearance:g} m": not max(0.0, clearance) <= kept < np.inf,
-        "it is for another path: waypoints differ": not same,
-        f"{' and '.join(map(repr, touching or ()))} touch and never move": touching is not None,
-        f"waypoints are not inside the limits of robot '{robot.name}', or beyond {LARGEST_VALUE:g}": not sound,
-        f"it has {len(certificate.motions)} motions, not {moves}": len(certificate.motions) != moves,
-    }
+    inside_limits = len(rows) > 0 and rows.shape[1] == robot.dof and bool(robot.within_limits(rows).all())
+    if not inside_limits or not (np.abs(robot.joint_values(rows)) <= LARGEST_VALUE).all():
+        return f"waypoints are not inside the limits of robot '{robot.name}', or beyond {LARGEST_VALUE:g}"
 
-    if any(faults.values()):
-        return next(text for text, found in faults.items() if found)
-    return Motions(world, np.repeat(rows, 2, axis=0) if len(rows) == 1 else rows, kept).fault(certificate.motions)
+    motion_count = max(1, len(rows) - 1)
+    if len(certificate.motions) != motion_count:
+        return f"it has {len(certificate.motions)} motions, not {motion_count}"
+    return ""
 
 
 class Solid:
-    """A body or a convex part of it; with a ball and, along axes' columns, a box: endless if a part is not convex."""
+    """A body or a convex part of it in the frame of its joint, in a ball and a box, both endless if it is not convex.
+
+    Attributes:
+        parts: The convex parts.
+        axes: The box's axes are its columns, shape (3, 3).
+        convex: Whether all parts are convex and bounded.
+        ball_centre, ball_radius: The ball, shape (3,) and [m].
+        box_centre, box_half: Centre and half sides of the box along its axes, shape (3,) each [m].
+    """
 
     def __init__(self, parts: tuple[ConvexSolid, ...], axes: Matrix) -> None:
         self.parts = parts
         self.axes = axes
         self.convex = all(part.kind == CONVEX_SOLID for part in parts)
 
-        self.centre = np.zeros(3)
-        self.middle = np.zeros(3)
-        self.half = np.full(3, np.inf)
-        self.radius = np.inf
+        self.ball_centre = np.zeros(3)
+        self.box_centre = np.zeros(3)
+        self.box_half = np.full(3, np.inf)
+        self.ball_radius = np.inf
 
         if self.convex:
-            low = -self.highest(-axes.T)
-            high = self.highest(axes.T)
-            self.middle = 0.5 * (low + high)
-            self.half = 0.5 * (high - low)
-            self.centre = axes @ (0.5 * (low + high))
-            self.radius = self.far(lambda points: points - self.centre)
+            low = -self.support(-axes.T)
+            high = self.support(axes.T)
+            self.box_centre = 0.5 * (low + high)
+            self.box_half = 0.5 * (high - low)
+            self.ball_centre = axes @ (0.5 * (low + high))
+            self.ball_radius = self.largest_length(lambda points: points - self.ball_centre)
 
-    def far(self, moved: Callable[[Matrix], Matrix]) -> float:
-        """The largest length of what a function makes of the points of the parts [m]."""
-        return max(float(np.linalg.norm(moved(p.corners), axis=1).max()) + p.disc + p.radius for p in self.parts)
+    def largest_length(self, mapping: Callable[[Matrix], Matrix]) -> float:
+        """The largest length [m] of what a mapping, (n, 3) -> (n, 3), makes of a point; it may stretch none."""
+        lengths = [
+            float(np.linalg.norm(mapping(part.corners), axis=1).max()) + part.disc + part.radius for part in self.parts
+        ]
+        return max(lengths)
 
-    def highest(self, ways: Matrix) -> Vector:
-        """How far it reaches along unit vectors of the joint's frame, shapes (n, 3) and (n,)."""
+    def support(self, directions: Matrix) -> Vector:
+        """The support function: how far it reaches along unit vectors of the joint's frame [m], (n, 3) -> (n,)."""
         heights = []
         for part in self.parts:
-            across = np.linalg.norm(np.cross(ways, part.axis), axis=1)
-            height = (ways @ part.corners.T).max(axis=1) + part.disc * across + part.radius
+            distance_from_axis = np.linalg.norm(np.cross(directions, part.axis), axis=1)
+            height = (directions @ part.corners.T).max(axis=1) + part.disc * distance_from_axis + part.radius
             if part.kind == HALF_SPACE_SOLID:
-                height = np.where(np.abs(ways - part.axis).max(axis=1) <= UNIT, part.disc, np.inf)
+                height = np.where(np.abs(directions - part.axis).max(axis=1) <= UNIT, part.disc, np.inf)
             heights.append(height if part.kind in (CONVEX_SOLID, HALF_SPACE_SOLID) else height + np.inf)
         return np.asarray(np.max(heights, axis=0))
 
 
 class Motions:
-    """The bodies, pairs and solids of a world, and motions of its robot between waypoints, shape (k, dof)."""
+    """The bodies, pairs and solids of a world, and motions of its robot between waypoints, shape (k, dof).
+
+    Attributes:
+        values: Values of all joints at the waypoints, shape (k, joints).
+        solids: The bodies and their convex parts.
+        solid_numbers: Number of each solid, by body and part; part -1 is the whole body.
+        parts: Numbers of the parts of each body.
+        joint_of_solid: The joint that carries each solid, 0 for the world.
+        pairs: Numbers of two bodies of which one moves; if one of them rests in the frame of the pair it is second.
+        base_of_pair: The joint in whose frame each pair is looked at: the last one that carries both.
+        required_gaps: What each pair has to keep [m], rounding included.
+        approaches, accelerations: Bounds for each pair and motion [m], shape (pairs, motions), motions taking time 1.
+    """
 
     def __init__(self, world: World, rows: Matrix, clearance: float) -> None:
         self.chain = world.robot.chain
@@ -129,203 +185,270 @@ class Motions:
         self.values: Matrix = rows @ self.chain.gain.T + self.chain.offset
 
         self.solids = list[Solid]()
-        self.numbers: dict[tuple[int, int], int] = {}  # of solids, by body and part; part -1 is the whole body
+        self.solid_numbers: dict[tuple[int, int], int] = {}
         self.parts = [self._describe(number, body) for number, body in enumerate(self.bodies)]
 
         joints = [body.joint for body in self.bodies]
-        self.joint_of = np.array([joints[k] for k, _ in self.numbers], dtype=np.int64)
+        self.joint_of_solid = np.array([joints[k] for k, _ in self.solid_numbers], dtype=np.int64)
 
-        moving = [(i, j, _common(self.chain, joints[i], joints[j])) for i, j in world.pairs if joints[i] or joints[j]]
+        moving = [
+            (i, j, _common_joint(self.chain, joints[i], joints[j])) for i, j in world.pairs if joints[i] or joints[j]
+        ]
         self.pairs = [(i, j) if joints[j] == base else (j, i) for i, j, base in moving]
-        self.bases = np.array([base for _, _, base in moving], dtype=np.int64)
+        self.base_of_pair = np.array([base for _, _, base in moving], dtype=np.int64)
 
-        both = [(self.bodies[i], self.bodies[j]) for i, j in self.pairs]
-        kept = [kept_apart(a, b) + (clearance if keeps_clearance(a, b) else 0.0) for a, b in both]
-        self.margins = np.array(kept) + ROUNDING
+        bodies_of_pairs = [(self.bodies[i], self.bodies[j]) for i, j in self.pairs]
+        clearances = [kept_apart(a, b) + (clearance if keeps_clearance(a, b) else 0.0) for a, b in bodies_of_pairs]
+        self.required_gaps = np.array(clearances) + ROUNDING
 
         bounds = np.array([self._bounds(i, base) + self._bounds(j, base) for i, j, base in moving])
-        self.rates, self.bends = bounds.reshape(-1, 2, len(rows) - 1).transpose(1, 0, 2)
+        self.approaches, self.accelerations = bounds.reshape(-1, 2, len(rows) - 1).transpose(1, 0, 2)
 
     def _describe(self, number: int, body: Body) -> range:
         """Add the solids of a body; returns the numbers of its parts."""
-        own = convex_solids(body.geometry).around
+        convex_parts = convex_solids(body.geometry).around
         pose = body.placement.homogeneous
-        parts = tuple(placed_solids(own, np.array([pose] * len(own)))) or (UNKNOWN,)
-        turn = pose[:3, :3]
+        parts = tuple(placed_solids(convex_parts, np.array([pose] * len(convex_parts)))) or (UNKNOWN,)
+        rotation = pose[:3, :3]
         for part in range(-1, len(parts)):
-            self.numbers[number, part] = len(self.solids)
-            self.solids.append(Solid(parts if part < 0 else (parts[part],), turn))
+            self.solid_numbers[number, part] = len(self.solids)
+            self.solids.append(Solid(parts if part < 0 else (parts[part],), rotation))
         return range(len(parts))
 
     def _bounds(self, number: int, base: int) -> Matrix:
-        """Bounds of velocity and acceleration of a body's points, seen from a frame, in each motion [m], two rows."""
+        """Bounds of how fast a body's points move as seen from a frame, and of their acceleration.
+
+        Args:
+            number: Of the body.
+            base: The joint whose frame it is, one that carries the body.
+
+        Returns:
+            Bounds of velocity and acceleration [m] in each motion, that takes time 1, shape (2, k - 1).
+        """
         rates = np.abs(np.diff(self.values, axis=0))
         chain = self.chain
-        body = self.solids[self.numbers[number, -1]]
-        velocity, bend = np.zeros((2, len(rates)))
+        body = self.solids[self.solid_numbers[number, -1]]
+        velocity, acceleration = np.zeros((2, len(rates)))
         joint = self.bodies[number].joint
-        if joint == base or not body.convex:
-            return np.full((2, len(rates)), 0.0 if joint == base else np.inf)
+        if joint == base:
+            return np.zeros((2, len(rates)))
+        if not body.convex:
+            return np.full((2, len(rates)), np.inf)
 
-        far = body.far(lambda points: points)
-        reach = body.far(lambda points: np.cross(points, chain.axis[joint - 1]))
+        distance_to_origin = body.largest_length(lambda points: points)
+        distance_to_axis = body.largest_length(lambda points: np.cross(points, chain.axis[joint - 1]))
 
         while joint != base:  # inwards: a turn adds centripetal and Coriolis terms, a slide adds velocity alone
             k = joint - 1
-            w = rates[:, k]
+            rate = rates[:, k]
             slides = bool(chain.prismatic[k])
-            bend = bend if slides else bend + w * (2.0 * velocity + w * reach)
-            velocity = velocity + w * (1.0 if slides else reach)
+            if slides:
+                velocity = velocity + rate
+            else:
+                acceleration = acceleration + rate * (2.0 * velocity + rate * distance_to_axis)
+                velocity = velocity + rate * distance_to_axis
 
             joint = int(chain.parent[k]) + 1
             origin = chain.placement[k][:3, 3]
-            slide = float(np.abs(self.values[:, k]).max()) if slides else 0.0
-            reach = float(np.linalg.norm(np.cross(origin, chain.axis[joint - 1]))) + slide + far
-            far += float(np.linalg.norm(origin)) + slide
+            stroke = float(np.abs(self.values[:, k]).max()) if slides else 0.0
+            origin_to_axis = float(np.linalg.norm(np.cross(origin, chain.axis[joint - 1])))
+            distance_to_axis = origin_to_axis + stroke + distance_to_origin
+            distance_to_origin += float(np.linalg.norm(origin)) + stroke
 
-        return np.array([velocity, bend])
+        return np.array([velocity, acceleration])
 
     def _frames(self, motion: Numbers, share: Vector) -> Poses:
-        """Frames of all joints, the world first, at shares of motions: shapes (n, joints + 1, 3, 3) and (.., 3)."""
+        """Frames of all joints, the world first, at places of motions.
+
+        Args:
+            motion: Numbers of the motions, shape (n,).
+            share: Of each, from 0 to 1, shape (n,).
+
+        Returns:
+            Rotations, shape (n, joints + 1, 3, 3), and origins, shape (n, joints + 1, 3).
+        """
         chain = self.chain
         begin = self.values[motion]
         values = begin + share[:, None] * (self.values[motion + 1] - begin)
-        turns = np.zeros((len(values), len(chain.parent) + 1, 3, 3))
+        rotations = np.zeros((len(values), len(chain.parent) + 1, 3, 3))
         origins = np.zeros((len(values), len(chain.parent) + 1, 3))
-        turns[:, 0] = np.eye(3)
+        rotations[:, 0] = np.eye(3)
 
         for k, parent in enumerate(chain.parent):
             x, y, z = chain.axis[k]
-            place = chain.placement[k]
+            placement = chain.placement[k]
             slides = bool(chain.prismatic[k])
             cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
             q = values[:, k, None]
-            shift = place[:3, 3] + (q * (place[:3, :3] @ (x, y, z)) if slides else 0.0 * q)
+            shift = placement[:3, 3] + (q * (placement[:3, :3] @ (x, y, z)) if slides else 0.0 * q)
             angle = 0.0 * q[:, :, None] if slides else q[:, :, None]
-            turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
+            rotation = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
 
-            turns[:, k + 1] = turns[:, parent + 1] @ place[:3, :3] @ turn
-            origins[:, k + 1] = origins[:, parent + 1] + _turned(turns[:, parent + 1], shift)
+            rotations[:, k + 1] = rotations[:, parent + 1] @ placement[:3, :3] @ rotation
+            origins[:, k + 1] = origins[:, parent + 1] + _rotated(rotations[:, parent + 1], shift)
 
-        return turns, origins
+        return rotations, origins
 
-    def _ball_gaps(self, one: Numbers, other: Numbers, seen: list[Poses], rests: Mask) -> Vector:
-        """Gaps between the one solid's ball on its chord and the other's ball on its own or, at rest, its box [m]."""
-        first = [self.solids[k] for k in one.tolist()]
-        second = [self.solids[k] for k in other.tolist()]
-        centres = [np.array([s.centre for s in solids]) for solids in (first, first, second, second)]
-        p, q, begin, end = (pose[1] + _turned(pose[0], c) for pose, c in zip(seen, centres, strict=True))
+    def _ball_gaps(
+        self, first_numbers: Numbers, second_numbers: Numbers, poses: list[Poses], second_rests: Mask
+    ) -> Vector:
+        """Gaps between the first solid's ball on its chord and the second's ball on its own or, at rest, its box.
 
-        chord = q - p
-        start = p - begin
+        Args:
+            first_numbers: Numbers of the first solids, shape (n,).
+            second_numbers: Numbers of the second ones, shape (n,).
+            poses: Seen from the pair's frame: the first solid's at begin and end of the interval, then the second's.
+            second_rests: Whether the second one rests in that frame, shape (n,).
+
+        Returns:
+            The gaps [m], shape (n,).
+        """
+        first = [self.solids[k] for k in first_numbers.tolist()]
+        second = [self.solids[k] for k in second_numbers.tolist()]
+        centres = [np.array([s.ball_centre for s in solids]) for solids in (first, first, second, second)]
+        first_begin, first_end, second_begin, second_end = (
+            pose[1] + _rotated(pose[0], c) for pose, c in zip(poses, centres, strict=True)
+        )
+
+        chord = first_end - first_begin
+        start = first_begin - second_begin
         length = partial(np.linalg.norm, axis=1)
         share = np.clip(-(start * chord).sum(axis=1) / np.maximum(1e-30, (chord * chord).sum(axis=1)), 0.0, 1.0)
 
-        moving = length(0.5 * (p + q - begin - end)) - 0.5 * (length(chord) + length(end - begin))
-        balls = np.where(rests, length(start + share[:, None] * chord), moving) - [s.radius for s in second]
+        half_chords = 0.5 * (length(chord) + length(second_end - second_begin))
+        moving = length(0.5 * (first_begin + first_end - second_begin - second_end)) - half_chords
+        balls = np.where(second_rests, length(start + share[:, None] * chord), moving) - [s.ball_radius for s in second]
 
-        back = (seen[2][0] @ np.array([s.axes for s in second])).transpose(0, 2, 1)
-        a, b = (_turned(back, x - seen[2][1]) - [s.middle for s in second] for x in (p, q))
-        half = np.array([s.half for s in second])
-        outside = np.maximum(0.0, np.minimum(a, b) - half) + np.minimum(0.0, np.maximum(a, b) + half)
-        boxes = np.where(rests, length(outside), -np.inf)
+        to_box = (poses[2][0] @ np.array([s.axes for s in second])).transpose(0, 2, 1)
+        begin_in_box, end_in_box = (
+            _rotated(to_box, x - poses[2][1]) - [s.box_centre for s in second] for x in (first_begin, first_end)
+        )
+        half = np.array([s.box_half for s in second])
+        above = np.maximum(0.0, np.minimum(begin_in_box, end_in_box) - half)
+        below = np.minimum(0.0, np.maximum(begin_in_box, end_in_box) + half)
+        boxes = np.where(second_rests, length(above + below), -np.inf)
 
-        return np.asarray(np.maximum(balls, boxes) - [s.radius for s in first])
+        return np.asarray(np.maximum(balls, boxes) - [s.ball_radius for s in first])
 
-    def _plane_gaps(self, one: Numbers, other: Numbers, seen: list[Poses], normals: Matrix) -> Vector:
-        """Gaps of planes that are beside solids at both ends [m]; none where a normal is not of unit length."""
+    def _plane_gaps(
+        self, first_numbers: Numbers, second_numbers: Numbers, poses: list[Poses], normals: Matrix
+    ) -> Vector:
+        """Gaps of planes that are beside solids at both ends [m], shape (n,); -inf for a normal not of unit length.
+
+        Arguments as of :meth:`_ball_gaps`; ``normals``: from the first solid to the second, shape (n, 3).
+        """
         lengths = np.linalg.norm(normals, axis=1)
         heights = []
-        for solids, (turns, origins), sign in zip((one, one, other, other), seen, (-1.0, -1.0, 1.0, 1.0), strict=True):
-            ways = sign * normals / np.maximum(lengths, 0.5)[:, None]
-            own = _turned(turns.transpose(0, 2, 1), ways)
-            height = (origins * ways).sum(axis=1)
+        numbers = (first_numbers, first_numbers, second_numbers, second_numbers)
+        for solids, (rotations, origins), sign in zip(numbers, poses, (-1.0, -1.0, 1.0, 1.0), strict=True):
+            directions = sign * normals / np.maximum(lengths, 0.5)[:, None]
+            local_directions = _rotated(rotations.transpose(0, 2, 1), directions)
+            height = (origins * directions).sum(axis=1)
             for number in np.unique(solids).tolist():
-                height[solids == number] += self.solids[number].highest(own[solids == number])
+                height[solids == number] += self.solids[number].support(local_directions[solids == number])
             heights.append(height)
 
-        return np.where(np.abs(lengths - 1.0) <= UNIT, -np.maximum(*heights[:2]) - np.maximum(*heights[2:]), -np.inf)
+        gaps = -np.maximum(*heights[:2]) - np.maximum(*heights[2:])
+        return np.where(np.abs(lengths - 1.0) <= UNIT, gaps, -np.inf)
 
-    def _open(self, sides: list[Side], normals: Matrix | None = None) -> list[int]:
-        """Which sides are not shown apart, by planes or, where there is none or its normal is 0, by balls and boxes."""
+    def _not_shown_apart(self, entries: list[Entry], normals: Matrix | None = None) -> list[int]:
+        """Numbers of the entries that are not shown apart by planes, or by balls and boxes where no plane is given.
+
+        ``normals``: Of the planes, shape (entries, 3), 0 where an entry has none; None if there are no planes at all.
+        """
         found: list[int] = []
-        for first in range(0, len(sides), AT_ONCE):
-            motion, pair, one, other, begins, widths = map(np.array, zip(*sides[first : first + AT_ONCE], strict=True))
+        for first in range(0, len(entries), AT_ONCE):
+            columns = zip(*entries[first : first + AT_ONCE], strict=True)
+            motion, pair, first_numbers, second_numbers, begins, widths = map(np.array, columns)
 
-            ends = 2.0 * np.concatenate([motion, motion]) + np.concatenate(
-                [begins, begins + widths]
-            )  # motion and share in one number, exactly
-            nodes, where = np.unique(ends, return_inverse=True)
-            turns, origins = self._frames((nodes // 2.0).astype(np.int64), nodes % 2.0)
+            # Motion and share in one number, exactly, so that frames are computed once for each place.
+            shares = np.concatenate([begins, begins + widths])
+            places = 2.0 * np.concatenate([motion, motion]) + shares
+            nodes, where = np.unique(places, return_inverse=True)
+            rotations, origins = self._frames((nodes // 2.0).astype(np.int64), nodes % 2.0)
 
-            seen = list[Poses]()
-            base = self.bases[pair]
-            for solid, node in product((one, other), where.reshape(2, -1)):
-                back = turns[node, base].transpose(0, 2, 1)
-                joint = self.joint_of[solid]
-                seen.append((back @ turns[node, joint], _turned(back, origins[node, joint] - origins[node, base])))
+            poses = list[Poses]()
+            base = self.base_of_pair[pair]
+            for solid, node in product((first_numbers, second_numbers), where.reshape(2, -1)):
+                to_base = rotations[node, base].transpose(0, 2, 1)
+                joint = self.joint_of_solid[solid]
+                origin = _rotated(to_base, origins[node, joint] - origins[node, base])
+                poses.append((to_base @ rotations[node, joint], origin))
 
-            gaps = self._ball_gaps(one, other, seen, self.joint_of[other] == base)
+            gaps = self._ball_gaps(first_numbers, second_numbers, poses, self.joint_of_solid[second_numbers] == base)
             if normals is not None:
-                ways = normals[first : first + AT_ONCE]
-                gaps = np.where(ways.any(axis=1), self._plane_gaps(one, other, seen, ways), gaps)
+                given = normals[first : first + AT_ONCE]
+                gaps = np.where(given.any(axis=1), self._plane_gaps(first_numbers, second_numbers, poses, given), gaps)
 
-            enough = self.margins[pair] + 0.125 * self.bends[pair, motion] * widths**2
-            found += (first + np.flatnonzero(~(gaps > enough))).tolist()
+            sagittas = 0.125 * self.accelerations[pair, motion] * widths**2
+            apart = gaps > self.required_gaps[pair] + sagittas  # False for NaN
+            found += (first + np.flatnonzero(~apart)).tolist()
         return found
 
-    def _measured_apart(self, side: Side) -> bool:
+    def _measured_apart(self, entry: Entry) -> bool:
         """Whether coal finds two whole bodies farther apart in the middle of an interval than they come nearer."""
-        turns, origins = self._frames(np.array([side.motion]), np.array([side.begin + 0.5 * side.width]))
-        frames = np.tile(np.eye(4), (turns.shape[1], 1, 1))
-        frames[:, :3, :3] = turns[0]
+        rotations, origins = self._frames(np.array([entry.motion]), np.array([entry.begin + 0.5 * entry.width]))
+        frames = np.tile(np.eye(4), (rotations.shape[1], 1, 1))
+        frames[:, :3, :3] = rotations[0]
         frames[:, :3, 3] = origins[0]
 
-        both = tuple(self.bodies[k] for k in self.pairs[side.pair])
-        kept = self.margins[side.pair] + DISTANCE_TOLERANCE + 0.5 * side.width * self.rates[side.pair, side.motion]
-        apart = next(measured(both, ((0, 1),), frames, near_only=False)).distance > kept
-        whole = side[:4] == self._all_of(side.motion, side.pair)[:4]
-        return bool(whole and apart and not Containment(both, ((0, 1),)).holds((0, 1), frames))
+        bodies = tuple(self.bodies[k] for k in self.pairs[entry.pair])
+        approach = 0.5 * entry.width * self.approaches[entry.pair, entry.motion]
+        required = self.required_gaps[entry.pair] + DISTANCE_TOLERANCE + approach
+        apart = next(measured(bodies, ((0, 1),), frames, near_only=False)).distance > required
+        whole_bodies = entry.solids_of_motion == self._on_all_of(entry.motion, entry.pair).solids_of_motion
+        return bool(whole_bodies and apart and not Containment(bodies, ((0, 1),)).holds((0, 1), frames))
 
-    def _all_of(self, motion: int, pair: int, a: int = -1, b: int = -1) -> Side:
+    def _on_all_of(self, motion: int, pair: int, a: int = -1, b: int = -1) -> Entry:
+        """Parts ``a`` and ``b`` of a pair, the whole bodies if -1, on all of a motion."""
         i, j = self.pairs[pair]
-        return Side(motion, pair, self.numbers[i, a], self.numbers[j, b], 0.0, 1.0)
+        return Entry(motion, pair, self.solid_numbers[i, a], self.solid_numbers[j, b], 0.0, 1.0)
 
-    def _say(self, side: Side, what: str) -> str:
-        pair = " and ".join(f"'{self.bodies[k].name}'" for k in self.pairs[side.pair])
-        return f"motion {side.motion + 1}: {pair} {what} {side.begin:g} to {side.begin + side.width:g} of it"
+    def _fault_of(self, entry: Entry, what: str) -> str:
+        pair = " and ".join(f"'{self.bodies[k].name}'" for k in self.pairs[entry.pair])
+        return f"motion {entry.motion + 1}: {pair} {what} {entry.begin:g} to {entry.begin + entry.width:g} of it"
 
     def fault(self, motions: tuple[MotionEntries, ...]) -> str:
         """The first thing that entries do not show; "" if they show all pairs apart in all of the motions."""
-        places = {pair: k for k, pair in enumerate(self.pairs)}
-        sides = list[Side]()
+        pair_numbers = {pair: k for k, pair in enumerate(self.pairs)}
+        entries = list[Entry]()
         for number, motion in enumerate(motions):
             for (i, a, j, b), (level, k) in zip(motion.solids.tolist(), motion.intervals.tolist(), strict=True):
-                if (i, j) not in places or not {(i, a), (j, b)} <= self.numbers.keys() or level > DEEPEST:
+                if (i, j) not in pair_numbers or not {(i, a), (j, b)} <= self.solid_numbers.keys() or level > DEEPEST:
                     return f"motion {number + 1}: no parts {a} and {b} of a pair {i} and {j}, or no level {level}"
                 width = 0.5**level
-                sides.append(Side(number, places[i, j], self.numbers[i, a], self.numbers[j, b], k * width, width))
+                solids = self.solid_numbers[i, a], self.solid_numbers[j, b]
+                entries.append(Entry(number, pair_numbers[i, j], *solids, k * width, width))
 
-        covered = {key: list(given) for key, given in groupby(sorted(sides), lambda side: side[:4])}
-        for given in covered.values():
-            if [0.0, *(side.begin + side.width for side in given)] != [*(side.begin for side in given), 1.0]:
-                return self._say(given[0], "have entries with a gap or an overlap, the first of them from")
+        # The entries of two solids in a motion have to cover all of it, one interval behind the other.
+        groups = groupby(sorted(entries), lambda entry: entry.solids_of_motion)
+        covered = {key: list(intervals) for key, intervals in groups}
+        for intervals in covered.values():
+            ends = [entry.begin + entry.width for entry in intervals]
+            if [0.0, *ends] != [*(entry.begin for entry in intervals), 1.0]:
+                return self._fault_of(intervals[0], "have entries with a gap or an overlap, the first of them from")
 
-        for k in self._open(sides, np.concatenate([motion.normals for motion in motions])):
-            if not self._measured_apart(sides[k]):
-                return self._say(sides[k], "are not shown apart from")
+        for k in self._not_shown_apart(entries, np.concatenate([motion.normals for motion in motions])):
+            if not self._measured_apart(entries[k]):
+                return self._fault_of(entries[k], "are not shown apart from")
 
-        every = (self._all_of(*both) for both in product(range(len(motions)), range(len(self.pairs))))
-        whole = [side for side in every if side[:4] not in covered]
-        split = [(whole[k][:2], *self.pairs[whole[k].pair]) for k in self._open(whole)]
-        parts = (self._all_of(*both, *ab) for both, i, j in split for ab in product(self.parts[i], self.parts[j]))
-        rest = [side for side in parts if side[:4] not in covered]
+        # What no entry is about has to be apart by balls and boxes: the whole bodies, or else all parts of them.
+        every_pair = (self._on_all_of(*both) for both in product(range(len(motions)), range(len(self.pairs))))
+        of_bodies = [entry for entry in every_pair if entry.solids_of_motion not in covered]
+        split = [of_bodies[k] for k in self._not_shown_apart(of_bodies)]
+        of_parts = [part for entry in split for part in self._parts_of(entry) if part.solids_of_motion not in covered]
 
-        return next((self._say(rest[k], "are not shown apart from") for k in self._open(rest)), "")
+        open_parts = self._not_shown_apart(of_parts)
+        return self._fault_of(of_parts[open_parts[0]], "are not shown apart from") if open_parts else ""
+
+    def _parts_of(self, entry: Entry) -> list[Entry]:
+        """All parts of one body of a pair with all parts of the other, on all of a motion."""
+        i, j = self.pairs[entry.pair]
+        return [self._on_all_of(entry.motion, entry.pair, a, b) for a, b in product(self.parts[i], self.parts[j])]
 
 
-def _common(chain: Chain, first: int, second: int) -> int:
+def _common_joint(chain: Chain, first: int, second: int) -> int:
     """The last frame that carries both of two frames."""
     while first != second:  # parents have smaller numbers
         first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1

@@ -39,9 +39,9 @@ def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: floa
         >>> rrtik.certificate_of(problem.world, path, path.proof.clearance).save("proof.json")
     """
     require(world, World, "world of a certificate")
-    kept = not_negative(clearance, "clearance")
+    required_clearance = not_negative(clearance, "clearance")
     robot = world.robot
-    given = path.waypoints if isinstance(path, HasWaypoints) else path
-    rows = finite_array(given, (None, None), "path of a certificate")
+    waypoints = path.waypoints if isinstance(path, HasWaypoints) else path
+    rows = finite_array(waypoints, (None, None), "path of a certificate")
     require_joints(robot, getattr(path, "joint_names", unnamed_joints(rows.shape[1])), "path")
-    return world.prover.certificate(rows, kept)
+    return world.prover.certificate(rows, required_clearance)

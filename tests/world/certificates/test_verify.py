@@ -197,7 +197,7 @@ def test_the_verifier_computes_the_frames_that_pinocchio_does_and_bounds_all_acc
     for number, body in enumerate(case.world.bodies):
         if body.joint == 0:
             continue
-        corners = np.concatenate([part.corners for part in motions.solids[motions.numbers[number, -1]].parts])
+        corners = np.concatenate([part.corners for part in motions.solids[motions.solid_numbers[number, -1]].parts])
         points = np.einsum("nij,kj->nki", turns[:, body.joint], corners) + origins[:, body.joint][:, None]
         chords = points[0] + shares[:, None, None] * (points[-1] - points[0])
         velocity, bend = motions._bounds(number, 0)[:, 0]
