@@ -86,7 +86,7 @@ def run_violations(
     scenes: Sequence[Snapshot],
     problem: Problem,
     *,
-    beside: float,
+    clearance: float,
     truth: Scene | Feed | None = None,
 ) -> tuple[RunViolation, ...]:
     """See :meth:`rrtik_ompl.replanning.record.ReplanRun.violations`.
@@ -95,23 +95,23 @@ def run_violations(
         ticks: Of the run.
         scenes: That were seen; none in an old record.
         problem: That was run.
-        beside: What moves that are called proven keep from obstacles beside their margins [m].
+        clearance: What moves that are called proven keep from obstacles beside their margins [m].
         truth: See there.
     """
     if not ticks:
         return ()
 
     snapshots = _snapshots(ticks, scenes, problem.world.scene, truth)
-    margin = float(problem.world.self_margin)
-    found = dict[tuple[int, str, str], RunViolation]()
+    self_margin = float(problem.world.self_margin)
+    worst = dict[tuple[int, str, str], RunViolation]()
 
-    for era in _eras(snapshots, ticks[-1].time):
-        for each in _EraJudge(problem.robot, ticks, era, margin, beside).violations():
-            key = each.tick, each.first, each.second
-            if key not in found or each.distance - each.kept < found[key].distance - found[key].kept:
-                found[key] = each
+    for period in _periods(snapshots, ticks[-1].time):
+        for violation in _PeriodJudge(problem.robot, ticks, period, self_margin, clearance).violations():
+            key = violation.tick, violation.first, violation.second
+            if key not in worst or violation.distance - violation.kept < worst[key].distance - worst[key].kept:
+                worst[key] = violation
 
-    return tuple(sorted(found.values(), key=lambda each: (each.time, each.first, each.second)))
+    return tuple(sorted(worst.values(), key=lambda violation: (violation.time, violation.first, violation.second)))
 
 
 def _snapshots(
@@ -122,230 +122,290 @@ def _snapshots(
         return [Snapshot(0.0, truth.at(0.0), stated=True)]
     if truth is not None:
         times = [tick.time for tick in ticks]
-        looks = np.interp(np.arange(PARTS * (len(times) - 1) + 1) / PARTS, np.arange(len(times)), times)
-        return [Snapshot(time, truth(time)) for time in looks.tolist()]
+        instants = np.interp(np.arange(PARTS * (len(times) - 1) + 1) / PARTS, np.arange(len(times)), times)
+        return [Snapshot(time, truth(time)) for time in instants.tolist()]
     if scenes:
         return scenes
     first = scene.at(0.0)
-    return [Snapshot(tick.time, _placed(first, tick)) for tick in ticks]
+    return [Snapshot(tick.time, _scene_at_tick(first, tick)) for tick in ticks]
 
 
-def _placed(scene: Scene, tick: Tick) -> Scene:
+def _scene_at_tick(scene: Scene, tick: Tick) -> Scene:
     """A scene at a tick, as its poses say."""
     poses = {name: pose(row[:3], row[3:]) for name, row in tick.poses.items()}
-    still = (replace(o, motion=None, pose=poses.get(o.name, o.pose)) for o in scene.obstacles)
-    return replace(scene, obstacles=tuple(still))
+    obstacles = (replace(o, motion=None, pose=poses.get(o.name, o.pose)) for o in scene.obstacles)
+    return replace(scene, obstacles=tuple(obstacles))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Era:
-    """A time in which shapes, margins and allowed pairs stay the same; obstacles state how they move in it."""
+class _Period:
+    """A time of a run in which shapes, margins and allowed pairs stay the same.
+
+    Attributes:
+        begin, end: Of it [s].
+        is_last: Whether the run ends with it.
+        scene: Its obstacles, which state how they move.
+        knots: When one of them turns, in all of the run [s], shape (m,).
+    """
 
     begin: float
     end: float
-    last: bool
+    is_last: bool
     scene: Scene
     knots: Vector
 
 
-def _eras(snapshots: Sequence[Snapshot], end: float) -> Iterator[_Era]:
+def _periods(snapshots: Sequence[Snapshot], end: float) -> Iterator[_Period]:
     """The times of a run in which only poses change."""
-    courses = {o.name: _course(snapshots, o) for o in snapshots[0].scene.obstacles}
-    knots = np.unique([time for course in courses.values() if course is not None for time in _times(course)])
-    begins = [0, *(k for k, (a, b) in enumerate(pairwise(snapshots), start=1) if not _alike(a.scene, b.scene))]
+    motions = {o.name: _motion_of(snapshots, o) for o in snapshots[0].scene.obstacles}
+    knots = np.unique([time for motion in motions.values() if motion is not None for time in _turning_times(motion)])
+    begins = [
+        0,
+        *(k for k, (a, b) in enumerate(pairwise(snapshots), start=1) if not _same_but_for_poses(a.scene, b.scene)),
+    ]
 
-    for first, after in pairwise([*begins, len(snapshots)]):
+    for first, next_first in pairwise([*begins, len(snapshots)]):
         scene = snapshots[first].scene
-        until = snapshots[after].time if after < len(snapshots) else end
-        moving = tuple(replace(o, motion=courses[o.name]) for o in scene.obstacles)
+        end_of_scenes = snapshots[next_first].time if next_first < len(snapshots) else end
+        moving = tuple(replace(o, motion=motions[o.name]) for o in scene.obstacles)
         begin = snapshots[first].time if first else 0.0
-        yield _Era(begin, min(until, end), after == len(snapshots), replace(scene, obstacles=moving), knots)
+        yield _Period(
+            begin, min(end_of_scenes, end), next_first == len(snapshots), replace(scene, obstacles=moving), knots
+        )
 
 
-def _course(snapshots: Sequence[Snapshot], obstacle: Obstacle) -> Motion | None:
+def _motion_of(snapshots: Sequence[Snapshot], obstacle: Obstacle) -> Motion | None:
     """How an obstacle moved: as stated, or straight from where it was seen to where it was seen next."""
     name = obstacle.name
     if snapshots[0].stated:
         return obstacle.motion
 
-    seen = {each.seen_at(name): each.scene.obstacle(name).pose for each in snapshots}
-    times = sorted(seen)
-    places = [seen[time] for time in times]
-    if all(np.array_equal(place.homogeneous, places[0].homogeneous) for place in places):
-        return TimedPoses(times[:1], places[:1])
-    return TimedPoses(times, places)
+    pose_of_time = {each.seen_at(name): each.scene.obstacle(name).pose for each in snapshots}
+    times = sorted(pose_of_time)
+    poses = [pose_of_time[time] for time in times]
+    if all(np.array_equal(pose.homogeneous, poses[0].homogeneous) for pose in poses):
+        return TimedPoses(times[:1], poses[:1])
+    return TimedPoses(times, poses)
 
 
-def _times(motion: Motion) -> Vector:
+def _turning_times(motion: Motion) -> Vector:
     """When a motion turns [s]."""
     return motion.times if isinstance(motion, TimedPoses) else np.zeros(1)
 
 
-def _alike(first: Scene, second: Scene) -> bool:
+def _same_but_for_poses(first: Scene, second: Scene) -> bool:
     """Whether two scenes differ in poses alone."""
     if first is second:
         return True
-    matched = ((each, second.obstacle(each.name)) for each in first.obstacles)
-    same = all(same_shape(a.shape, b.shape) and a.margin == b.margin for a, b in matched)
-    return same and pairs_that_may_touch(first) == pairs_that_may_touch(second)
+    pairs = ((each, second.obstacle(each.name)) for each in first.obstacles)
+    same_solids = all(same_shape(a.shape, b.shape) and a.margin == b.margin for a, b in pairs)
+    return same_solids and pairs_that_may_touch(first) == pairs_that_may_touch(second)
 
 
-class _EraJudge:
-    """Says what touches in an era of a run."""
+class _PeriodJudge:
+    """Says what touches in a period of a run.
 
-    def __init__(self, robot: Robot, ticks: Sequence[Tick], era: _Era, self_margin: float, beside: float) -> None:
+    Args:
+        robot: That moved.
+        ticks: Of the whole run.
+        period: Of the run.
+        self_margin: What links, and what they hold, keep from each other [m].
+        clearance: What moves that are called proven keep from obstacles beside their margins [m].
+    """
+
+    def __init__(
+        self, robot: Robot, ticks: Sequence[Tick], period: _Period, self_margin: float, clearance: float
+    ) -> None:
         self._robot = robot
         self._ticks = ticks
-        self._era = era
+        self._period = period
 
-        scene = era.scene
+        scene = period.scene
         bodies = (*link_bodies(robot, self_margin), *scene_bodies(robot, scene, self_margin))
         self._bodies = in_contact(robot, scene, bodies)
         self._pairs: Pairs = colliding_pairs(robot, scene, self._bodies)
-        self._approach = approach_weights(robot, self._bodies, self._pairs)
-        self._sides: NDArray[np.int64] = np.array(self._pairs, dtype=np.int64).reshape(-1, 2)
+        self._approach_weights = approach_weights(robot, self._bodies, self._pairs)
+        self._pair_indices: NDArray[np.int64] = np.array(self._pairs, dtype=np.int64).reshape(-1, 2)
 
         self._obstacles = {o.name: o for o in scene.obstacles}
-        own = {name: o.pose.inverse() for name, o in self._obstacles.items()}
-        self._within = [  # where each solid is in its joint's frame, or in that of its obstacle
-            (own[body.name] * body.placement if body.kind == "obstacle" else body.placement).homogeneous
+        from_world = {name: o.pose.inverse() for name, o in self._obstacles.items()}
+        # Where each solid is in the frame of its joint, or in that of its obstacle.
+        self._local_poses = [
+            (from_world[body.name] * body.placement if body.kind == "obstacle" else body.placement).homogeneous
             for body in self._bodies
         ]
 
-        self._names = list(self._obstacles)
-        places = {name: k for k, name in enumerate(self._names)}
-        self._carrier = np.array([places[b.name] if b.kind == "obstacle" else -1 for b in self._bodies])
+        self._obstacle_names = list(self._obstacles)
+        index_of_obstacle = {name: k for k, name in enumerate(self._obstacle_names)}
+        # Index of the obstacle that each body is a part of; -1 for bodies of the arm.
+        self._obstacle_of_body = np.array(
+            [index_of_obstacle[b.name] if b.kind == "obstacle" else -1 for b in self._bodies]
+        )
 
-        self._radii = np.array([farthest(o.shape, pin.SE3.Identity()) for o in self._obstacles.values()])
-        self._balls = np.array([_ball(body) for body in self._bodies]).reshape(-1, 4)
+        self._obstacle_radii = np.array([farthest(o.shape, pin.SE3.Identity()) for o in self._obstacles.values()])
+        self._bounding_balls = np.array([_bounding_ball(body) for body in self._bodies]).reshape(-1, 4)
 
-        sides = [(self._bodies[i], self._bodies[j]) for i, j in self._pairs]
-        self._least = np.array([min(contact_distance(*pair) or 0.0, 0.0) for pair in sides])
-        self._kept = np.array([kept_apart(*pair) + (beside if _promised(*pair) else 0.0) for pair in sides])
+        bodies_of_pairs = [(self._bodies[i], self._bodies[j]) for i, j in self._pairs]
+        # What each pair keeps [m]: in moves that are not proven, where it must only not touch, and in proven ones.
+        self._contact_distances = np.array([min(contact_distance(*pair) or 0.0, 0.0) for pair in bodies_of_pairs])
+        self._required_distances = np.array(
+            [kept_apart(*pair) + (clearance if _clearance_applies(*pair) else 0.0) for pair in bodies_of_pairs]
+        )
 
     def violations(self) -> Iterator[RunViolation]:
         """Who is too near to whom, tick after tick; a pair may come several times in a tick."""
         ticks = self._ticks
-        era = self._era
+        period = self._period
         if len(self._pairs) == 0:
             return
 
         for number, tick in enumerate(ticks):
-            stands = number + 1 == len(ticks)  # the last one is a moment
-            end = tick.time if stands else ticks[number + 1].time
-            begin = max(tick.time, era.begin)
-            last = min(end, era.end)
-            if begin >= last and not (stands and era.last):
+            is_last_tick = number + 1 == len(ticks)  # the last one is a moment
+            end = tick.time if is_last_tick else ticks[number + 1].time
+            begin = max(tick.time, period.begin)
+            until = min(end, period.end)
+            if begin >= until and not (is_last_tick and period.is_last):
                 continue
 
-            inside = era.knots[(era.knots > begin) & (era.knots < last)]
-            times = [begin, *inside.tolist(), last]
+            turns = period.knots[(period.knots > begin) & (period.knots < until)]
+            times = [begin, *turns.tolist(), until]
             for a, b in pairwise(times):
-                yield from self._between(number, a, b)
+                yield from self._violations_between(number, a, b)
 
-    def _between(self, number: int, begin: float, end: float) -> Iterator[RunViolation]:
+    def _violations_between(self, number: int, begin: float, end: float) -> Iterator[RunViolation]:
         """What is too near in a part of a tick in which all moves straight."""
-        kept = self._kept if self._ticks[number].proven else self._least
-        most = self._most_approach(number, begin, end)
+        required = self._required_distances if self._ticks[number].proven else self._contact_distances
+        approaches = self._approach_bounds(number, begin, end)
 
-        placed = self._placed(number, 0.5 * (begin + end))
-        centres = np.einsum("kij,kj->ki", placed[:, :3, :3], self._balls[:, :3]) + placed[:, :3, 3]
-        first, second = self._sides.T
-        gaps = np.linalg.norm(centres[first] - centres[second], axis=1) - self._balls[first, 3] - self._balls[second, 3]
-        near = ~(gaps > kept + 0.5 * most)  # NaN, of what has no end, is near
+        poses = self._body_poses(number, 0.5 * (begin + end))
+        centres = np.einsum("kij,kj->ki", poses[:, :3, :3], self._bounding_balls[:, :3]) + poses[:, :3, 3]
+        first, second = self._pair_indices.T
+        gaps = (
+            np.linalg.norm(centres[first] - centres[second], axis=1)
+            - self._bounding_balls[first, 3]
+            - self._bounding_balls[second, 3]
+        )
+        is_near = ~(gaps > required + 0.5 * approaches)  # NaN, of what has no end, is near
 
-        for pair in np.flatnonzero(near).tolist():
-            found = self._worst(number, pair, begin, end, float(kept[pair]), float(most[pair]))
-            if found is not None:
-                time, apart = found
-                one, other = (self._bodies[k].name for k in self._pairs[pair])
+        for pair in np.flatnonzero(is_near).tolist():
+            nearest = self._nearest_time(number, pair, begin, end, float(required[pair]), float(approaches[pair]))
+            if nearest is not None:
+                time, gap = nearest
+                first_name, second_name = (self._bodies[k].name for k in self._pairs[pair])
                 tick = self._ticks[number]
-                yield RunViolation(time, number, tick.event, one, other, apart, float(kept[pair]), bool(tick.proven))
+                yield RunViolation(
+                    time, number, tick.event, first_name, second_name, gap, float(required[pair]), bool(tick.proven)
+                )
 
-    def _worst(
-        self, number: int, pair: int, begin: float, end: float, kept: float, most: float
+    def _nearest_time(
+        self, number: int, pair: int, begin: float, end: float, required: float, approach: float
     ) -> tuple[float, float] | None:
-        """When a pair is nearest of the times that are looked at, and how near [m]; None if it keeps enough."""
+        """Look for the time at which a pair lacks most in a part of a tick, by bisection.
+
+        Args:
+            number: Of the tick.
+            pair: Number of the pair.
+            begin: Of the part [s].
+            end: Of the part [s].
+            required: What the pair has to keep [m]; negative where it may overlap.
+            approach: How much nearer it can come in the part at most [m].
+
+        Returns:
+            The time at which the pair is nearest, of those that are looked at [s], and its signed distance then [m];
+            None if it keeps what it has to.
+        """
         middle = 0.5 * (begin + end)
-        room = kept + 0.5 * most if most > FINEST else kept
-        ends = self._ends(number, pair, middle)
-        if distance(*ends, margin=_less_rounding(room)) is not None:
+        sufficient = required  # to be kept in the middle, so that enough is kept in all of the part
+        if approach > FINEST:
+            sufficient += 0.5 * approach
+        solids = self._solids_of_pair(number, pair, middle)
+        if distance(*solids, margin=_less_rounding(sufficient)) is not None:
             return None
 
-        here = _signed(*ends)
-        lacking = here <= _less_rounding(kept) or (kept < 0.0 and distance(*ends, margin=_less_rounding(kept)) is None)
-        if most <= FINEST and not lacking:
+        middle_distance = _signed_distance(*solids)
+        lacking = middle_distance <= _less_rounding(required)
+        if not lacking and required < 0.0:  # of solids that may overlap the depth may not be known
+            lacking = distance(*solids, margin=_less_rounding(required)) is None
+        if approach <= FINEST and not lacking:
             return None
 
-        if lacking and most <= max(COARSEST, RELATIVE * (kept - here)):
-            looks = [(time, _signed(*self._ends(number, pair, time))) for time in (begin, end)]
-            return min((middle, here), *looks, key=lambda each: each[1])
+        if lacking and approach <= max(COARSEST, RELATIVE * (required - middle_distance)):
+            ends = [(time, _signed_distance(*self._solids_of_pair(number, pair, time))) for time in (begin, end)]
+            return min((middle, middle_distance), *ends, key=lambda candidate: candidate[1])
 
-        halves = ((begin, middle), (middle, end))
-        found = [each for a, b in halves if (each := self._worst(number, pair, a, b, kept, 0.5 * most)) is not None]
+        candidates: list[tuple[float, float]] = []
+        for a, b in ((begin, middle), (middle, end)):
+            nearest = self._nearest_time(number, pair, a, b, required, 0.5 * approach)
+            if nearest is not None:
+                candidates.append(nearest)
         if lacking:
-            found.append((middle, here))
-        return min(found, key=lambda each: each[1], default=None)
+            candidates.append((middle, middle_distance))
+        return min(candidates, key=lambda candidate: candidate[1], default=None)
 
-    def _most_approach(self, number: int, begin: float, end: float) -> Vector:
+    def _approach_bounds(self, number: int, begin: float, end: float) -> Vector:
         """How much nearer each pair can come in a part of a tick [m]."""
-        change = np.abs(self._q(number, end) - self._q(number, begin))
-        ways = [
-            _way(self._pose(name, begin), self._pose(name, end), radius)
-            for name, radius in zip(self._names, self._radii.tolist(), strict=True)
+        change = np.abs(self._configuration(number, end) - self._configuration(number, begin))
+        travels = [
+            _travel_bound(self._obstacle_pose(name, begin), self._obstacle_pose(name, end), radius)
+            for name, radius in zip(self._obstacle_names, self._obstacle_radii.tolist(), strict=True)
         ]
-        of_bodies = np.array([0.0, *ways])[self._carrier + 1]
-        return np.asarray(self._approach @ change + of_bodies[self._sides].sum(axis=1))
+        travel_of_body = np.array([0.0, *travels])[self._obstacle_of_body + 1]
+        return np.asarray(self._approach_weights @ change + travel_of_body[self._pair_indices].sum(axis=1))
 
-    def _placed(self, number: int, time: float) -> Frames:
+    def _body_poses(self, number: int, time: float) -> Frames:
         """Where all bodies are, shape (bodies, 4, 4)."""
-        frames = self._robot.joint_frames(self._q(number, time)[None])[0]
-        places = [self._pose(name, time).homogeneous for name in self._names]
+        joint_frames = self._robot.joint_frames(self._configuration(number, time)[None])[0]
+        obstacle_poses = [self._obstacle_pose(name, time).homogeneous for name in self._obstacle_names]
         return np.array(
             [
-                (frames[body.joint] if carrier < 0 else places[carrier]) @ within
-                for body, carrier, within in zip(self._bodies, self._carrier, self._within, strict=True)
+                (joint_frames[body.joint] if obstacle < 0 else obstacle_poses[obstacle]) @ local_pose
+                for body, obstacle, local_pose in zip(
+                    self._bodies, self._obstacle_of_body, self._local_poses, strict=True
+                )
             ]
         )
 
-    def _ends(
+    def _solids_of_pair(
         self, number: int, pair: int, time: float
     ) -> tuple[coal.CollisionGeometry, Matrix, coal.CollisionGeometry, Matrix]:
         """The two solids of a pair, and where they are."""
-        frames = self._robot.joint_frames(self._q(number, time)[None])[0]
+        joint_frames = self._robot.joint_frames(self._configuration(number, time)[None])[0]
         first, second = self._pairs[pair]
         poses = []
-        for k in (first, second):
-            carrier = self._carrier[k]
-            base = frames[self._bodies[k].joint] if carrier < 0 else self._pose(self._names[carrier], time).homogeneous
-            poses.append(base @ self._within[k])
+        for body in (first, second):
+            obstacle = self._obstacle_of_body[body]
+            if obstacle < 0:
+                carrier_pose = joint_frames[self._bodies[body].joint]
+            else:
+                carrier_pose = self._obstacle_pose(self._obstacle_names[obstacle], time).homogeneous
+            poses.append(carrier_pose @ self._local_poses[body])
         return self._bodies[first].geometry, poses[0], self._bodies[second].geometry, poses[1]
 
-    def _q(self, number: int, time: float) -> Vector:
-        """The arm in a tick."""
+    def _configuration(self, number: int, time: float) -> Vector:
+        """The arm at a time of a tick, on the straight line to the next one; shape (dof,)."""
         ticks = self._ticks
-        here = ticks[number]
+        tick = ticks[number]
         if number + 1 == len(ticks):
-            return here.q
-        after = ticks[number + 1]
-        return here.q + (time - here.time) / (after.time - here.time) * (after.q - here.q)
+            return tick.q
+        next_tick = ticks[number + 1]
+        return tick.q + (time - tick.time) / (next_tick.time - tick.time) * (next_tick.q - tick.q)
 
-    def _pose(self, name: str, time: float) -> pin.SE3:
+    def _obstacle_pose(self, name: str, time: float) -> pin.SE3:
         obstacle = self._obstacles[name]
         return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
 
 
-def _promised(first: Body, second: Body) -> bool:
+def _clearance_applies(first: Body, second: Body) -> bool:
     """Whether margin and clearance of a run are promised between two bodies: an obstacle and what moves."""
     return keeps_clearance(first, second) and max(first.joint, second.joint) > 0
 
 
-def _less_rounding(kept: float) -> float:
+def _less_rounding(required: float) -> float:
     """What must be kept, rounding allowed for [m]; what must not touch must not touch."""
-    return kept - ROUNDING if kept < 0.0 else max(kept - ROUNDING, 0.0)
+    return required - ROUNDING if required < 0.0 else max(required - ROUNDING, 0.0)
 
 
-def _ball(body: Body) -> tuple[float, float, float, float]:
+def _bounding_ball(body: Body) -> tuple[float, float, float, float]:
     """Centre and radius of a ball around a solid, in its own frame."""
     if isinstance(body.geometry, coal.Halfspace):
         return 0.0, 0.0, 0.0, float("inf")
@@ -353,21 +413,21 @@ def _ball(body: Body) -> tuple[float, float, float, float]:
     return x, y, z, float(body.geometry.aabb_radius)
 
 
-def _way(a: pin.SE3, b: pin.SE3, radius: float) -> float:
+def _travel_bound(a: pin.SE3, b: pin.SE3, radius: float) -> float:
     """How far a point of an obstacle goes at most from one pose to another [m]."""
     angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
-    turned = radius * angle if angle > ROTATION_NOISE else 0.0
-    return float(np.linalg.norm(b.translation - a.translation)) + turned
+    arc = radius * angle if angle > ROTATION_NOISE else 0.0
+    return float(np.linalg.norm(b.translation - a.translation)) + arc
 
 
-def _signed(
+def _signed_distance(
     first: coal.CollisionGeometry, first_pose: Matrix, second: coal.CollisionGeometry, second_pose: Matrix
 ) -> float:
     """The distance of two solids [m], below 0 how deep they overlap; 0 where that is not known."""
     transforms = [coal.Transform3s(place[:3, :3], place[:3, 3]) for place in (first_pose, second_pose)]
-    ends = (first, transforms[0], second, transforms[1])
-    if is_ours(ends):
-        return float(own_nearest(ends).distance)
-    if not coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()):
-        return max(float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult())), ROUNDING)
-    return min(float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult())), 0.0)
+    solids = (first, transforms[0], second, transforms[1])
+    if is_ours(solids):
+        return float(own_nearest(solids).distance)
+    if not coal.collide(*solids, coal.CollisionRequest(), coal.CollisionResult()):
+        return max(float(coal.distance(*solids, coal.DistanceRequest(), coal.DistanceResult())), ROUNDING)
+    return min(float(coal.distance(*solids, coal.DistanceRequest(), coal.DistanceResult())), 0.0)

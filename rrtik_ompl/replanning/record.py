@@ -119,8 +119,8 @@ class ReplanRun:
             raise InputError(f"{named}; give the problem that was run")
         if truth is None and self.ticks and self.scenes_end <= self.ticks[-1].time:
             raise InputError(f"run: its clouds were too large to be kept after {self.scenes_end:g} s; give the truth")
-        beside = self.margin + (self.clearance or 0.0)
-        return run_violations(self.ticks, self.scenes, problem, beside=beside, truth=truth)
+        clearance = self.margin + (self.clearance or 0.0)
+        return run_violations(self.ticks, self.scenes, problem, clearance=clearance, truth=truth)
 
     def judged(self, problem: Problem | None) -> Judged:
         """What is said of the run where it is replayed: what its record calls proven, and :meth:`violations`.
