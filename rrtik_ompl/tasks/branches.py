@@ -21,7 +21,7 @@ from rrtik_ompl.planning.tip_motion.following import follow
 from rrtik_ompl.planning.tip_motion.freedom import centred
 from rrtik_ompl.planning.tip_motion.rails import straight_rail
 from rrtik_ompl.planning.tip_motion.values import Tolerance
-from rrtik_ompl.tasks.contact_life import MotionContact, lived, parted
+from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts, parted
 from rrtik_ompl.tasks.finger_motion import finger_motion
 from rrtik_ompl.tasks.handling import arriving_at, handled, left_where, may_touch
 from rrtik_ompl.tasks.program import Step, options_of
@@ -136,13 +136,13 @@ class Expander:
                 for number, row in enumerate(options_of(step)):
                     yield from self.after(replace(branch, rest=(*row, *rest), chosen=(*branch.chosen, number)))
             elif isinstance(stage, MoveTo):
-                yield from self._aims(branch, step, stage)
+                yield from self._after_move(branch, step, stage)
             elif isinstance(stage, Straight):
-                yield from self._line(branch, step, stage)
+                yield from self._after_line(branch, step, stage)
             elif isinstance(stage, Gripper):
-                yield from self._fingers(branch, step, stage)
+                yield from self._after_gripper(branch, step, stage)
             else:
-                yield _next(branch, step, branch.after.after(stage, branch.q), branch.q)
+                yield _following_branch(branch, step, branch.after.after(stage, branch.q), branch.q)
         except (ProblemError, InputError) as error:
             self.failures.append((branch, step, str(error)))
 
@@ -151,7 +151,7 @@ class Expander:
         for choices in self.choices:
             if not choices.search.exhausted:
                 choices.search.more()
-                yield from self._drawn(choices)
+                yield from self._branches_of_choices(choices)
 
     def ends(self, branch: Branch) -> bool:
         """Whether a branch with nothing left to do may end; the reason why not is noted."""
@@ -159,20 +159,22 @@ class Expander:
             return True
         touching = branch.after.world.explain(branch.q)
         if touching:
-            why = f"contact after it: {touching}; attach the object, open the gripper, or allow the pair"
-            self.failures.append((branch.before, branch.step, why))
+            reason = f"contact after it: {touching}; attach the object, open the gripper, or allow the pair"
+            self.failures.append((branch.before, branch.step, reason))
         return not touching
 
-    def _fingers(self, branch: Branch, step: Step, stage: Gripper) -> Iterator[Branch]:
+    def _after_gripper(self, branch: Branch, step: Step, stage: Gripper) -> Iterator[Branch]:
+        """The branch after fingers have moved; none, and the fault noted, if something is in their way."""
         setting = branch.after.after(stage, branch.q)
-        taken = [thing.name for thing in handled(branch.rest[1:], setting.robot) if thing.by is not None]
-        moved = finger_motion(branch.after, setting, branch.q, taken)
-        if moved.fault:
-            self.failures.append((branch, step, moved.fault))
+        things_taken = [thing.name for thing in handled(branch.rest[1:], setting.robot) if thing.by is not None]
+        motion = finger_motion(branch.after, setting, branch.q, things_taken)
+        if motion.fault:
+            self.failures.append((branch, step, motion.fault))
             return
-        yield replace(_next(branch, step, setting, branch.q), note=moved.note)
+        yield replace(_following_branch(branch, step, setting, branch.q), note=motion.note)
 
-    def _aims(self, branch: Branch, step: Step, stage: MoveTo) -> Iterator[Branch]:
+    def _after_move(self, branch: Branch, step: Step, stage: MoveTo) -> Iterator[Branch]:
+        """A branch for each configuration of a goal, in contact there only if nothing else is possible."""
         try:
             choices = self._choices(branch, branch.after, stage)
             reason = choices.search.reason
@@ -191,7 +193,7 @@ class Expander:
         if choices is not None:
             if choices.more:
                 self.choices.append(choices)
-            yield from self._drawn(choices)
+            yield from self._branches_of_choices(choices)
 
     def _choices(self, branch: Branch, setting: Setting, stage: MoveTo) -> Choices:
         problem = Problem(setting.world, branch.q, stage.goal, constraints=stage.constraints)
@@ -199,48 +201,52 @@ class Expander:
         search.first()
         return Choices(branch, search, setting is not branch.after, problem.goal.q is None)
 
-    def _drawn(self, choices: Choices) -> Iterator[Branch]:
+    def _branches_of_choices(self, choices: Choices) -> Iterator[Branch]:
+        """A branch for each configuration of a goal that has not become one yet."""
         branch = choices.branch
         rows = choices.search.rows
         for q in rows[choices.used :]:
             arriving = self._arriving(branch, q) if choices.arrives or branch.after.scene.contacts else ()
             setting = branch.after.arriving(arriving)
             lasting = tuple(each for each in branch.after.scene.contacts if not parted(setting.world, q, each))
-            yield _next(branch, branch.rest[0], setting, q, left=setting.left_with(lasting), arriving=arriving)
+            left = setting.left_with(lasting)
+            yield _following_branch(branch, branch.rest[0], setting, q, left=left, arriving=arriving)
         choices.used = len(rows)
 
     def _arriving(self, branch: Branch, q: Vector) -> tuple[Touching, ...]:
         """The contacts of what is taken or set down at a configuration, shape (dof,), to which a motion leads."""
         return arriving_at(branch.after.world, branch.rest[1:], q)
 
-    def _line(self, branch: Branch, step: Step, stage: Straight) -> Iterator[Branch]:
+    def _after_line(self, branch: Branch, step: Step, stage: Straight) -> Iterator[Branch]:
+        """The branch at the end of a straight line of the tip; none, and the reason noted, if it is not reached."""
         world = branch.after.world
         if touching := world.explain(branch.q):
             self.failures.append((branch, step, f"it cannot begin: {touching}; move it or allow the pair"))
             return
 
-        way = _way(branch, stage, self.seed)
-        if way.leads_nowhere(world.robot):
-            still = JointPath.of(world.robot, branch.q[None]).proved(world)
-            yield _next(branch, step, branch.after, branch.q, still)
+        line = _line_of(branch, stage, self.seed)
+        if line.leads_nowhere(world.robot):
+            path_at_rest = JointPath.of(world.robot, branch.q[None]).proved(world)
+            yield _following_branch(branch, step, branch.after, branch.q, path_at_rest)
             return
 
-        setting, arriving, made, reason = self._along(branch, way)
-        if made.fraction < WHOLE:
-            self.failures.append((branch, step, f"ends at {100.0 * made.fraction:.3g} %: {reason}"))
+        setting, arriving, attempted, reason = self._follow_line(branch, line)
+        if attempted.fraction < WHOLE:
+            self.failures.append((branch, step, f"ends at {100.0 * attempted.fraction:.3g} %: {reason}"))
             return
 
-        path = path_of(setting.world, made)
+        path = path_of(setting.world, attempted)
         assert path is not None, "it has come to its end"
-        done = lived(path, setting.world, setting.named, arriving)
-        if done.fault:
-            self.failures.append((branch, step, done.fault))
+        followed = follow_contacts(path, setting.world, setting.named, arriving)
+        if followed.fault:
+            self.failures.append((branch, step, followed.fault))
             return
 
-        left = setting.left_with(done.lasting)
-        yield _next(branch, step, setting, path.end, done.path, left=left, contacts=done.contacts)
+        setting_left = setting.left_with(followed.lasting)
+        contacts = followed.contacts
+        yield _following_branch(branch, step, setting, path.end, followed.path, left=setting_left, contacts=contacts)
 
-    def _along(self, branch: Branch, way: Way) -> tuple[Setting, tuple[Touching, ...], Attempt, str]:
+    def _follow_line(self, branch: Branch, line: Way) -> tuple[Setting, tuple[Touching, ...], Attempt, str]:
         """Follow a line, in contact at its end only if nothing else is possible.
 
         Returns:
@@ -249,49 +255,49 @@ class Expander:
         setting = branch.after
         steps = branch.rest[1:]
         world = setting.world
-        made = self._followed(branch, way, world)
+        attempted = self._attempt(branch, line, world)
 
         if not handled(steps, world.robot):
-            return setting, (), made, made.reason
-        if made.fraction == WHOLE:
-            arriving = self._arriving(branch, made.rows[-1]) if setting.scene.contacts else ()
-            return setting.arriving(arriving), arriving, made, made.reason
+            return setting, (), attempted, attempted.reason
+        if attempted.fraction == WHOLE:
+            arriving = self._arriving(branch, attempted.rows[-1]) if setting.scene.contacts else ()
+            return setting.arriving(arriving), arriving, attempted, attempted.reason
 
-        unchecked = follow(world.robot, way.rails[0], branch.q, way.tolerance, centred(world.robot))
+        unchecked = follow(world.robot, line.rails[0], branch.q, line.tolerance, centred(world.robot))
         if not unchecked.complete:
-            return setting, (), made, made.reason
-        if deep := left_where(world, steps, unchecked.rows[-1]):
-            return setting, (), made, deep
+            return setting, (), attempted, attempted.reason
+        if too_deep := left_where(world, steps, unchecked.rows[-1]):
+            return setting, (), attempted, too_deep
 
         arriving = self._arriving(branch, unchecked.rows[-1])
         if arriving:
             setting = setting.arriving(arriving)
-            made = self._followed(branch, way, setting.world)
-        return setting, arriving, made, made.reason
+            attempted = self._attempt(branch, line, setting.world)
+        return setting, arriving, attempted, attempted.reason
 
-    def _followed(self, branch: Branch, way: Way, world: World) -> Attempt:
+    def _attempt(self, branch: Branch, line: Way, world: World) -> Attempt:
         if branch.effort >= THOROUGH:
-            return farthest(world, way, branch.q[None])
-        return attempt(world, way, branch.q, centred(world.robot))
+            return farthest(world, line, branch.q[None])
+        return attempt(world, line, branch.q, centred(world.robot))
 
 
-def way_of(robot: Robot, a: Vector, b: Vector) -> float:
+def weighted_length(robot: Robot, a: Vector, b: Vector) -> float:
     """Of the joints from one configuration to another, weighted [rad, metres counted alike]."""
     return float(np.linalg.norm(weighted_difference(robot, b, a)))
 
 
-def _way(branch: Branch, stage: Straight, seed: int) -> Way:
+def _line_of(branch: Branch, stage: Straight, seed: int) -> Way:
     """Of the tip on a straight line that begins where a branch has come to."""
     tip = branch.after.robot.fk(branch.q)
     return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, None, seed)
 
 
-def again(branch: Branch, effort: int) -> Branch:
+def with_effort(branch: Branch, effort: int) -> Branch:
     """The same branch, to be tried with more effort."""
     return replace(branch, effort=effort)
 
 
-def _next(
+def _following_branch(
     branch: Branch,
     step: Step,
     setting: Setting,
@@ -303,7 +309,7 @@ def _next(
     contacts: tuple[MotionContact, ...] = (),
 ) -> Branch:
     rows = [branch.q, q] if path is None else path.waypoints
-    cost = branch.cost + sum(way_of(setting.robot, a, b) for a, b in pairwise(rows))
+    cost = branch.cost + sum(weighted_length(setting.robot, a, b) for a, b in pairwise(rows))
 
     return Branch(
         setting,

@@ -115,26 +115,28 @@ def left_inside(near: Nearness) -> str:
 
 def with_contacts(scene: Scene, contacts: Iterable[Touching]) -> Scene:
     """A scene with further contacts; of a pair that has one already the new one counts, of two new ones the last."""
-    new = {contact.pair: contact for contact in contacts}
-    return replace(scene, contacts=(*(old for old in scene.contacts if old.pair not in new), *new.values()))
+    contact_of_pair = {contact.pair: contact for contact in contacts}
+    unchanged = tuple(old for old in scene.contacts if old.pair not in contact_of_pair)
+    return replace(scene, contacts=(*unchanged, *contact_of_pair.values()))
 
 
 def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
     """What touches or overlaps a thing at q, shape (dof,), the deepest first, of the pairs that are checked."""
     bodies = world.bodies
     frames = world.robot.joint_frames(q[None])[0]
-    found: dict[tuple[str, str], Nearness] = {}
+    nearest_of_pair: dict[tuple[str, str], Nearness] = {}
 
     for i, j in world.pairs:
         first = bodies[i]
         second = bodies[j]
         if name in (first.name, second.name):
-            away = signed_distance(world.robot, (first, second), q, frames)
+            gap = signed_distance(world.robot, (first, second), q, frames)
             other = second.name if first.name == name else first.name
-            if away <= NEAR and ((name, other) not in found or away < found[name, other].distance):
-                found[name, other] = Nearness(name, other, away, deepest_contact(bodies, name, other))
+            is_nearest = (name, other) not in nearest_of_pair or gap < nearest_of_pair[name, other].distance
+            if gap <= NEAR and is_nearest:
+                nearest_of_pair[name, other] = Nearness(name, other, gap, deepest_contact(bodies, name, other))
 
-    return sorted(found.values(), key=lambda near: near.distance)
+    return sorted(nearest_of_pair.values(), key=lambda near: near.distance)
 
 
 def signed_distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Matrix) -> float:
@@ -154,8 +156,8 @@ def signed_distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Ma
 def _depth_of_pieces(robot: Robot, pair: tuple[Body, Body], q: Vector) -> float:
     """How deep convex pieces of two bodies overlap at q [m], as proofs see it; endless if it is more than a metre."""
     others = zip(pair, pair[::-1], strict=True)
-    bare = [replace(one, margin=0.0, padding=0.0, contacts=((other.name, 0.0),)) for one, other in others]
-    prover = Prover(robot, bare, ((0, 1),))
+    bodies = [replace(one, margin=0.0, padding=0.0, contacts=((other.name, 0.0),)) for one, other in others]
+    prover = Prover(robot, bodies, ((0, 1),))
 
     low = 0.0
     high = DEEPEST
@@ -166,13 +168,13 @@ def _depth_of_pieces(robot: Robot, pair: tuple[Body, Body], q: Vector) -> float:
 
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        apart = prover.route(q[None], slack=-middle).proven
-        low, high = (low, middle) if apart else (middle, high)
+        is_proven = prover.route(q[None], slack=-middle).proven
+        low, high = (low, middle) if is_proven else (middle, high)
     return high
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lived:
+class FollowedContacts:
     """A motion and its contacts, once it is known where they end.
 
     Attributes:
@@ -190,80 +192,97 @@ class Lived:
     world: World | None = None
 
 
-def lived(path: JointPath, world: World, named: frozenset[frozenset[str]], arriving: Iterable[Touching] = ()) -> Lived:
-    """See where the contacts of a motion end, and that what has parted stays apart.
+def follow_contacts(
+    path: JointPath,
+    world: World,
+    grasp_pairs: frozenset[frozenset[str]],
+    contacts_at_end: Iterable[Touching] = (),
+) -> FollowedContacts:
+    """Find where the contacts of a motion end, and check that what has parted stays apart.
 
     Args:
         path: The motion.
         world: Its world, with all contacts.
-        named: Pairs that somebody allowed for a grasp: when they have parted, they may touch again.
-        arriving: Contacts of what is taken or set down at its end.
+        grasp_pairs: Pairs that somebody allowed for a grasp: when they have parted, they may touch again.
+        contacts_at_end: Contacts of what is taken or set down at its end.
     """
-    at_end = {contact.pair: contact for contact in arriving}
-    ends = {
-        contact: parting(path.waypoints, world, contact)
+    end_contact_of_pair = {contact.pair: contact for contact in contacts_at_end}
+    parting_of_contact = {
+        contact: place_of_parting(path.waypoints, world, contact)
         for contact in world.scene.contacts
-        if at_end.get(contact.pair) != contact
+        if end_contact_of_pair.get(contact.pair) != contact
     }
 
-    places = sorted({place for place in ends.values() if place is not None})
-    rows, numbers = _with_places(path.waypoints, places)
+    places = sorted({place for place in parting_of_contact.values() if place is not None})
+    rows, waypoint_of_place = _with_waypoints_at(path.waypoints, places)
 
     contacts = []
     for contact in world.scene.contacts:
-        place = ends.get(contact)
-        then = at_end.get(contact.pair, again(contact) if contact.pair in named else None)
-        if place is None or then == contact:
-            contacts.append(MotionContact(contact, allowed=contact.pair in named))
+        of_grasp = contact.pair in grasp_pairs
+        place = parting_of_contact.get(contact)
+        following = touching_again(contact) if of_grasp else None
+        following = end_contact_of_pair.get(contact.pair, following)
+        if place is None or following == contact:
+            contacts.append(MotionContact(contact, allowed=of_grasp))
         else:
-            later = None if then is None else then.distance
-            contacts.append(MotionContact(contact, numbers[place], later, contact.pair in named))
+            later_distance = None if following is None else following.distance
+            contacts.append(MotionContact(contact, waypoint_of_place[place], later_distance, of_grasp))
 
-    for until in sorted(set(numbers.values())):
-        strict = world_from(world, contacts, until)
-        if wrong := violations_of(strict, rows[until:]):
-            fault = f"what has parted touches again: {wrong[0].reason}"
-            return Lived(path_through(path, rows[: until + 1]), (), (), fault, strict)
+    for until in sorted(set(waypoint_of_place.values())):
+        world_after = world_from(world, contacts, until)
+        if violations := violations_of(world_after, rows[until:]):
+            fault = f"what has parted touches again: {violations[0].reason}"
+            return FollowedContacts(path_through(path, rows[: until + 1]), (), (), fault, world_after)
 
-    made = path
+    new_path = path
     if len(rows) > len(path.waypoints):
-        made = proved(path_through(path, rows), world, clearance=None if path.proof is None else path.proof.clearance)
+        clearance = None if path.proof is None else path.proof.clearance
+        new_path = proved(path_through(path, rows), world, clearance=clearance)
 
-    left = contacts_from(contacts, len(rows))
-    lasting = tuple(contact for contact in left if at_end.get(contact.pair) != contact)
-    return Lived(made, tuple(each for each in contacts if each.until != 0), lasting)
+    contacts_left = contacts_from(contacts, len(rows))
+    lasting = tuple(contact for contact in contacts_left if end_contact_of_pair.get(contact.pair) != contact)
+    stood_on = tuple(motion_contact for motion_contact in contacts if motion_contact.until != 0)
+    return FollowedContacts(new_path, stood_on, lasting)
 
 
 def contacts_from(contacts: Iterable[MotionContact], number: int) -> tuple[Touching, ...]:
     """The contacts of a motion that are left from a waypoint on, by its number."""
-    left: list[Touching] = []
+    contacts_left: list[Touching] = []
     for each in contacts:
-        left += [each.touching] if each.until is None or each.until > number else each.following
-    return tuple(left)
+        contacts_left += [each.touching] if each.until is None or each.until > number else each.following
+    return tuple(contacts_left)
 
 
 def world_from(world: World, contacts: Iterable[MotionContact], number: int) -> World:
     """The world of a motion from a waypoint on, by its number: without the contacts that have ended there."""
     stood_on = tuple(contacts)
-    own = {each.touching.pair for each in stood_on}
-    others = tuple(contact for contact in world.scene.contacts if contact.pair not in own)
+    known_pairs = {each.touching.pair for each in stood_on}
+    others = tuple(contact for contact in world.scene.contacts if contact.pair not in known_pairs)
     return form_of(world, scene=replace(world.scene, contacts=(*others, *contacts_from(stood_on, number))))
 
 
-def again(contact: Touching) -> Touching:
+def touching_again(contact: Touching) -> Touching:
     """The contact of a pair that was allowed for a grasp, once the two have parted: it may touch again, no deeper."""
     return replace(contact, distance=max(contact.distance, -DEEPER))
 
 
 def parted(world: World, q: Vector, contact: Touching) -> bool:
     """Whether two that are in contact in a world have parted at q, shape (dof,)."""
-    return parting(q[None], world, contact) is not None
+    return place_of_parting(q[None], world, contact) is not None
 
 
-def parting(rows: Matrix, world: World, contact: Touching) -> tuple[int, float] | None:
-    """Where two that are in contact have parted: a motion between waypoints, shape (k, dof), and a share of it.
+def place_of_parting(rows: Matrix, world: World, contact: Touching) -> tuple[int, float] | None:
+    """Look for the first place on a route at which two that are in contact have parted.
 
-    None if they have not at any place that was looked at, of which one follows the other by a quarter of a millimetre.
+    Places are looked at between which the two come nearer by a quarter of a millimetre at most.
+
+    Args:
+        rows: Waypoints, shape (k, dof).
+        world: In which the two are in contact.
+        contact: Of the two.
+
+    Returns:
+        Number of the motion between waypoints and the share of it; None if they have not parted at any place.
     """
     bodies = world.bodies
     pairs = [pair for pair in world.pairs if {bodies[k].name for k in pair} == contact.pair]
@@ -271,25 +290,25 @@ def parting(rows: Matrix, world: World, contact: Touching) -> tuple[int, float] 
         return 0, 0.0
 
     weights = approach_weights(world.robot, bodies, pairs).max(axis=0)
-    for number, share, frames in _places(rows, world.robot, weights):
-        if all(_apart((bodies[i], bodies[j]), frames) for i, j in pairs):
+    for number, share, frames in _places_along(rows, world.robot, weights):
+        if all(_keep_apart((bodies[i], bodies[j]), frames) for i, j in pairs):
             return number, share
     return None
 
 
-def _places(rows: Matrix, robot: Robot, weights: Vector) -> Iterator[tuple[int, float, Matrix]]:
+def _places_along(rows: Matrix, robot: Robot, weights: Vector) -> Iterator[tuple[int, float, Matrix]]:
     """Places of a route between which bodies come nearer by a step at most, and the frames of all joints there."""
     ends = [(rows[0], rows[0])] if len(rows) == 1 else pairwise(rows)
     for number, (a, b) in enumerate(ends):
-        count = max(1, int(np.ceil(float(weights @ np.abs(b - a)) / STEP)))
-        shares = np.arange(count + 1) / count
+        steps = max(1, int(np.ceil(float(weights @ np.abs(b - a)) / STEP)))
+        shares = np.arange(steps + 1) / steps
         for part in np.array_split(shares, 1 + len(shares) // AT_ONCE):
             frames = robot.joint_frames(a + part[:, None] * (b - a))
             for share, frame in zip(part.tolist(), frames, strict=True):
                 yield number, share, frame
 
 
-def _apart(pair: tuple[Body, Body], frames: Matrix) -> bool:
+def _keep_apart(pair: tuple[Body, Body], frames: Matrix) -> bool:
     """Whether two bodies keep what they must where they are not in contact, and do not touch."""
     poses = _transforms(pair, frames)
     limit = usually_apart(*pair) + NEAR
@@ -302,26 +321,36 @@ def _transforms(pair: tuple[Body, Body], frames: Matrix) -> list[coal.Transform3
     return [coal.Transform3s(pose.rotation, pose.translation) for pose in poses]
 
 
-def _with_places(rows: Matrix, places: Iterable[tuple[int, float]]) -> tuple[Matrix, dict[tuple[int, float], int]]:
-    """Waypoints with further ones at places between them, and the number of the waypoint at each place."""
-    made = list(rows)
-    numbers = {}
-    added = 0
+def _with_waypoints_at(
+    rows: Matrix, places: Iterable[tuple[int, float]]
+) -> tuple[Matrix, dict[tuple[int, float], int]]:
+    """Insert waypoints at places between others.
+
+    Args:
+        rows: Waypoints, shape (k, dof).
+        places: Number of a motion between waypoints and the share of it, in their order.
+
+    Returns:
+        All waypoints, shape (m, dof), and the number of the waypoint at each place.
+    """
+    waypoints = list(rows)
+    waypoint_of_place = {}
+    added_count = 0
 
     for number, share in places:
         if share in (0.0, 1.0):
-            numbers[number, share] = number + added + int(share)
+            waypoint_of_place[number, share] = number + added_count + int(share)
             continue
 
-        added += 1
-        made.insert(number + added, rows[number] + share * (rows[number + 1] - rows[number]))
-        numbers[number, share] = number + added
+        added_count += 1
+        waypoints.insert(number + added_count, rows[number] + share * (rows[number + 1] - rows[number]))
+        waypoint_of_place[number, share] = number + added_count
 
-    return np.array(made), numbers
+    return np.array(waypoints), waypoint_of_place
 
 
 def joined_with(robot: Robot, link: str) -> frozenset[str]:
     """The links that are rigidly joined with a link, itself among them."""
     model = robot.model
-    joint = {name: model.frames[model.getFrameId(name)].parentJoint for name in robot.link_names}
-    return frozenset(name for name, own in joint.items() if own == joint[link])
+    joint_of_link = {name: model.frames[model.getFrameId(name)].parentJoint for name in robot.link_names}
+    return frozenset(name for name, its_joint in joint_of_link.items() if its_joint == joint_of_link[link])

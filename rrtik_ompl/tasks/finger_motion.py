@@ -8,7 +8,7 @@ on half of it are apart in all of it.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -39,59 +39,64 @@ class FingerMotion:
     note: str = ""
 
 
-def finger_motion(before: Setting, after: Setting, q: Vector, taken: Sequence[str]) -> FingerMotion:
+def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequence[str]) -> FingerMotion:
     """Check fingers on their way against the scene, and what they carry.
 
     Args:
         before: With the fingers as they are held.
         after: With the fingers as they are held then.
         q: Where the arm is, shape (dof,).
-        taken: Things that are attached before the arm moves on: fingers may press on these.
+        things_taken: Things that are attached before the arm moves on: fingers may press on these.
     """
-    first = before.world.bodies
-    last = after.world.bodies
-    moving = {k for k in range(len(first)) if not _same(first[k].placement, last[k].placement)}
+    bodies_before = before.world.bodies
+    bodies_after = after.world.bodies
+    moving = {
+        k for k in range(len(bodies_before)) if not _same_pose(bodies_before[k].placement, bodies_after[k].placement)
+    }
     if not moving:
         return FingerMotion()
     if not _on_screws(before.robot, after.robot):
         return FingerMotion(note="the way of the fingers is not checked: it is not about or along one axis")
 
-    note = _pressed_in(before, after, q, moving, taken)
+    note = _pressed_in(before, after, q, moving, things_taken)
     frames = before.robot.joint_frames(q[None])[0]
     for i, j in before.world.pairs:
-        names = {first[i].name, first[j].name}
-        if not {i, j} & moving or not names & set(before.scene.names) or names & set(taken):
+        names = {bodies_before[i].name, bodies_before[j].name}
+        if not {i, j} & moving or not names & set(before.scene.names) or names & set(things_taken):
             continue
-        way = Way((first[i], first[j]), (last[i], last[j]), frames)
-        if not way.apart():
-            names_in_order = " and ".join(f"'{body.name}'" for body in (first[i], first[j]))
+        motion = PairMotion((bodies_before[i], bodies_before[j]), (bodies_after[i], bodies_after[j]), frames)
+        if not motion.apart():
+            names_in_order = " and ".join(f"'{body.name}'" for body in (bodies_before[i], bodies_before[j]))
             return FingerMotion(fault=f"contact of the fingers on their way: {names_in_order}; {REMEDY}")
 
     return FingerMotion(note=note)
 
 
-def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], taken: Sequence[str]) -> str:
+def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], things_taken: Sequence[str]) -> str:
     """A note of the finger that closes deepest into what is held or taken next, q of shape (dof,); "" if none does."""
-    first = before.world.bodies
-    last = after.world.bodies
-    held = {item.name for item in after.scene.attached} | set(taken)
-    things = [k for k in range(len(last)) if last[k].name in held and k not in moving]
+    bodies_before = before.world.bodies
+    bodies_after = after.world.bodies
+    names_held = {item.name for item in after.scene.attached} | set(things_taken)
+    numbers_held = [k for k in range(len(bodies_after)) if bodies_after[k].name in names_held and k not in moving]
     frames = after.robot.joint_frames(q[None])[0]
 
     deepest = DEEPER + DISTANCE_TOLERANCE
     note = ""
     for finger in sorted(moving):
-        for thing in things:
-            depth = -signed_distance(after.robot, (last[finger], last[thing]), q, frames)
-            if depth <= deepest or -signed_distance(before.robot, (first[finger], first[thing]), q, frames) >= depth:
+        for thing in numbers_held:
+            depth = -signed_distance(after.robot, (bodies_after[finger], bodies_after[thing]), q, frames)
+            if depth <= deepest:
+                continue
+            depth_before = -signed_distance(before.robot, (bodies_before[finger], bodies_before[thing]), q, frames)
+            if depth_before >= depth:  # the finger opens, or rests
                 continue
             deepest = depth
-            note = f"'{last[finger].name}' closes {1e3 * depth:.3g} mm deep into '{last[thing].name}'"
+            note = f"'{bodies_after[finger].name}' closes {1e3 * depth:.3g} mm deep into '{bodies_after[thing].name}'"
 
     return f"{note}; give a width that only touches it" if note else ""
 
 
-class Way:
+class PairMotion:
     """Two bodies of which one moves at least, from their first places to their last ones.
 
     Args:
@@ -105,41 +110,45 @@ class Way:
         self._frames = frames
         self._twists = [pin.log6(a.placement.actInv(b.placement)).vector for a, b in zip(first, last, strict=True)]
         self._speed = sum(_speed(body, twist) for body, twist in zip(first, self._twists, strict=True))
-        self._kept = kept_apart(*first)
+        self._required_distance = kept_apart(*first)
         if self._distance(0.0, hulls=False) <= NEAR:  # what fingers let go may go on touching them, no deeper
-            self._kept = min(self._kept, min(self._distance(0.0, hulls=True), 0.0) - DEEPER)
+            self._required_distance = min(self._required_distance, min(self._distance(0.0, hulls=True), 0.0) - DEEPER)
 
     def apart(self) -> bool:
         """Whether the two keep what they must on the whole way."""
-        places = Containment(self._at(0.0), ((0, 1),))
-        return not places.holds((0, 1), self._frames) and all(self._intervals())
+        places = Containment(self._bodies_at(0.0), ((0, 1),))
+        return not places.holds((0, 1), self._frames) and self._apart_on_intervals()
 
-    def _intervals(self) -> Iterator[bool]:
-        open_ = [(0, 0)]
-        while open_:
-            level, number = open_.pop()
+    def _apart_on_intervals(self) -> bool:
+        """Whether the two keep their distance on the whole way, by bisection and a bound on how fast they move [16]."""
+        undecided = [(0, 0)]  # level and number of intervals
+        while undecided:
+            level, number = undecided.pop()
             width = 0.5**level
-            spare = self._distance((number + 0.5) * width, hulls=self._kept < 0.0) - self._kept - DISTANCE_TOLERANCE
+            distance = self._distance((number + 0.5) * width, hulls=self._required_distance < 0.0)
+            spare = distance - self._required_distance - DISTANCE_TOLERANCE
             if spare > 0.5 * width * self._speed:
                 continue
             if spare <= 0.0 or level == DEEPEST:
-                yield False
-                return
-            open_ += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
-        yield True
+                return False
+            undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
+        return True
 
-    def _at(self, share: float) -> tuple[Body, Body]:
-        both = zip(self._first, self._twists, strict=True)
-        one, other = (replace(body, placement=body.placement * pin.exp6(share * twist)) for body, twist in both)
-        return one, other
+    def _bodies_at(self, share: float) -> tuple[Body, Body]:
+        """Both bodies at a share of the way."""
+        first, second = (
+            replace(body, placement=body.placement * pin.exp6(share * twist))
+            for body, twist in zip(self._first, self._twists, strict=True)
+        )
+        return first, second
 
     def _distance(self, share: float, *, hulls: bool) -> float:
         """Signed, at a share of the way [m]; that of their hulls where they may overlap, for coal knows no other."""
-        both = self._at(share)
+        bodies = self._bodies_at(share)
         if hulls:
-            one, other = (replace(body, geometry=around(body.geometry)) for body in both)
-            both = one, other
-        return next(measured(both, [(0, 1)], self._frames, near_only=False)).distance
+            first, second = (replace(body, geometry=around(body.geometry)) for body in bodies)
+            bodies = first, second
+        return next(measured(bodies, [(0, 1)], self._frames, near_only=False)).distance
 
 
 def _speed(body: Body, twist: Vector) -> float:
@@ -148,34 +157,39 @@ def _speed(body: Body, twist: Vector) -> float:
     return float(np.linalg.norm(twist[:3]) + np.linalg.norm(twist[3:]) * reach)
 
 
-def _same(first: pin.SE3, second: pin.SE3) -> bool:
+def _same_pose(first: pin.SE3, second: pin.SE3) -> bool:
     return bool(np.abs(first.homogeneous - second.homogeneous).max() <= SAME)
 
 
 def _on_screws(before: Robot, after: Robot) -> bool:
     """Whether every finger is in the middle of the way where a single screw takes it."""
-    middle = _robot(_entry(before, after))
-    places = [
+    middle = _robot_of_entry(_entry_of_middle(before, after))
+    placements = [
         {(str(item.name), int(item.parentJoint)): item.placement for item in robot.collision.geometryObjects}
         for robot in (before, middle, after)
     ]
 
     return all(
-        name in places[1]
-        and name in places[2]
-        and _same(places[1][name], place * pin.exp6(0.5 * pin.log6(place.actInv(places[2][name])).vector))
-        for name, place in places[0].items()
+        name in placements[1]
+        and name in placements[2]
+        and _same_pose(placements[1][name], _middle_of_screw(placement, placements[2][name]))
+        for name, placement in placements[0].items()
     )
 
 
-def _entry(before: Robot, after: Robot) -> str:
+def _middle_of_screw(first: pin.SE3, last: pin.SE3) -> pin.SE3:
+    """The pose half-way from one to another on the screw that takes the one to the other."""
+    return first * pin.exp6(0.5 * pin.log6(first.actInv(last)).vector)
+
+
+def _entry_of_middle(before: Robot, after: Robot) -> str:
     """The entry of the robot with its fingers in the middle, as JSON."""
-    begin = before.source.get("locked", {})
-    end = after.source.get("locked", {})
-    held = {name: 0.5 * (begin.get(name, 0.0) + value) for name, value in end.items()}
-    return json.dumps({**before.source, "locked": held}, sort_keys=True)
+    values_before = before.source.get("locked", {})
+    values_after = after.source.get("locked", {})
+    middle_values = {name: 0.5 * (values_before.get(name, 0.0) + value) for name, value in values_after.items()}
+    return json.dumps({**before.source, "locked": middle_values}, sort_keys=True)
 
 
 @lru_cache(maxsize=32)
-def _robot(entry: str) -> Robot:
+def _robot_of_entry(entry: str) -> Robot:
     return robot_from_entry(json.loads(entry))

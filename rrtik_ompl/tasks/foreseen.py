@@ -39,7 +39,7 @@ def never_set_down(steps: Sequence[Step], world: World, q: Vector) -> str:
     """
     tip: Tip | None = Tip(world.robot.fk(q))
     grasps: dict[str, Tip] = {}
-    taken = {held.name for held in world.scene.attached}
+    moved_before = {held.name for held in world.scene.attached}
 
     for step in steps:
         stage = step.stage
@@ -50,16 +50,16 @@ def never_set_down(steps: Sequence[Step], world: World, q: Vector) -> str:
         elif isinstance(stage, Straight) and tip is not None:
             tip = Tip(stage.goal(tip.pose), tip.away + DEVIATION, tip.turned + TURN_DEVIATION)
         elif isinstance(stage, Attach):
-            moved = stage.object in taken
-            if tip is not None and not moved and world.robot.tip in joined_with(world.robot, stage.link):
+            already_moved = stage.object in moved_before
+            if tip is not None and not already_moved and world.robot.tip in joined_with(world.robot, stage.link):
                 pose = tip.pose.actInv(world.scene.obstacle(stage.object).pose)
                 grasps[stage.object] = replace(tip, pose=pose)
-            taken.add(stage.object)
+            moved_before.add(stage.object)
         elif isinstance(stage, Detach):
             grasp = grasps.pop(stage.object, None)
-            deep = "" if tip is None or grasp is None else _too_deep(world, q, stage.object, tip, grasp, taken)
-            if deep:
-                return f"{step} failed: {deep}"
+            fault = "" if tip is None or grasp is None else _too_deep(world, q, stage.object, tip, grasp, moved_before)
+            if fault:
+                return f"{step} failed: {fault}"
     return ""
 
 
@@ -73,23 +73,24 @@ def _reached(stage: MoveTo, world: World) -> Tip | None:
     return Tip(world.robot.fk(goal)) if isinstance(goal, np.ndarray) else None
 
 
-def _too_deep(world: World, q: Vector, name: str, tip: Tip, grasp: Tip, taken: set[str]) -> str:
+def _too_deep(world: World, q: Vector, name: str, tip: Tip, grasp: Tip, moved_before: set[str]) -> str:
     """Says how deep a thing would be left inside an obstacle that nothing has moved, if that is sure."""
     frames = world.robot.joint_frames(q[None])[0]
     pose = tip.pose * grasp.pose
     allowed = {frozenset(pair) for pair in world.scene.allowed_collisions}
-    others = {each.name for each in world.scene.obstacles if frozenset((name, each.name)) not in allowed} - taken
-    arm = float(np.linalg.norm(grasp.pose.translation))
+    not_allowed = {each.name for each in world.scene.obstacles if frozenset((name, each.name)) not in allowed}
+    names_of_others = not_allowed - moved_before
+    grasp_length = float(np.linalg.norm(grasp.pose.translation))
     shift = pose * world.scene.obstacle(name).pose.inverse()
 
-    for own in (body for body in world.bodies if body.name == name):
-        reach = arm + float(np.linalg.norm(_centre(world, own, name)) + own.geometry.aabb_radius)
-        unsure = tip.away + grasp.away + (tip.turned + grasp.turned) * reach
-        placed = replace(own, placement=shift * own.placement)
-        for other in (body for body in world.bodies if body.name in others):
-            away = signed_distance(world.robot, (placed, other), q, frames)
-            if away < -DEEPER - unsure:
-                return left_inside(Nearness(name, other.name, away, DEEPER))
+    for part in (body for body in world.bodies if body.name == name):
+        reach = grasp_length + float(np.linalg.norm(_centre(world, part, name)) + part.geometry.aabb_radius)
+        uncertainty = tip.away + grasp.away + (tip.turned + grasp.turned) * reach
+        placed_body = replace(part, placement=shift * part.placement)
+        for other in (body for body in world.bodies if body.name in names_of_others):
+            gap = signed_distance(world.robot, (placed_body, other), q, frames)
+            if gap < -DEEPER - uncertainty:
+                return left_inside(Nearness(name, other.name, gap, DEEPER))
     return ""
 
 

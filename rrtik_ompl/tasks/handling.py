@@ -24,47 +24,47 @@ class Handled:
 
 def handled(steps: Sequence[Step], robot: Robot) -> list[Handled]:
     """What may be taken and set down before the arm moves on, whatever is chosen."""
-    found: list[Handled] = []
+    things: list[Handled] = []
     for place, step in enumerate(steps):
         stage = step.stage
         if isinstance(stage, MoveTo | Straight):
             break
         if isinstance(stage, Alternatives):
             for row in options_of(step):
-                found += handled((*row, *steps[place + 1 :]), robot)
+                things += handled((*row, *steps[place + 1 :]), robot)
             break
         if isinstance(stage, Attach):
-            found.append(Handled(stage.object, joined_with(robot, stage.link) | frozenset(stage.allow)))
+            things.append(Handled(stage.object, joined_with(robot, stage.link) | frozenset(stage.allow)))
         elif isinstance(stage, Detach):
-            found.append(Handled(stage.object, None))
-    return list(dict.fromkeys(found))
+            things.append(Handled(stage.object, None))
+    return list(dict.fromkeys(things))
 
 
 def may_touch(world: World, steps: Sequence[Step]) -> list[Touching]:
     """Contacts that would let what is taken or set down next touch all that it may touch there."""
-    found: dict[frozenset[str], Touching] = {}
+    contact_of_pair: dict[frozenset[str], Touching] = {}
     for thing in handled(steps, world.robot):
         for pair in {frozenset(world.bodies[k].name for k in numbers) for numbers in world.pairs}:
             other = next(iter(pair - {thing.name}), None)
             if thing.name in pair and other is not None and (thing.by is None or other in thing.by):
-                found[pair] = allowed(world.bodies, thing.name, other)
-    return sorted(found.values(), key=lambda contact: contact.names)
+                contact_of_pair[pair] = allowed(world.bodies, thing.name, other)
+    return sorted(contact_of_pair.values(), key=lambda contact: contact.names)
 
 
 def left_where(world: World, steps: Sequence[Step], q: Vector) -> str:
     """Why something cannot be set down at q, shape (dof,), because of its depth; "" if it can."""
-    standing = frozenset(world.scene.names)
+    obstacle_names = frozenset(world.scene.names)
     for thing in handled(steps, world.robot):
         for near in touching_at(world, q, thing.name) if thing.by is None else ():
-            if near.second in standing and near.too_deep:
+            if near.second in obstacle_names and near.too_deep:
                 return left_inside(near)
     return ""
 
 
 def arriving_at(world: World, steps: Sequence[Step], q: Vector) -> tuple[Touching, ...]:
     """The contacts of what is taken or set down at q, shape (dof,); none where it would be deeper than it may be."""
-    found: dict[frozenset[str], Touching] = {}
+    contact_of_pair: dict[frozenset[str], Touching] = {}
     for thing in handled(steps, world.robot):
         near = (each for each in touching_at(world, q, thing.name) if thing.by is None or each.second in thing.by)
-        found |= {each.pair: each.arriving() for each in near if not each.too_deep}
-    return tuple(found.values())
+        contact_of_pair |= {each.pair: each.arriving() for each in near if not each.too_deep}
+    return tuple(contact_of_pair.values())

@@ -69,10 +69,10 @@ def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
     motions = np.searchsorted(timed.begins, clock, side="right") - 1
     rests = np.array([_share_of_rest(timed.pauses, time) for time in clock.tolist()])
 
-    without = np.setdiff1d(numbers, motions)
-    motions = np.append(motions, without)
-    rows = np.vstack([states.positions, starts[without]])
-    rests = np.append(rests, np.zeros(len(without)))
+    motions_without_tick = np.setdiff1d(numbers, motions)
+    motions = np.append(motions, motions_without_tick)
+    rows = np.vstack([states.positions, starts[motions_without_tick]])
+    rests = np.append(rests, np.zeros(len(motions_without_tick)))
     order = np.argsort(motions, kind="stable")
     return motions[order], rows[order], rests[order]
 
@@ -94,10 +94,10 @@ def _judged(plan: TaskPlan, motions: NDArray[np.int64], rows: Matrix) -> Judged:
     unproven = tuple(np.flatnonzero(np.isin(motions[:-1], doubtful)).tolist())
 
     if doubtful:
-        doubt = f"{len(doubtful)} of {len(proven)} motions not proven free"
+        summary = f"{len(doubtful)} of {len(proven)} motions not proven free"
         text = next((f"; motion {k + 1}: {found[0].reason}" for k, found in enumerate(faults) if found), "")
     else:
-        doubt = ""
+        summary = ""
         text = "every motion is proven free" + (", on the contacts that it stands on" if any(plan.contacts) else "")
     text += as_it_stands(plan.worlds[0].scene)
 
@@ -105,7 +105,7 @@ def _judged(plan: TaskPlan, motions: NDArray[np.int64], rows: Matrix) -> Judged:
     for k in doubtful:
         ticks = np.flatnonzero(motions == k)
         contacts += _contacts(worlds[k], ticks, rows[ticks], [fault.q for fault in faults[k]])
-    return Judged(Verdict(not doubtful, text, unproven, doubt), None, tuple(contacts))
+    return Judged(Verdict(not doubtful, text, unproven, summary), None, tuple(contacts))
 
 
 def _contacts(world: World, ticks: NDArray[np.int64], rows: Matrix, faults: list[Vector]) -> Iterator[PathContact]:
@@ -119,9 +119,9 @@ def _contacts(world: World, ticks: NDArray[np.int64], rows: Matrix, faults: list
 
 def _held(plan: TaskPlan) -> tuple[tuple[HeldRegion, Vector], ...]:
     """The regions of the path constraints of all motions, and where each motion begins, shape (dof,)."""
-    found: list[tuple[HeldRegion, Vector]] = []
+    regions_of_motions: list[tuple[HeldRegion, Vector]] = []
     for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True):
         if isinstance(stage, MoveTo):
-            held = held_regions(world.robot, world.scene, stage.constraints, path.start)
-            found += [(region, path.start) for region in held.regions]
-    return tuple(found)
+            constraints = held_regions(world.robot, world.scene, stage.constraints, path.start)
+            regions_of_motions += [(region, path.start) for region in constraints.regions]
+    return tuple(regions_of_motions)

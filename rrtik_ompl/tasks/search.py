@@ -17,8 +17,8 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import ProblemError
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.planning.plan import plan_counted
-from rrtik_ompl.tasks.branches import Branch, Expander, again
-from rrtik_ompl.tasks.contact_life import MotionContact, lived
+from rrtik_ompl.tasks.branches import Branch, Expander, with_effort
+from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts
 from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.stages import MoveTo
@@ -54,162 +54,183 @@ class TaskSearch:
         self._budget = budget
         self._out_of_time = False
         self._expander = Expander(np.random.default_rng(budget.seed), budget.seed)
-        self._open: list[tuple[int, float, int, Branch]] = []  # a heap: what is popped is the smallest
+
+        # A heap of branches to go on from, the smallest first: most stages done, then shortest, then oldest.
+        self._queue: list[tuple[int, float, int, Branch]] = []
         self._numbers = count()
-        self._ways: dict[int, JointPath] = {}  # of motions between postures, by their branches
-        self._contacts: dict[int, tuple[MotionContact, ...]] = {}  # that they stand on
-        self._blocked: set[int] = set()  # motions that were not found in this round
-        self._late: list[Branch] = []  # what hangs on these
+
+        # Of motions between postures, by the identity of their branches: path, and contacts that it stands on.
+        self._paths: dict[int, JointPath] = {}
+        self._contacts: dict[int, tuple[MotionContact, ...]] = {}
+
+        # Motions that were not found in this round, by the same, and the branches that cannot go on without them.
+        self._motions_not_found: set[int] = set()
+        self._waiting: list[Branch] = []
 
     def run(self, start: Branch) -> Done | None:
         """What does the whole task; None if no choices work."""
         self._push(start)
         for effort in range(ROUNDS):
-            found = self._round(effort)
-            if found is not None or self._out_of_time:
-                return found
+            done = self._run_round(effort)
+            if done is not None or self._out_of_time:
+                return done
 
-            waiting = self._late
-            self._late = []
-            self._blocked.clear()
+            waiting = self._waiting
+            self._waiting = []
+            self._motions_not_found.clear()
             failed = [branch for branch, _, _ in self._expander.failures] if effort == 0 else []
             for branch in (*waiting, *failed):
-                self._push(again(branch, effort + 1))
+                self._push(with_effort(branch, effort + 1))
             for branch in self._expander.more():
                 self._push(branch)
-            if not self._open:
+            if not self._queue:
                 return None
         return None
 
     def reason(self) -> str:
         """Why nothing was found: what failed, the farthest stage first, and how often."""
         failures = self._expander.failures
-        texts: dict[str, tuple[Step, Counter[str]]] = {}
+        failures_of_step: dict[str, tuple[Step, Counter[str]]] = {}
         for _, step, text in failures:
-            texts.setdefault(step.number, (step, Counter()))[1][text] += 1
+            failures_of_step.setdefault(step.number, (step, Counter()))[1][text] += 1
 
-        order = sorted(texts.values(), key=lambda item: [int(n) for n in item[0].number.split(".")], reverse=True)
-        parts = []
-        for step, reasons in order[:NAMED]:
+        latest_first = sorted(
+            failures_of_step.values(),
+            key=lambda item: [int(number) for number in item[0].number.split(".")],
+            reverse=True,
+        )
+        sentences = []
+        for step, reasons in latest_first[:NAMED]:
             text, _ = reasons.most_common(1)[0]
-            times = reasons.total()
-            short = text if len(text) <= MOST_WORDS else text[:MOST_WORDS] + "..."
-            parts.append(f"{step} failed" + (f" {times} times, for instance: " if times > 1 else ": ") + short)
+            count = reasons.total()
+            shortened = text if len(text) <= MOST_WORDS else text[:MOST_WORDS] + "..."
+            repeated = f" {count} times, for instance: " if count > 1 else ": "
+            sentences.append(f"{step} failed{repeated}{shortened}")
 
-        late = ["out of time before all choices were tried"] if self._out_of_time else []
-        return "; ".join([*late, *parts]) or "no choice of alternatives and configurations works"
+        time_note = ["out of time before all choices were tried"] if self._out_of_time else []
+        return "; ".join([*time_note, *sentences]) or "no choice of alternatives and configurations works"
 
-    def _round(self, effort: int) -> Done | None:
-        while self._open:
+    def _run_round(self, effort: int) -> Done | None:
+        """Expand branches until one has done the whole task; None if none is left or the time is up."""
+        while self._queue:
             if self._budget.over():
                 self._out_of_time = True
                 return None
-            branch = heapq.heappop(self._open)[-1]
-            if any(id(link) in self._blocked for link in branch.chain()):
-                self._late.append(branch)
+            branch = heapq.heappop(self._queue)[-1]
+            if any(id(link) in self._motions_not_found for link in branch.chain()):
+                self._waiting.append(branch)
             elif branch.rest:
                 for following in self._expander.after(branch):
                     self._push(following)
             elif self._expander.ends(branch):
-                motions = self._motions(branch, effort)
+                motions = self._plan_motions(branch, effort)
                 if motions is not None:
                     contacts = tuple(self._contacts.get(id(link), link.contacts) for link, _ in motions)
                     return Done(branch, tuple(motions), contacts)
         return None
 
     def _push(self, branch: Branch) -> None:
-        heapq.heappush(self._open, (-branch.done, branch.cost, next(self._numbers), branch))
+        heapq.heappush(self._queue, (-branch.done, branch.cost, next(self._numbers), branch))
 
-    def _motions(self, branch: Branch, effort: int) -> list[tuple[Branch, JointPath]] | None:
+    def _plan_motions(self, branch: Branch, effort: int) -> list[tuple[Branch, JointPath]] | None:
         """The motions of a branch that has done everything, those between postures planned; None if one fails."""
-        found: list[tuple[Branch, JointPath]] = []
+        motions: list[tuple[Branch, JointPath]] = []
         for link in branch.chain():
-            if link.moves and id(link) not in self._ways and not self._plan(link, effort):
-                self._blocked.add(id(link))
-                self._late.append(branch)
+            if link.moves and id(link) not in self._paths and not self._plan_motion(link, effort):
+                self._motions_not_found.add(id(link))
+                self._waiting.append(branch)
                 return None
-            path = self._ways.get(id(link), link.path)
+            path = self._paths.get(id(link), link.path)
             if path is not None:
-                found.append((link, _begun_at(found[-1][1].end, path, link) if found else path))
-        return found
+                motions.append((link, _moved_to_start(motions[-1][1].end, path, link) if motions else path))
+        return motions
 
-    def _plan(self, link: Branch, effort: int) -> bool:
-        """Find the way of a motion between postures."""
+    def _plan_motion(self, link: Branch, effort: int) -> bool:
+        """Plan a motion between postures and store its path and contacts; whether one was found."""
         before = link.before
         world = link.setting.world
         assert before is not None, "it comes after another"
         assert link.step is not None, "it has done one"
-        kept = link.step.stage.constraints if isinstance(link.step.stage, MoveTo) else ()
+        constraints = link.step.stage.constraints if isinstance(link.step.stage, MoveTo) else ()
 
         try:
-            problem = Problem(world, before.q, link.q, name=f"stage {link.step.number}", constraints=kept)
+            problem = Problem(world, before.q, link.q, name=f"stage {link.step.number}", constraints=constraints)
         except ProblemError as error:
-            self._failed(link, str(error))
+            self._note_failure(link, str(error))
             return False
 
         if problem.world.motion_proven(before.q, link.q):
             straight = JointPath.of(world.robot, np.stack([before.q, link.q]))
-            if self._kept(link, proved_as_clear(straight, problem.world, CLEARANCE), effort):
+            if self._accept_path(link, proved_as_clear(straight, problem.world, CLEARANCE), effort):
                 return True
 
-        path = self._found(problem, link, effort)
-        return path is not None and self._kept(link, path, effort)
+        path = self._path_of(problem, link, effort)
+        return path is not None and self._accept_path(link, path, effort)
 
-    def _found(self, problem: Problem, link: Branch, effort: int) -> JointPath | None:
-        """A path of a problem that a motion poses; why there is none is noted."""
-        left = max(self._budget.left, LEAST_SECONDS)
-        made = plan_counted(problem, Budget(self._budget.seed, left, FIRST_ITERATIONS * GROWTH**effort))
-        if made.path is None:
-            self._failed(link, made.reason)
-        return made.path
+    def _path_of(self, problem: Problem, link: Branch, effort: int) -> JointPath | None:
+        """Plan a path of a problem that a motion poses; None, and the reason noted, if there is none."""
+        seconds = max(self._budget.left, LEAST_SECONDS)
+        result = plan_counted(problem, Budget(self._budget.seed, seconds, FIRST_ITERATIONS * GROWTH**effort))
+        if result.path is None:
+            self._note_failure(link, result.reason)
+        return result.path
 
-    def _from_parting(self, link: Branch, world: World, q: Vector, goal: Vector, effort: int) -> JointPath | None:
+    def _path_from_parting(self, link: Branch, world: World, q: Vector, goal: Vector, effort: int) -> JointPath | None:
         """A way on from where two have parted to the goal of a motion, both of shape (dof,)."""
         try:
-            return self._found(Problem(world, q, goal), link, effort)
+            return self._path_of(Problem(world, q, goal), link, effort)
         except ProblemError as error:
-            self._failed(link, str(error))
+            self._note_failure(link, str(error))
             return None
 
-    def _failed(self, link: Branch, reason: str) -> None:
+    def _note_failure(self, link: Branch, reason: str) -> None:
         """Note why the way of a motion between postures was not found."""
         assert link.before is not None, "it comes after another"
         assert link.step is not None, "it has done one"
         self._expander.failures.append((link.before, link.step, reason))
 
-    def _kept(self, link: Branch, path: JointPath, effort: int) -> bool:
-        """Keep the way of a motion; if what has parted on it touches again, another one is planned from there."""
+    def _accept_path(self, link: Branch, path: JointPath, effort: int) -> bool:
+        """Store the path of a motion and its contacts; if what has parted on it touches again, replan from there.
+
+        Args:
+            link: The branch of the motion.
+            path: From the branch before it to its configuration.
+            effort: Round of the search, for a path that is planned anew.
+
+        Returns:
+            Whether a path is stored; if not, the reason is noted.
+        """
         assert link.step is not None, "it has done one"
 
         setting = link.setting
         if setting.scene.contacts:
             world = world_of_motion(path, setting.world, link.step.stage)
-            done = lived(path, world, setting.named, link.arriving)
-            if done.world is not None:
-                rest = self._from_parting(link, done.world, done.path.end, path.end, effort)
-                if rest is None:
+            followed = follow_contacts(path, world, setting.named, link.arriving)
+            if followed.world is not None:  # the path ends where two have parted that it would make touch again
+                detour = self._path_from_parting(link, followed.world, followed.path.end, path.end, effort)
+                if detour is None:
                     return False
-                whole = proved(path_through(path, np.vstack([done.path.waypoints, rest.waypoints[1:]])), world)
-                done = lived(whole, world, setting.named, link.arriving)
-            if done.fault:
-                self._failed(link, done.fault)
+                joined = proved(path_through(path, np.vstack([followed.path.waypoints, detour.waypoints[1:]])), world)
+                followed = follow_contacts(joined, world, setting.named, link.arriving)
+            if followed.fault:
+                self._note_failure(link, followed.fault)
                 return False
-            path = done.path
-            self._contacts[id(link)] = done.contacts
+            path = followed.path
+            self._contacts[id(link)] = followed.contacts
 
-        self._ways[id(link)] = path
+        self._paths[id(link)] = path
         return True
 
 
-def _begun_at(q: Vector, path: JointPath, link: Branch) -> JointPath:
+def _moved_to_start(q: Vector, path: JointPath, link: Branch) -> JointPath:
     """The path of a branch from q, shape (dof,), where the one before ended: perhaps whole turns of joints away.
 
     A plan may reach its goal the other way round of a continuous joint.
     """
-    away = q - path.start
-    if not away.any():
+    difference = q - path.start
+    if not difference.any():
         return path
     assert link.step is not None, "it has done one"
-    turned = path_through(path, np.vstack([q, path.waypoints[1:] + TAU * np.round(away / TAU)]))
+    shifted = path_through(path, np.vstack([q, path.waypoints[1:] + TAU * np.round(difference / TAU)]))
     clearance = CLEARANCE if path.proof is None else path.proof.clearance
-    return proved_as_clear(turned, world_of_motion(turned, link.setting.world, link.step.stage), clearance)
+    return proved_as_clear(shifted, world_of_motion(shifted, link.setting.world, link.step.stage), clearance)

@@ -47,8 +47,8 @@ class Setting:
     def beginning(cls, world: World, q: Vector) -> Setting:
         """The setting of a world at q, shape (dof,): what is held there may go on touching what it touches."""
         touching = [near for item in world.scene.attached for near in touching_at(world, q, item.name)]
-        known = {contact.pair for contact in world.scene.contacts}
-        contacts = [near.going_on() for near in touching if near.distance >= -LITTLE and near.pair not in known]
+        known_pairs = {contact.pair for contact in world.scene.contacts}
+        contacts = [near.going_on() for near in touching if near.distance >= -LITTLE and near.pair not in known_pairs]
         return cls.of(world).with_contacts(contacts)
 
     @cached_property
@@ -63,8 +63,8 @@ class Setting:
 
     def arriving(self, contacts: Iterable[Touching]) -> Setting:
         """The same setting with contacts of what is about to be taken or set down; deeper ones that there are stay."""
-        known = {contact.pair: contact.distance for contact in self.scene.contacts}
-        return self.with_contacts(each for each in contacts if each.distance < known.get(each.pair, np.inf))
+        distance_of_pair = {contact.pair: contact.distance for contact in self.scene.contacts}
+        return self.with_contacts(each for each in contacts if each.distance < distance_of_pair.get(each.pair, np.inf))
 
     def with_scene(self, scene: Scene) -> Setting:
         """The same robot in another scene."""
@@ -93,26 +93,26 @@ class Setting:
 
         others = frozenset(stage.allow) - frozenset(links)
         named = self.named | {frozenset((stage.object, other)) for other in others}
-        held = Setting(self._like, self.robot, scene, named)
+        setting = Setting(self._like, self.robot, scene, named)
 
-        bodies = held.world.bodies
+        bodies = setting.world.bodies
         contacts = {frozenset((stage.object, other)): allowed(bodies, stage.object, other) for other in sorted(others)}
-        near = touching_at(held.world, q, stage.object)
+        near = touching_at(setting.world, q, stage.object)
         contacts |= {each.pair: each.going_on() for each in near if each.distance >= -LITTLE or each.pair in named}
-        return held.with_contacts(contacts.values())
+        return setting.with_contacts(contacts.values())
 
     def _detached(self, stage: Detach, q: Vector) -> Setting:
-        standing = frozenset(self.scene.names)
+        obstacle_names = frozenset(self.scene.names)
         for near in touching_at(self.world, q, stage.object):
-            if near.second in standing and near.too_deep:
+            if near.second in obstacle_names and near.too_deep:
                 raise InputError(left_inside(near))
 
-        held = next(item for item in self.scene.attached if item.name == stage.object)
-        pose = self.robot.fk(q, held.link) * held.pose
+        attached = next(item for item in self.scene.attached if item.name == stage.object)
+        pose = self.robot.fk(q, attached.link) * attached.pose
         named = frozenset(pair for pair in self.named if stage.object not in pair)
-        free = Setting(self._like, self.robot, self.scene.detaching(stage.object, pose), named)
-        touching = touching_at(free.world, q, stage.object)
-        return free.with_contacts(each.going_on() for each in touching if each.distance >= -DEEPER)
+        setting = Setting(self._like, self.robot, self.scene.detaching(stage.object, pose), named)
+        touching = touching_at(setting.world, q, stage.object)
+        return setting.with_contacts(each.going_on() for each in touching if each.distance >= -DEEPER)
 
 
 def world_of_motion(path: JointPath, world: World, stage: Stage) -> World:

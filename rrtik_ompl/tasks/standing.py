@@ -40,7 +40,7 @@ def standing_faults(
         contacts: That each stood on.
         end: The world after the last one; what changes there is a fault of the last motion.
     """
-    found: list[list[Violation]] = []
+    faults_of_motions: list[list[Violation]] = []
     before: tuple[Touching, ...] = ()
 
     for number, (path, world, stood_on) in enumerate(zip(paths, worlds, contacts, strict=True)):
@@ -48,17 +48,19 @@ def standing_faults(
         reasons += _too_deep(world, path.start, stood_on, before)
         if number:
             reasons += _changes(worlds[number - 1], world, paths[number - 1].end)
-        found.append([Violation(0, path.start, f"motion {number + 1}: {reason}") for reason in reasons])
+        faults_of_motions.append([Violation(0, path.start, f"motion {number + 1}: {reason}") for reason in reasons])
 
-        own = {each.touching for each in stood_on}
-        others = (contact for contact in world.scene.contacts if contact not in own)
+        known_contacts = {each.touching for each in stood_on}
+        others = (contact for contact in world.scene.contacts if contact not in known_contacts)
         before = (*others, *contacts_from(stood_on, len(path.waypoints)))
 
     if end is not None and paths:
         changes = _changes(worlds[-1], end, paths[-1].end)
         last = max(len(paths[-1].waypoints) - 2, 0)
-        found[-1] += [Violation(last, paths[-1].end, f"after motion {len(paths)}: {reason}") for reason in changes]
-    return found
+        faults_of_motions[-1] += [
+            Violation(last, paths[-1].end, f"after motion {len(paths)}: {reason}") for reason in changes
+        ]
+    return faults_of_motions
 
 
 def _false_names(world: World, stood_on: Sequence[MotionContact]) -> list[str]:
@@ -77,16 +79,17 @@ def _false_names(world: World, stood_on: Sequence[MotionContact]) -> list[str]:
 
 def _too_deep(world: World, q: Vector, stood_on: Sequence[MotionContact], before: Sequence[Touching]) -> list[str]:
     """Contacts that allow more than is true where they begin, at q, shape (dof,); ``before``: those that go on."""
-    going_on = {contact.pair: contact.distance for contact in before}
+    distance_of_pair = {contact.pair: contact.distance for contact in before}
     named = {each.touching for each in stood_on if each.allowed}
     faults = []
 
     for contact in world.scene.contacts:
-        if contact.distance < going_on.get(contact.pair, 0.0) and contact.distance < -DEEPER - DISTANCE_TOLERANCE:
+        is_deeper_than_before = contact.distance < distance_of_pair.get(contact.pair, 0.0)
+        if is_deeper_than_before and contact.distance < -DEEPER - DISTANCE_TOLERANCE:
             depth = _depth(world, q, contact)
-            most = (depth if contact in named else min(depth, LITTLE)) + DEEPER
-            if contact.distance < -most - DISTANCE_TOLERANCE:
-                faults.append(_deeper(contact.names, contact.distance, most, depth))
+            deepest_allowed = (depth if contact in named else min(depth, LITTLE)) + DEEPER
+            if contact.distance < -deepest_allowed - DISTANCE_TOLERANCE:
+                faults.append(_deeper(contact.names, contact.distance, deepest_allowed, depth))
 
     for each in stood_on:
         if each.then is not None and each.then < -DEEPER - DISTANCE_TOLERANCE:
@@ -94,11 +97,11 @@ def _too_deep(world: World, q: Vector, stood_on: Sequence[MotionContact], before
     return faults
 
 
-def _deeper(names: tuple[str, str], distance: float, most: float, depth: float) -> str:
+def _deeper(names: tuple[str, str], distance: float, deepest_allowed: float, depth: float) -> str:
     """Says that a contact allows too much."""
     first, second = names
-    allowed = f"may overlap by {1e3 * most:.3g} mm at most, not by {-1e3 * distance:.4g} mm"
-    return f"contact of '{first}' and '{second}': they {allowed}; where it begins they overlap by {1e3 * depth:.3g} mm"
+    fault = f"may overlap by {1e3 * deepest_allowed:.3g} mm at most, not by {-1e3 * distance:.4g} mm"
+    return f"contact of '{first}' and '{second}': they {fault}; where it begins they overlap by {1e3 * depth:.3g} mm"
 
 
 def _depth(world: World, q: Vector, contact: Touching) -> float:
@@ -106,10 +109,10 @@ def _depth(world: World, q: Vector, contact: Touching) -> float:
     if not set(contact.names) & set(world.scene.names):
         return 0.0
     name, other = contact.names if contact.first in world.scene.names else contact.names[::-1]
-    near = [each.distance for each in touching_at(world, q, name) if each.second == other]
-    let_go = world.robot.gripper is not None and other in world.robot.link_names
-    least = DEEPER if let_go else 0.0  # fingers may have moved away since they let it go
-    return max([least, *(-distance for distance in near)])
+    distances = [each.distance for each in touching_at(world, q, name) if each.second == other]
+    may_have_let_go = world.robot.gripper is not None and other in world.robot.link_names
+    least_depth = DEEPER if may_have_let_go else 0.0  # fingers may have moved away since they let it go
+    return max([least_depth, *(-distance for distance in distances)])
 
 
 def _changes(before: World, after: World, q: Vector) -> list[str]:
@@ -128,11 +131,11 @@ def _changes(before: World, after: World, q: Vector) -> list[str]:
     faults += [f"'{name}' is in one of the scenes before and after, not in both" for name in sorted(old.keys() ^ new)]
     for name in sorted(old.keys() & new):
         faults += [f"'{name}' has not the {what} that it had before" for what in _altered(old[name], new[name])]
-        away, turned = _between(old[name], new[name], before, after, q)
-        if max(away, turned) > MOVED:
+        shift, angle = _between(old[name], new[name], before, after, q)
+        if max(shift, angle) > MOVED:
             faults.append(
                 f"'{name}' is not where the motion before has left it: "
-                f"{1e3 * away:.3g} mm and {np.degrees(turned):.3g} deg away"
+                f"{1e3 * shift:.3g} mm and {np.degrees(angle):.3g} deg away"
             )
     return faults
 

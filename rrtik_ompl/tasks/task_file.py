@@ -63,9 +63,9 @@ class MoveToEntry(Section):
         return _move_to(self.move_to, robot, [section.build(robot) for section in self.path_constraints])
 
 
-def _move_to(section: GoalSection, robot: Robot, held: Iterable[TaskRegion]) -> MoveTo:
+def _move_to(section: GoalSection, robot: Robot, constraints: Iterable[TaskRegion]) -> MoveTo:
     goal = section.posture if isinstance(section, Posture) else build_goal(section, robot)
-    return MoveTo(goal, tuple(held))
+    return MoveTo(goal, tuple(constraints))
 
 
 class LineEntry(Section):
@@ -274,14 +274,14 @@ def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector
         with document.at(("task",)):
             return [stage.build(world.robot) for stage in entry.task]
 
-    held = build_constraints(document, entry.path_constraints, world.robot)
+    constraints = build_constraints(document, entry.path_constraints, world.robot)
     with document.at(("path_constraints",)):
-        placed = placed_constraints(world, start, held)
+        placed_regions = placed_constraints(world, start, constraints)
 
     stages: list[Stage] = []
     for number, goal in enumerate(entry.goals or ()):
         with document.at(("goals", number)):
-            stages.append(_move_to(goal, world.robot, placed))
+            stages.append(_move_to(goal, world.robot, placed_regions))
     return stages
 
 
@@ -294,8 +294,8 @@ def stage_data(stage: Stage) -> dict[str, Any]:
     if isinstance(stage, Alternatives):
         return {"alternatives": [[stage_data(each) for each in row] for row in stage.options]}
     if isinstance(stage, MoveTo):
-        held = [constraint_data(region) for region in stage.constraints]
-        return {"move_to": _goal_data(stage.goal)} | ({"path_constraints": held} if held else {})
+        regions = [constraint_data(region) for region in stage.constraints]
+        return {"move_to": _goal_data(stage.goal)} | ({"path_constraints": regions} if regions else {})
     if isinstance(stage, Straight):
         if stage.by is not None:
             return {"straight": {"by": stage.by.tolist(), "frame": stage.frame}}
@@ -303,8 +303,8 @@ def stage_data(stage: Stage) -> dict[str, Any]:
             raise InputError("Straight: a task file cannot say to=[x, y, z]; give a pose, or by=[dx, dy, dz]")
         return {"straight": {"to": pose_data(stage.to)}}
     if isinstance(stage, Attach):
-        thick = {} if stage.padding is None else {"padding": stage.padding}
-        return {"attach": {"object": stage.object, "link": stage.link, "allow": list(stage.allow), **thick}}
+        padding = {} if stage.padding is None else {"padding": stage.padding}
+        return {"attach": {"object": stage.object, "link": stage.link, "allow": list(stage.allow), **padding}}
     if isinstance(stage, Detach):
         return {"detach": stage.object}
     return {"gripper": stage.state} | ({} if stage.width is None else {"width": stage.width})

@@ -51,8 +51,8 @@ def placed_constraints(
     Raises:
         ProblemError: If the start does not keep them, or cannot be used.
     """
-    held = listed(constraints, "path constraints")
-    return Problem(world, start, start, constraints=held).constraints if held else ()
+    regions = listed(constraints, "path constraints")
+    return Problem(world, start, start, constraints=regions).constraints if regions else ()
 
 
 def plan_through(
@@ -86,16 +86,16 @@ def plan_through(
         >>> tour.found, len(tour.reached), tour.reached[-1] == len(tour.path.waypoints) - 1
         (True, 3, True)
     """
-    wanted = listed(goals, "goals to be reached in order")
-    if not wanted:
+    goal_list = listed(goals, "goals to be reached in order")
+    if not goal_list:
         raise InputError(
             "goals to be reached in order: there is none; give at least one, such as PoseGoal(T_world_tip)"
         )
     placed = placed_constraints(world, start, constraints)
-    if dimensions(goals) == 1 and all(isinstance(goal, Real) for goal in wanted):
+    if dimensions(goals) == 1 and all(isinstance(goal, Real) for goal in goal_list):
         raise InputError("goals to be reached in order: this is one configuration; put it into a list: [q]")
 
-    stages = [MoveTo(goal, constraints=placed) for goal in wanted]
+    stages = [MoveTo(goal, constraints=placed) for goal in goal_list]
     plan = Task(stages).plan(world, start, seconds=seconds, seed=seed)
     if not plan.found:
         return PlanThrough(False, None, (), plan.reason)

@@ -81,31 +81,31 @@ def time_task(
     if not any(path.length > 0.0 for path in plan.paths):
         raise InputError("task plan to time: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
 
-    used = RateLimits.of(plan.worlds[0].robot) if limits is None else limits
+    rate_limits = RateLimits.of(plan.worlds[0].robot) if limits is None else limits
     parts: list[Trajectory] = []
-    gaps: list[float] = []  # [s] of rest before each part
+    rests_before: list[float] = []  # [s] of rest before each part
     begins: list[float] = []
     pauses: list[tuple[float, float]] = []
     now = 0.0
-    waiting = 0.0  # since the last part that moves
+    rest_so_far = 0.0  # since the last part that moves
 
     for number, (path, world, stage) in enumerate(zip(plan.paths, plan.worlds, plan.stages, strict=True)):
         if number and rest and _changed(plan.worlds[number - 1], world):
             pauses.append((now, now + rest))
-            waiting += rest
+            rest_so_far += rest
             now += rest
         begins.append(now)
         if path.length == 0.0:
             continue
 
-        held = world_of_motion(path, world, stage)
-        part = _timed(path, held, plan.contacts[number] if plan.contacts else (), used, radius, options)
+        motion_world = world_of_motion(path, world, stage)
+        part = _timed(path, motion_world, plan.contacts[number] if plan.contacts else (), rate_limits, radius, options)
         parts.append(part)
-        gaps.append(waiting)
-        waiting = 0.0
+        rests_before.append(rest_so_far)
+        rest_so_far = 0.0
         now += part.duration
 
-    return TimedTask(_joined(parts, gaps), frozen(begins), frozen(np.reshape(pauses, (-1, 2))))
+    return TimedTask(_joined(parts, rests_before), frozen(begins), frozen(np.reshape(pauses, (-1, 2))))
 
 
 def _timed(
@@ -117,12 +117,12 @@ def _timed(
     options: dict[str, Any],
 ) -> Trajectory:
     """A motion with its times, corners rounded less where what has parted would touch again."""
-    ended = sorted({contact.until for contact in contacts if contact.until is not None})
-    later = [(path.waypoints[until], world_from(world, contacts, until)) for until in ended]
+    parting_waypoints = sorted({contact.until for contact in contacts if contact.until is not None})
+    passed_with_world = [(path.waypoints[until], world_from(world, contacts, until)) for until in parting_waypoints]
     for share in ROUNDED:
-        made = time_parameterize(path, limits, blend=share * blend, world=world, **options)
-        if all(_free_from(made, q, strict) for q, strict in later):
-            return made
+        trajectory = time_parameterize(path, limits, blend=share * blend, world=world, **options)
+        if all(_free_from(trajectory, q, world_after) for q, world_after in passed_with_world):
+            return trajectory
     return time_parameterize(path, limits, blend=0.0, world=world, **options)
 
 
@@ -136,28 +136,28 @@ def _free_from(motion: Trajectory, q: Vector, world: World) -> bool:
 
 def _changed(before: World, after: World) -> bool:
     """Whether the arm holds other things than before, or its fingers otherwise."""
-    held = [{(item.name, item.link) for item in world.scene.attached} for world in (before, after)]
-    return held[0] != held[1] or before.robot.source != after.robot.source
+    attached = [{(item.name, item.link) for item in world.scene.attached} for world in (before, after)]
+    return attached[0] != attached[1] or before.robot.source != after.robot.source
 
 
-def _joined(parts: list[Trajectory], gaps: list[float]) -> Trajectory:
+def _joined(parts: list[Trajectory], rests_before: list[float]) -> Trajectory:
     """Motions that begin where the one before ends, at rest, with a rest [s] before each."""
     times = []
     rows: dict[str, list[Matrix]] = {"positions": [], "velocities": [], "accelerations": []}
     now = 0.0
 
-    for part, gap in zip(parts, gaps, strict=True):
+    for part, rest in zip(parts, rests_before, strict=True):
         values = {name: getattr(part, name) for name in rows}
-        if gap > 0.0:
+        if rest > 0.0:
             times.append(np.array([now]))
-            for name, kept in rows.items():
-                kept.append(values[name][:1] * (name == "positions"))  # nothing moves in a rest
+            for name, columns in rows.items():
+                columns.append(values[name][:1] * (name == "positions"))  # nothing moves in a rest
 
-        now += gap
+        now += rest
         last = -1 if part is not parts[-1] else len(part.times)  # the next one begins where a part ends
         times.append(now + part.times[:last])
-        for name, kept in rows.items():
-            kept.append(values[name][:last])
+        for name, columns in rows.items():
+            columns.append(values[name][:last])
         now += part.duration
 
     first = parts[0]
