@@ -24,7 +24,8 @@ from rrtik_ompl.world.motion_queries import KernelWorld, MotionFree, MotionQueri
 
 KERNELS = (CONNECT_KERNELS, CUT_KERNELS)  # libraries that replanning in kernels needs
 ITERATIONS = 4000  # samples of one search at most, so that the same seed gives the same run
-CUTS, PATIENCE = 100, 40  # tries of random shortcuts, and without gain
+CUTS = 100  # tries of random shortcuts
+PATIENCE = 40  # of them without gain, after which it ends
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,8 +81,8 @@ class KernelConnect:
     ) -> Joined | None:
         """See :class:`Connect`; conservative: what the kernel cannot prove counts as blocked."""
         seed = int(self._rng.integers(2**63))
-        most = self._iterations
-        bridge = self._search.solve(first, second, seed, stop=stop, max_iterations=most)
+        max_iterations = self._iterations
+        bridge = self._search.solve(first, second, seed, stop=stop, max_iterations=max_iterations)
         self.samples += int(self._search.statistics()["iterations"])
         return None if bridge is None else joined(first, bridge, second, chain=chain)
 

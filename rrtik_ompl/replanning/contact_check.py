@@ -66,10 +66,10 @@ def check_contacts(
     gaps, names = _gaps(robot, np.array(rows), first, _poses(source, times))
 
     contacts = []
-    done = set()
+    ticks_in_contact = set()
     for sample in np.flatnonzero((gaps <= 0.0).any(axis=1)):
-        if (tick := sample // samples_per_tick) not in done:
-            done.add(tick)
+        if (tick := sample // samples_per_tick) not in ticks_in_contact:
+            ticks_in_contact.add(tick)
             contacts.append((times[sample], ticks[tick].event, *names[int(gaps[sample].argmin())]))
 
     return ContactReport(tuple(contacts), max(float(gaps.min(initial=MAX_DISTANCE)), 0.0), len(times))
@@ -94,29 +94,37 @@ def _place(obstacle: Obstacle, time: float) -> pin.SE3:
 
 
 def _gaps(
-    robot: Robot, rows: Matrix, scene: Scene, own: dict[str, NDArray[np.float64]]
+    robot: Robot, rows: Matrix, scene: Scene, obstacle_poses: dict[str, NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], list[tuple[str, str]]]:
     """Distances [m] of all pairs of an arm's body and an obstacle, shape (samples, pairs), and the pairs' names."""
-    placed = scene_bodies(robot, scene)
-    arm = [*link_bodies(robot), *(b for b in placed if b.kind == "attached")]
+    bodies_of_scene = scene_bodies(robot, scene)
+    arm = [*link_bodies(robot), *(body for body in bodies_of_scene if body.kind == "attached")]
     allowed = {frozenset(pair) for pair in scene.allowed_collisions}
-    moving = [b for b in placed if b.kind == "obstacle"]
-    pairs = [(a, o) for a in arm for o in moving if frozenset((a.name, o.name)) not in allowed and a.joint > 0]
+    obstacle_bodies = [body for body in bodies_of_scene if body.kind == "obstacle"]
+    pairs = [
+        (link, obstacle)
+        for link in arm
+        for obstacle in obstacle_bodies
+        if frozenset((link.name, obstacle.name)) not in allowed and link.joint > 0
+    ]
 
     frames = robot.joint_frames(rows)
-    arm_poses = {id(a): frames[:, a.joint] @ a.placement.homogeneous for a in arm}
-    back = {o.name: o.pose.inverse() for o in scene.obstacles}
-    own_poses = {id(o): own[o.name] @ (back[o.name] * o.placement).homogeneous for o in moving}  # of each piece
+    arm_poses = {id(link): frames[:, link.joint] @ link.placement.homogeneous for link in arm}
+    from_world = {obstacle.name: obstacle.pose.inverse() for obstacle in scene.obstacles}
+    body_poses = {  # of each piece of an obstacle
+        id(obstacle): obstacle_poses[obstacle.name] @ (from_world[obstacle.name] * obstacle.placement).homogeneous
+        for obstacle in obstacle_bodies
+    }
 
     gaps = np.full((len(rows), len(pairs)), np.inf)
-    for k, (a, o) in enumerate(pairs):
-        arm_pose = arm_poses[id(a)]
-        own_pose = own_poses[id(o)]
-        near = np.flatnonzero(_sphere_distances(a, arm_pose, o, own_pose) < MAX_DISTANCE)
-        for sample in near:
-            gaps[sample, k] = _distance(a.geometry, arm_pose[sample], o.geometry, own_pose[sample])
+    for k, (link, obstacle) in enumerate(pairs):
+        arm_pose = arm_poses[id(link)]
+        body_pose = body_poses[id(obstacle)]
+        near_samples = np.flatnonzero(_sphere_distances(link, arm_pose, obstacle, body_pose) < MAX_DISTANCE)
+        for sample in near_samples:
+            gaps[sample, k] = _distance(link.geometry, arm_pose[sample], obstacle.geometry, body_pose[sample])
 
-    return gaps, [(a.name, o.name) for a, o in pairs]
+    return gaps, [(link.name, obstacle.name) for link, obstacle in pairs]
 
 
 def _sphere_distances(
@@ -131,8 +139,8 @@ def _sphere_distances(
         poses[:, :3, :3] @ np.array(solid.aabb_center) + poses[:, :3, 3]
         for poses, solid in zip((first_poses, second_poses), solids, strict=True)
     ]
-    apart: Vector = np.linalg.norm(centres[0] - centres[1], axis=1) - sum(float(s.aabb_radius) for s in solids)
-    return apart
+    distances: Vector = np.linalg.norm(centres[0] - centres[1], axis=1) - sum(float(s.aabb_radius) for s in solids)
+    return distances
 
 
 def _distance(
@@ -140,9 +148,9 @@ def _distance(
 ) -> float:
     """Coal's distance of two geometries [m], 0 if they touch."""
     poses = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
-    ends = (first, poses[0], second, poses[1])
-    if has_cloud(ends):
-        return max(0.0, nearest_of_cloud(ends).distance) if cloud_gap(ends, 0.0) is not None else 0.0
-    if coal.collide(*ends, coal.CollisionRequest(), coal.CollisionResult()):
+    solids = (first, poses[0], second, poses[1])
+    if has_cloud(solids):
+        return max(0.0, nearest_of_cloud(solids).distance) if cloud_gap(solids, 0.0) is not None else 0.0
+    if coal.collide(*solids, coal.CollisionRequest(), coal.CollisionResult()):
         return 0.0
-    return float(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult()))
+    return float(coal.distance(*solids, coal.DistanceRequest(), coal.DistanceResult()))

@@ -57,9 +57,9 @@ class DrrtCon:
         self.free = False
         self.repairs = 0
 
-        # Of the last check: points along the path, and which motions between them are blocked.
-        self._dense = np.zeros((0, 0))
-        self._hits: Mask = np.zeros(0, dtype=bool)
+        # Of the last check: points along the path, shape (k, n), and which motions between them are blocked, (k - 1,).
+        self._points_at_last_check = np.zeros((0, 0))
+        self._blocked_at_last_check: Mask = np.zeros(0, dtype=bool)
 
     @classmethod
     def in_box(cls, lower: Vector, upper: Vector, max_edge: float, seed: int, post: Post | None) -> DrrtCon:
@@ -77,31 +77,32 @@ class DrrtCon:
         """
         starts = np.atleast_2d(start)
         usable = motions.valid_batch(np.vstack([starts, goals]))
-        first = starts[usable[: len(starts)]]
-        last = goals[usable[len(starts) :]]
-        if len(first) == 0 or len(last) == 0:
+        free_starts = starts[usable[: len(starts)]]
+        free_goals = goals[usable[len(starts) :]]
+        if len(free_starts) == 0 or len(free_goals) == 0:
             return False
 
-        found = self.connect(first, last, motions, stop, chain=False)
-        if found is not None:  # the other starts do not lead to the one where it begins
-            found = Joined(found.path[found.begin :], 0, found.end - found.begin)
-        return self._take(found, motions)
+        connection = self.connect(free_starts, free_goals, motions, stop, chain=False)
+        if connection is not None:  # the other starts do not lead to the one where it begins
+            connection = Joined(connection.path[connection.begin :], 0, connection.end - connection.begin)
+        return self._take_over(connection, motions)
 
     def check_path(self, motions: MotionQueries) -> bool:
         """Check the path again, all of it in one call; whether it is free."""
         if self.path is None:
             return False
-        self._dense = points_along(self.path, 0.5 * self.max_edge)
-        self._hits = ~motions.motion_valid_batch(self._dense[:-1], self._dense[1:])
-        self.free = not self._hits.any()
+        points = points_along(self.path, 0.5 * self.max_edge)
+        self._points_at_last_check = points
+        self._blocked_at_last_check = ~motions.motion_valid_batch(points[:-1], points[1:])
+        self.free = not self._blocked_at_last_check.any()
         return self.free
 
     def repair(self, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """After a :meth:`check_path` that found the path blocked: find another one; whether there is one."""
         self.repairs += 1
         ends_free = self.path is not None and bool(motions.valid_batch(self.path[[0, -1]]).all())
-        found = self._reconnected(motions, stop) if ends_free else None
-        return self._take(found, motions)
+        connection = self._reconnected(motions, stop) if ends_free else None
+        return self._take_over(connection, motions)
 
     def retarget(self, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """Reconnect the free beginning of the path to the nearest of other goals, shape (g, n), without shortening.
@@ -112,24 +113,24 @@ class DrrtCon:
         if self.path is None or len(goals) == 0:
             return False
 
-        piece = points_along(self.path, 0.5 * self.max_edge)
-        hit = np.flatnonzero(~motions.motion_valid_batch(piece[:-1], piece[1:]))
-        piece = piece[: hit[0] + 1] if len(hit) else piece
-        if not motions.valid_batch(piece[:1])[0]:
+        points = points_along(self.path, 0.5 * self.max_edge)
+        blocked = np.flatnonzero(~motions.motion_valid_batch(points[:-1], points[1:]))
+        points = points[: blocked[0] + 1] if len(blocked) else points
+        if not motions.valid_batch(points[:1])[0]:
             return False
 
-        found = self.connect(piece, goals, motions, stop, chain=False)
-        if found is not None:
-            self.path = found.path
+        connection = self.connect(points, goals, motions, stop, chain=False)
+        if connection is not None:
+            self.path = connection.path
             self.free = True
-        return found is not None
+        return connection is not None
 
     def advance(self, place: Vector, passed: int, motions: MotionQueries) -> None:
         """The robot has gone to ``place``, past ``passed`` waypoints: drop what lies behind it, shorten the rest."""
-        free = self.free
+        was_free = self.free
         self.rejoin(place, passed)
-        self.free = free  # it was, so the part of it that is left is
-        if self.path is not None and free and len(self.path) > 2:
+        self.free = was_free  # it was, so the part of it that is left is
+        if self.path is not None and was_free and len(self.path) > 2:
             self.path = cut_from_start(self.path, 0.5 * self.max_edge, motions)
 
     def rejoin(self, place: Vector, passed: int = 0) -> None:
@@ -141,21 +142,25 @@ class DrrtCon:
 
     def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
         """Cut at the first hit seen from the robot and at the first one seen from the goal; join the two pieces."""
-        hits = np.flatnonzero(self._hits)
-        first = int(hits[0])
-        last = int(hits[-1])
-        return self.connect(self._dense[: first + 1], self._dense[last + 1 :], motions, stop)
+        blocked = np.flatnonzero(self._blocked_at_last_check)
+        first = int(blocked[0])
+        last = int(blocked[-1])
+        points = self._points_at_last_check
+        return self.connect(points[: first + 1], points[last + 1 :], motions, stop)
 
-    def _take(self, found: Joined | None, motions: MotionQueries) -> bool:
-        """Walk on along a new path, if there is one; what is new of it is shortened."""
-        self.free = found is not None
-        if found is not None:
-            path = found.path
-            begin = found.begin
-            end = found.end
-            new = path[begin : end + 1]
-            new = dense_sequential_cut(new, 0.5 * self.max_edge, motions) if self.post is None else self.post(new)
-            self.path = without_points_between(np.vstack([path[:begin], new, path[end + 1 :]]))
+    def _take_over(self, connection: Joined | None, motions: MotionQueries) -> bool:
+        """Make a new path the path, if there is one, what is new of it shortened; whether there is one."""
+        self.free = connection is not None
+        if connection is not None:
+            path = connection.path
+            begin = connection.begin
+            end = connection.end
+            new_part = path[begin : end + 1]
+            if self.post is None:
+                new_part = dense_sequential_cut(new_part, 0.5 * self.max_edge, motions)
+            else:
+                new_part = self.post(new_part)
+            self.path = without_points_between(np.vstack([path[:begin], new_part, path[end + 1 :]]))
         return self.free
 
 
@@ -166,7 +171,7 @@ class FromScratch(DrrtCon):
     forgetting: ClassVar[bool] = True
 
     def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
-        return self.connect(self._dense[:1], self._dense[-1:], motions, stop)
+        return self.connect(self._points_at_last_check[:1], self._points_at_last_check[-1:], motions, stop)
 
 
 def points_along(path: Matrix, step: float) -> Matrix:
@@ -182,8 +187,8 @@ def without_points_between(path: Matrix) -> Matrix:
     lengths = np.linalg.norm(edges, axis=1)
     units = edges / np.maximum(lengths, STRAIGHT_TOLERANCE)[:, None]
     turns = np.linalg.norm(np.diff(units, axis=0), axis=1) > STRAIGHT_TOLERANCE
-    kept: Matrix = path[np.concatenate([[True], turns, [True]])]
-    return kept
+    corners: Matrix = path[np.concatenate([[True], turns, [True]])]
+    return corners
 
 
 def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
@@ -193,21 +198,21 @@ def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> M
     :func:`rrtik_ompl.planning.shortening.sequential.sequential_cut` tries every waypoint and no others. Source:
     [1, ch. 5.3, method 1], as DRRT-Con uses it.
     """
-    done = [path[:1]]
+    points_kept = [path[:1]]
     rest = path
     while len(rest) > 2:
         rest = cut_from_start(rest, step, motions)
-        done.append(rest[1:2])
+        points_kept.append(rest[1:2])
         rest = rest[1:]
-    return np.vstack([*done, rest[1:]])
+    return np.vstack([*points_kept, rest[1:]])
 
 
 def cut_from_start(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
     """A free path with its beginning straight to the last point along it that can be reached, asked in one call."""
     points, edges = _points_and_edges(path, step)
-    known = int(np.searchsorted(edges, 1))  # the first point behind the first edge, which is free
-    ends = np.unique(np.linspace(known, len(points) - 1, MAX_CUTS).round().astype(int))
-    if known >= len(points):
+    first_beyond = int(np.searchsorted(edges, 1))  # the first point behind the first edge, which is free
+    ends = np.unique(np.linspace(first_beyond, len(points) - 1, MAX_CUTS).round().astype(int))
+    if first_beyond >= len(points):
         return path
 
     free = motions.motion_valid_batch(np.broadcast_to(path[0], (len(ends), path.shape[1])), points[ends])

@@ -52,21 +52,24 @@ def evasion(
     moves *= np.minimum(step / np.linalg.norm(moves, axis=1), 1.0)[:, None]
     moves = np.vstack([np.zeros_like(q), *(speed * moves for speed in SPEED_SHARES)])
 
-    near = ahead(0)
-    lower = near.robot.lower
-    upper = near.robot.upper
+    world_now = ahead(0)
+    lower = world_now.robot.lower
+    upper = world_now.robot.upper
     ends = np.clip(q + moves, lower, upper)
-    middle = near.clearance(0.5 * (q + ends))
-    end = near.clearance(ends)
+    clearance_half_way = world_now.clearance(0.5 * (q + ends))
+    clearance_after_tick = world_now.clearance(ends)
 
-    future = np.full(len(moves), np.inf)
+    least_ahead = np.full(len(moves), np.inf)
     for ticks in HORIZON_TICKS:
-        future = np.minimum(future, ahead(ticks).clearance(np.clip(q + ticks * moves, lower, upper)))
+        least_ahead = np.minimum(least_ahead, ahead(ticks).clearance(np.clip(q + ticks * moves, lower, upper)))
 
-    least = end[0] - MAX_LOSS_SHARE * max(abs(end[0]), distance)
-    usable = np.flatnonzero(np.minimum(middle, end) >= least)
-    enough = np.minimum(end, 2.0 * distance) if end.max() >= distance else np.zeros_like(end)
-    order = usable[np.lexsort((-future[usable], -enough[usable]))][:MAX_CANDIDATES]
+    least_clearance = clearance_after_tick[0] - MAX_LOSS_SHARE * max(abs(clearance_after_tick[0]), distance)
+    usable = np.flatnonzero(np.minimum(clearance_half_way, clearance_after_tick) >= least_clearance)
+    # Where a motion keeps the distance after this tick, such motions come first; else the ticks to come decide alone.
+    rated_clearance = np.zeros_like(clearance_after_tick)
+    if clearance_after_tick.max() >= distance:
+        rated_clearance = np.minimum(clearance_after_tick, 2.0 * distance)
+    order = usable[np.lexsort((-least_ahead[usable], -rated_clearance[usable]))][:MAX_CANDIDATES]
 
     free = alone.motion_valid_batch(np.tile(q, (len(order), 1)), ends[order])
     best = int(order[np.flatnonzero(free)[0]]) if free.any() else 0
@@ -75,9 +78,9 @@ def evasion(
 
 def _directions(q: Vector, max_change: Vector, rng: np.random.Generator, path: Matrix | None) -> Matrix:
     """Single joints, random directions, and towards the next waypoint and back; largest part 1, shape (m, n)."""
-    drawn = rng.uniform(-1.0, 1.0, (RANDOM_DIRECTIONS, len(q)))
-    rows = [np.eye(len(q)), -np.eye(len(q)), drawn / np.abs(drawn).max(axis=1, keepdims=True)]
+    random = rng.uniform(-1.0, 1.0, (RANDOM_DIRECTIONS, len(q)))
+    rows = [np.eye(len(q)), -np.eye(len(q)), random / np.abs(random).max(axis=1, keepdims=True)]
     if path is not None and len(path) > 1 and (path[1] != q).any():
-        ahead = (path[1] - q) / max_change
-        rows.append(np.outer([1.0, -1.0], ahead / np.abs(ahead).max()))
+        to_waypoint = (path[1] - q) / max_change
+        rows.append(np.outer([1.0, -1.0], to_waypoint / np.abs(to_waypoint).max()))
     return np.vstack(rows)

@@ -116,20 +116,20 @@ class Stream:
     """
 
     def __init__(self, snapshots: Iterable[tuple[float, Scene] | Snapshot], patience: float = SILENCE_SECONDS) -> None:
-        self._left: Iterator[Snapshot] = map(_snapshot, snapshots)
+        self._remaining: Iterator[Snapshot] = map(_snapshot, snapshots)
         self._patience = patience
 
-        first = next(self._left, None)
+        first = next(self._remaining, None)
         if first is None:
             raise InputError("scene feed: it holds no snapshot; give at least one pair of a time and a scene")
         if abs(first.time) > LATEST:
             raise InputError(f"scene feed: its times begin at {first.time:.16g}; give seconds, not milliseconds")
 
-        self._begin = first.time
-        self._now = replace(first, time=0.0)
+        self._first_time = first.time
+        self._latest = replace(first, time=0.0)
         self._next: Snapshot | None = None
         self._count = 1
-        self._ended = False
+        self._has_ended = False
 
     def __call__(self, time: float) -> Snapshot:
         """The last snapshot that is not later than ``time`` [s].
@@ -139,44 +139,44 @@ class Stream:
                 second one is so much later than the first that no run could wait for it.
         """
         while True:
-            if self._next is None and not self._ended:
+            if self._next is None and not self._has_ended:
                 self._next = self._read()
-                self._ended = self._next is None
+                self._has_ended = self._next is None
             if self._next is None or self._next.time > time + TIME_RESOLUTION:
-                return self._now
-            self._now = self._next
+                return self._latest
+            self._latest = self._next
             self._next = None
 
     def _read(self) -> Snapshot | None:
         """The next snapshot, its time counted from the first one."""
-        given = next(self._left, None)
-        if given is None:
+        snapshot = next(self._remaining, None)
+        if snapshot is None:
             return None
 
-        time = round(given.time - self._begin, 6)
-        before = self._now.time
+        time = round(snapshot.time - self._first_time, 6)
+        before = self._latest.time
         if time < before:
-            stamps = f"{given.time:.16g} s comes after {self._begin + before:.16g} s"
-            raise InputError(f"scene feed: times go backwards: {stamps}; sort the snapshots by time")
+            times = f"{snapshot.time:.16g} s comes after {self._first_time + before:.16g} s"
+            raise InputError(f"scene feed: times go backwards: {times}; sort the snapshots by time")
         if time == before:
-            twice = f"{given.time:.16g} s comes twice"
-            raise InputError(f"scene feed: times stand still: {twice}; give the time at which each scene was taken")
+            repeated = f"{snapshot.time:.16g} s comes twice"
+            raise InputError(f"scene feed: times stand still: {repeated}; give the time at which each scene was taken")
         if self._count == 1 and time > self._patience:
-            apart = f"the second scene comes {time:.6g} s after the first, feed_patience is {self._patience:g} s"
-            raise InputError(f"scene feed: {apart}; give times in seconds, not milliseconds, or raise feed_patience")
+            delay = f"the second scene comes {time:.6g} s after the first, feed_patience is {self._patience:g} s"
+            raise InputError(f"scene feed: {delay}; give times in seconds, not milliseconds, or raise feed_patience")
 
         self._count += 1
-        return replace(given, time=time)
+        return replace(snapshot, time=time)
 
 
-def _snapshot(given: object) -> Snapshot:
+def _snapshot(item: object) -> Snapshot:
     """A snapshot, or a pair of a time and a scene, checked."""
-    pair = (given.time, given.scene) if isinstance(given, Snapshot) else given
+    pair = (item.time, item.scene) if isinstance(item, Snapshot) else item
     match pair:
         case (float() | int() | np.number() as time, Scene() as scene) if np.isfinite(time):
-            unseen = dict(given.unseen) if isinstance(given, Snapshot) else {}
+            unseen = dict(item.unseen) if isinstance(item, Snapshot) else {}
             return Snapshot(float(time), scene, unseen)
-    raise InputError(f"scene feed: expected pairs of a time [s] and a scene, got {given!r:.80}")
+    raise InputError(f"scene feed: expected pairs of a time [s] and a scene, got {item!r:.80}")
 
 
 class MotionTracker:
@@ -205,20 +205,20 @@ class MotionTracker:
 
         for obstacle in seen.scene.obstacles:
             name = obstacle.name
-            when = seen.seen_at(obstacle.name)
-            before, last = self._sightings.get(name, (when, obstacle))
-            reshaped = not same_shape(obstacle.shape, last.shape)
-            moved = not np.array_equal(last.pose.homogeneous, obstacle.pose.homogeneous)
-            changed |= reshaped or moved or obstacle.margin != last.margin
+            time = seen.seen_at(obstacle.name)
+            last_time, last_seen = self._sightings.get(name, (time, obstacle))
+            reshaped = not same_shape(obstacle.shape, last_seen.shape)
+            moved = not np.array_equal(last_seen.pose.homogeneous, obstacle.pose.homogeneous)
+            changed |= reshaped or moved or obstacle.margin != last_seen.margin
 
             if reshaped:  # a cloud that was seen anew: its points may have moved
                 self.speeds.setdefault(name, 0.0)
                 self._reshaped.add(name)
-            if when > before:
+            if time > last_time:
                 self._velocities.pop(name, None)
                 if moved:
-                    self._measure(obstacle, last.pose, before, when)
-            self._sightings[name] = (when, obstacle)
+                    self._measure(obstacle, last_seen.pose, last_time, time)
+            self._sightings[name] = (time, obstacle)
 
         return changed
 
@@ -230,16 +230,17 @@ class MotionTracker:
             seconds: From now [s].
             ages: How long ago obstacles were seen [s]; now if it does not say.
         """
-        known = ages or {}
+        age_of_obstacle = ages or {}
         return replace(
-            scene, obstacles=tuple(self._predicted(o, seconds + known.get(o.name, 0.0)) for o in scene.obstacles)
+            scene,
+            obstacles=tuple(self._predicted(o, seconds + age_of_obstacle.get(o.name, 0.0)) for o in scene.obstacles),
         )
 
     def _predicted(self, obstacle: Obstacle, seconds: float) -> Obstacle:
         """An obstacle where it will be, so long after it was seen [s]."""
         if obstacle.motion is not None:
-            there = obstacle.motion.pose_at(obstacle.pose, seconds)
-            return replace(obstacle, pose=there, motion=obstacle.motion.seen_from(seconds))
+            pose = obstacle.motion.pose_at(obstacle.pose, seconds)
+            return replace(obstacle, pose=pose, motion=obstacle.motion.seen_from(seconds))
         if obstacle.name not in self._velocities:
             return obstacle
         return replace(obstacle, pose=pin.SE3(*_extrapolated(obstacle.pose, self._velocities[obstacle.name], seconds)))
@@ -248,11 +249,11 @@ class MotionTracker:
         """How far obstacles whose motion nobody can predict may go in a time [s]: clouds that are seen anew [m]."""
         return dict.fromkeys(self._reshaped, (self._bound or 0.0) * seconds)
 
-    def _measure(self, obstacle: Obstacle, old: pin.SE3, before: float, now: float) -> None:
+    def _measure(self, obstacle: Obstacle, old_pose: pin.SE3, last_time: float, now: float) -> None:
         name = obstacle.name
-        seconds = now - before
-        shift = obstacle.pose.translation - old.translation
-        turn = pin.log3(old.rotation.T @ obstacle.pose.rotation)
+        seconds = now - last_time
+        shift = obstacle.pose.translation - old_pose.translation
+        turn = pin.log3(old_pose.rotation.T @ obstacle.pose.rotation)
         angle = float(np.linalg.norm(turn))
 
         if name in self._reshaped:
@@ -262,14 +263,14 @@ class MotionTracker:
         if not np.isfinite(rotation_path):
             raise turns_without_end(name)
 
-        way = float(np.linalg.norm(shift)) + rotation_path
-        speed = way / seconds
+        travel = float(np.linalg.norm(shift)) + rotation_path
+        speed = travel / seconds
         self._velocities[name] = (shift / seconds, turn / seconds)
         self.speeds[name] = max(speed, self.speeds.get(name, 0.0))
 
-        if self._bound is None or way <= SPEED_WARNING_RATIO * self._bound * (seconds + TIME_RESOLUTION):
+        if self._bound is None or travel <= SPEED_WARNING_RATIO * self._bound * (seconds + TIME_RESOLUTION):
             return
-        self.faster_since = min(before, self.faster_since)
+        self.faster_since = min(last_time, self.faster_since)
         if name not in self._warned:
             self._warned.add(name)
             warnings.warn(SpeedWarning(speed_warning(name, speed, now, self._bound)), stacklevel=4)
@@ -289,8 +290,8 @@ def refuse_endless_turns(scene: Scene) -> None:
     for obstacle in scene.obstacles:
         if obstacle.shape.bounded or not isinstance(obstacle.motion, TimedPoses):
             continue
-        first = obstacle.motion.poses[0].rotation
-        turns = (float(np.linalg.norm(pin.log3(first.T @ there.rotation))) for there in obstacle.motion.poses)
+        first_rotation = obstacle.motion.poses[0].rotation
+        turns = (float(np.linalg.norm(pin.log3(first_rotation.T @ pose.rotation))) for pose in obstacle.motion.poses)
         if max(turns) > ROTATION_NOISE:
             raise turns_without_end(obstacle.name)
 
@@ -314,15 +315,17 @@ def stated_way(obstacle: Obstacle, seconds: float) -> float:
     if motion is None:
         return 0.0
 
-    inside = motion.times[(motion.times > 0.0) & (motion.times < seconds)] if isinstance(motion, TimedPoses) else ()
-    poses = [motion.pose_at(obstacle.pose, float(time)) for time in (0.0, *inside, seconds)]
+    times = [0.0, seconds]
+    if isinstance(motion, TimedPoses):  # it may turn at its own times
+        times[1:1] = motion.times[(motion.times > 0.0) & (motion.times < seconds)].tolist()
+    poses = [motion.pose_at(obstacle.pose, time) for time in times]
     radius = farthest(obstacle.shape, pin.SE3.Identity())
-    way = 0.0
+    travel = 0.0
     for a, b in pairwise(poses):
         angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
-        turned = radius * angle if angle > ROTATION_NOISE else 0.0
-        way += float(np.linalg.norm(b.translation - a.translation)) + turned
-    return way + ROUNDING
+        arc = radius * angle if angle > ROTATION_NOISE else 0.0
+        travel += float(np.linalg.norm(b.translation - a.translation)) + arc
+    return travel + ROUNDING
 
 
 class Travels:
@@ -345,8 +348,8 @@ class Travels:
 
     def in_tick(self, scene: Scene) -> dict[str, float]:
         """How far each obstacle that moves may go within a tick [m]; nothing where no bound is stated."""
-        known = self._bound is not None
-        return {o.name: self._speed(o) * self._seconds if known else 0.0 for o in scene.obstacles}
+        bound_is_stated = self._bound is not None
+        return {o.name: self._speed(o) * self._seconds if bound_is_stated else 0.0 for o in scene.obstacles}
 
     def possible(self, seen: Snapshot, ages: Mapping[str, float]) -> dict[str, float] | None:
         """How far each obstacle may be by the end of the tick, even if it begins to move just now [m].
@@ -354,18 +357,18 @@ class Travels:
         Whatever is not stated to be at rest may begin to move. Without a bound what states its motion goes as it says.
         None if nothing bounds that.
         """
-        found = {}
+        travels = {}
         for obstacle in seen.scene.obstacles:
             if self._stays(obstacle) or (seen.stated and obstacle.motion is None):
-                found[obstacle.name] = 0.0
+                travels[obstacle.name] = 0.0
             elif self._bound is None and seen.stated:
-                found[obstacle.name] = stated_way(obstacle, self._seconds)
+                travels[obstacle.name] = stated_way(obstacle, self._seconds)
             elif self._bound is None:
                 return None
             else:
                 speed = max(self._bound, self._measured.get(obstacle.name, 0.0))
-                found[obstacle.name] = speed * (ages[obstacle.name] + self._seconds)
-        return found
+                travels[obstacle.name] = speed * (ages[obstacle.name] + self._seconds)
+        return travels
 
     def _stays(self, obstacle: Obstacle) -> bool:
         """Whether an obstacle states that it does not move, and was not seen to."""
@@ -381,5 +384,5 @@ class Travels:
 
 
 def _extrapolated(pose: pin.SE3, velocity: tuple[Vector, Vector], seconds: float) -> tuple[Matrix, Vector]:
-    linear, turn = velocity
-    return pose.rotation @ pin.exp3(seconds * turn), pose.translation + seconds * linear
+    linear, angular = velocity
+    return pose.rotation @ pin.exp3(seconds * angular), pose.translation + seconds * linear

@@ -42,11 +42,11 @@ def moving_scene(robot: Robot, count: int, speed: float, seed: int, *, seconds: 
         shape = _shape(rng, k, reach)
         low = SHELL[0] * reach + shape.bounding_radius
         high = SHELL[1] * reach
-        places = _wander(rng, steps, speed * WAYPOINT_SECONDS, low, high) + centre
+        points = _wander(rng, steps, speed * WAYPOINT_SECONDS, low, high) + centre
 
-        turned = _rotation(rng)
-        turns = turning_points(places)
-        poses = [pin.SE3(turned, place) for place in places[turns]]
+        rotation = _rotation(rng)
+        turns = turning_points(points)
+        poses = [pin.SE3(rotation, place) for place in points[turns]]
         obstacles.append(Obstacle(f"obstacle{k + 1}", shape, poses[0], TimedPoses(times[turns], poses)))
 
     return Scene(tuple(obstacles))
@@ -62,18 +62,18 @@ def moving_problem(
     """
     scene = moving_scene(robot, count, speed, seed, seconds=seconds)
     world = World(robot, scene)
-    clear = MovingWorld(world)
-    clear.move(scene, inflation={o.name: room for o in scene.obstacles})
+    inflated_world = MovingWorld(world)
+    inflated_world.move(scene, inflation={o.name: room for o in scene.obstacles})
 
     rng = np.random.default_rng([seed, 1])
-    lower, upper = (np.clip(ends, -0.5 * np.pi, 0.5 * np.pi) for ends in robot.finite_range())
+    lower, upper = (np.clip(limits, -0.5 * np.pi, 0.5 * np.pi) for limits in robot.finite_range())
     rows = rng.uniform(lower, upper, (ENDPOINT_SAMPLES, robot.dof))
-    free = rows[clear.valid_batch(rows)]
+    free = rows[inflated_world.valid_batch(rows)]
     if len(free) < 2:
         raise InputError(f"no free start and goal among {count} obstacles; take fewer, or another seed than {seed}")
 
-    far = int(np.argmax(np.linalg.norm(free[1:16] - free[0], axis=1))) + 1
-    return Problem(world, free[0], free[far], name=f"{robot.name}_{count}_{seed}")
+    goal_number = int(np.argmax(np.linalg.norm(free[1:16] - free[0], axis=1))) + 1
+    return Problem(world, free[0], free[goal_number], name=f"{robot.name}_{count}_{seed}")
 
 
 def turning_points(places: Matrix) -> NDArray[np.int64]:
@@ -104,23 +104,23 @@ def _shape(rng: np.random.Generator, number: int, reach: float) -> Shape:
 
 def _wander(rng: np.random.Generator, steps: int, length: float, low: float, high: float) -> Matrix:
     """Points ``length`` apart between two spheres about the origin, shape (steps + 1, 3)."""
-    place = _direction(rng) * rng.uniform(low, high)
+    point = _direction(rng) * rng.uniform(low, high)
     heading = _direction(rng)
-    places = [place]
+    points = [point]
 
     for _ in range(steps):
         if rng.random() < TURN_PROBABILITY:
             heading = _direction(rng)
-        while not low <= np.linalg.norm(place + length * heading) <= high:
+        while not low <= np.linalg.norm(point + length * heading) <= high:
             heading = _direction(rng)
-        place = place + length * heading
-        places.append(place)
-    return np.array(places)
+        point = point + length * heading
+        points.append(point)
+    return np.array(points)
 
 
 def _direction(rng: np.random.Generator) -> Vector:
-    drawn = rng.normal(size=3)
-    unit: Vector = drawn / np.linalg.norm(drawn)
+    normal = rng.normal(size=3)
+    unit: Vector = normal / np.linalg.norm(normal)
     return unit
 
 

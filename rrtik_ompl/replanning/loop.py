@@ -65,15 +65,16 @@ class Loop:
         self._patience = patience
 
         robot = problem.robot
-        self._seen = self._watched(0.0)
-        scene = self._seen.scene
+        self._snapshot = self._read_feed(0.0)
+        scene = self._snapshot.scene
         refuse_endless_turns(scene)
-        first = problem.world.with_accuracy("exact").with_scene(scene)
-        self._make_worlds(first)
+        first_world = problem.world.with_accuracy("exact").with_scene(scene)
+        self._make_worlds(first_world)
 
-        between = 0.5 * first.motion_resolution  # the margin holds between two checked configurations too
-        self._kept = min(CLEARANCE, between) if settings.clearance is None else settings.clearance
-        self._searched = between + (settings.clearance or 0.0)
+        # Searches look at steps of a motion alone: half a step on top, and what they clear holds between steps too [m].
+        half_resolution = 0.5 * first_world.motion_resolution
+        self._proven_clearance = min(CLEARANCE, half_resolution) if settings.clearance is None else settings.clearance
+        self._search_clearance = half_resolution + (settings.clearance or 0.0)
 
         self._tracker = MotionTracker(scene, settings.speed_bound)
         self._travels = Travels(settings.tick, settings.speed_bound, self._tracker.speeds)
@@ -81,34 +82,41 @@ class Loop:
         self._rng = np.random.default_rng(settings.seed)
 
         self.q = problem.start
-        self._goals = (
-            every_goal(problem, self._alone, self._rng) if goal_feed is None else goal_now(robot, goal_feed, 0.0)
-        )
-        self._first = {o.name: o.pose for o in scene.obstacles}  # a record tells of those that have moved since
-        self._left = np.nan  # [m]: the distance left at the end of the tick before
-        self._distances: dict[str, float] = {}  # [m] to be kept from each obstacle now
+        if goal_feed is None:
+            self._goals = every_goal(problem, self._world_of_arm, self._rng)
+        else:
+            self._goals = goal_now(robot, goal_feed, 0.0)
+
+        self._first_poses = {o.name: o.pose for o in scene.obstacles}  # a record tells of those that have moved since
+        self._distance_left_before = np.nan  # [m]: the distance left at the end of the tick before
+        self._required_distances: dict[str, float] = {}  # [m] to be kept from each obstacle now
 
         self.run = ReplanRun(
             problem.name, robot.name, robot.joint_names, settings.planner, settings.seed, settings.step, settings.rate,
-            settings.margin, settings.speed_bound, clearance=self._kept,
+            settings.margin, settings.speed_bound, clearance=self._proven_clearance,
         )  # fmt: skip
 
         self._read_scene(0.0)
-        self._world.move(scene, inflation=self._distances)  # a start may be where an obstacle is only predicted
-        check_start(self.q, scene, first, self._world)
+        # A start may be where an obstacle is only predicted: all copies of it stand where it is now.
+        self._world.move(scene, inflation=self._required_distances)
+        check_start(self.q, scene, first_world, self._world)
 
         self._box = sampling_box(robot, np.vstack([self.q, self._goals]))
         self._planner = make_planner(settings, self._world, *self._box)
-        self._distances = {}  # so that the first tick puts the predicted places in
+        self._required_distances = {}  # so that the first tick puts the predicted places in
 
-    def _make_worlds(self, first: World) -> None:
-        """The worlds of a run, in which obstacles are moved from then on."""
-        scene = first.scene
+    def _make_worlds(self, first_world: World) -> None:
+        """Make the worlds of a run, in which obstacles are moved from then on.
+
+        ``_world`` is that of searches, with predicted places of obstacles; ``_world_of_obstacles`` has no
+        self-collision, and tells distances of obstacles alone; ``_world_of_arm`` has no obstacles.
+        """
+        scene = first_world.scene
         copies = PREDICTED_PLACES if self._settings.lookahead_ticks else 1
-        self._world = MovingWorld(first, copies=copies)
-        self._near = MovingWorld(first, self_collision=False)
-        empty = Scene((), scene.attached, held_pairs(scene))
-        self._alone = first.with_accuracy("conservative").with_scene(empty)
+        self._world = MovingWorld(first_world, copies=copies)
+        self._world_of_obstacles = MovingWorld(first_world, self_collision=False)
+        empty_scene = Scene((), scene.attached, held_pairs(scene))
+        self._world_of_arm = first_world.with_accuracy("conservative").with_scene(empty_scene)
 
     def tick(self, number: int) -> bool:
         """Do one tick and add it to the record; False when the run is over."""
@@ -123,86 +131,94 @@ class Loop:
         if self._goal_feed is not None:
             self._goals = goal_now(self._problem.robot, self._goal_feed, now)
 
-        spent: dict[str, float] = {}
-        changed = self._measured(spent, "sense", self._read_scene, now)
-        if now - self._seen.time > self._patience:
+        seconds_of_part: dict[str, float] = {}
+        changed = self._timed(seconds_of_part, "sense", self._read_scene, now)
+        if now - self._snapshot.time > self._patience:
             return self._give_up(now)
-        self._measured(spent, "retarget", self._follow_goal)
+        self._timed(seconds_of_part, "retarget", self._follow_goal)
 
-        before_look = self._world.checked
-        free = self._measured(spent, "look", self._check) if changed or not self._planner.free else True
-        checked = self._world.checked - before_look
+        checked_before = self._world.checked
+        free = self._timed(seconds_of_part, "look", self._check) if changed or not self._planner.free else True
+        checked = self._world.checked - checked_before
 
         event: TickEvent = "walk"
         if not free and not self._world.blocked:
             event = "repair" if self._planner.path is not None else "plan"
-            before = self._planner.path
-            free = self._measured(spent, event, self._repair)
-            event = "walk" if free and self._planner.path is before else event
+            path_before = self._planner.path
+            free = self._timed(seconds_of_part, event, self._repair)
+            event = "walk" if free and self._planner.path is path_before else event
 
-        here = self.q
-        event, reason, place = self._early_evasion() or (self._go(event) if free else self._wait_or_evade())
-        self._left = self._distance_left(place)
+        q_before = self.q
+        event, reason, q_after = self._early_evasion() or (self._go(event) if free else self._wait_or_evade())
+        self._distance_left_before = self._distance_left(q_after)
 
         path = self._planner.path
-        moves = (place != here).any()
-        proven = self._measured(spent, "prove", self._surely_free, here, place) if moves else None
+        moves = (q_after != q_before).any()
+        proven: bool | None = None
+        if moves:
+            proven = self._timed(seconds_of_part, "prove", self._proven_whatever_moves, q_before, q_after)
 
-        self._record(now, here, event, {**spent, "all": self._clock() - begin}, checked, reason, path, proven)
-        self.q = place
+        seconds_of_part["all"] = self._clock() - begin
+        self._record(now, q_before, event, seconds_of_part, checked, reason, path, proven)
+        self.q = q_after
         return True
 
     def _give_up(self, now: float) -> bool:
         """End the run, since the feed has nothing new."""
-        silent = f"no scene since {self._seen.time:.3g} s: the scene feed has ended, or has been silent for longer"
-        reason = f"{silent} than feed_patience ({self._patience:g} s)"
+        silence = f"no scene since {self._snapshot.time:.3g} s: the scene feed has ended, or has been silent for longer"
+        reason = f"{silence} than feed_patience ({self._patience:g} s)"
         self._record(now, self.q, "wait", {}, 0, reason)
         self.run.outcome = "no scene"
         self.run.reason = reason
         return False
 
-    def _watched(self, now: float) -> Snapshot:
+    def _read_feed(self, now: float) -> Snapshot:
         """What the feed has, in which the arm must hold what it holds in the problem."""
-        seen = self._feed(now)
-        check_held(seen.scene, self._problem.world.scene)
-        return seen
+        snapshot = self._feed(now)
+        check_held(snapshot.scene, self._problem.world.scene)
+        return snapshot
 
     def _read_scene(self, now: float) -> bool:
         """Read the scene; whether anything has moved, or may have since it was seen."""
-        seen = self._watched(now)
-        scene = seen.scene
-        ages = seen.ages(now)
+        snapshot = self._read_feed(now)
+        scene = snapshot.scene
+        ages = snapshot.ages(now)
 
-        allows = self._allow(scene)
-        changed = self._tracker.update(seen) or allows
+        renewed = self._renew_worlds(scene)
+        changed = self._tracker.update(snapshot) or renewed
         self._doubt_moves_since(self._tracker.faster_since)
-        self._seen = seen
-        self.run.see(seen)
+        self._snapshot = snapshot
+        self.run.see(snapshot)
 
-        self._blind = self._settings.speed_bound is not None and max(ages.values(), default=0.0) > self._settings.tick
-        self._aged = self._travels.since_seen(scene, ages)
+        is_old = max(ages.values(), default=0.0) > self._settings.tick
+        self._scene_is_old = self._settings.speed_bound is not None and is_old
+        self._travels_since_seen = self._travels.since_seen(scene, ages)
 
         # What to keep from each obstacle [m]: for what it may do in the tick, also for what it may have done since it
         # was seen, and for what nobody has ruled out.
-        clear = self._settings.margin + self._searched
+        distance = self._settings.margin + self._search_clearance
         in_tick = self._travels.in_tick(scene)
-        self._at_once = required_distances(scene, clear, in_tick)
-        distances = required_distances(scene, clear, {name: way + self._aged[name] for name, way in in_tick.items()})
-        self._ways = self._travels.possible(seen, ages)
-        self._possible = None if self._ways is None else required_distances(scene, clear, self._ways)
+        self._required_in_tick = required_distances(scene, distance, in_tick)
+        travels = {name: travel + self._travels_since_seen[name] for name, travel in in_tick.items()}
+        distances = required_distances(scene, distance, travels)
+        self._possible_travels = self._travels.possible(snapshot, ages)
+        required_if_moving: dict[str, float] | None = None
+        if self._possible_travels is not None:
+            required_if_moving = required_distances(scene, distance, self._possible_travels)
+        self._required_if_moving = required_if_moving
 
-        if not changed and distances == self._distances:
+        if not changed and distances == self._required_distances:
             return False
-        self._distances = distances
+        self._required_distances = distances
 
         predicted = (self._tracker.later(scene, seconds, ages) for seconds in self._lookahead())
         self._world.move(scene, *predicted, inflation=distances)
         return True
 
-    def _allow(self, scene: Scene) -> bool:
-        """Make new worlds if other pairs may touch than before; whether that was so."""
-        before = self._world.scene
-        if pairs_that_may_touch(scene) == pairs_that_may_touch(before):
+    def _renew_worlds(self, scene: Scene) -> bool:
+        """Make new worlds if other pairs may touch than before; returns whether that was so."""
+        scene_before = self._world.scene
+        if pairs_that_may_touch(scene) == pairs_that_may_touch(scene_before):
             return False
         self._make_worlds(self._problem.world.with_accuracy("exact").with_scene(scene))
         self._planner = make_planner(self._settings, self._world, *self._box)
@@ -231,6 +247,7 @@ class Loop:
         return self._planner.retarget(self._goals, self._world, self._budget_ends())
 
     def _check(self) -> bool:
+        """Check the path again; whether it is free."""
         return self._planner.check_path(self._world)
 
     def _repair(self) -> bool:
@@ -239,46 +256,50 @@ class Loop:
             return True
         if not self._settings.lookahead_ticks:
             return False
-        self._world.move(self._world.scene, inflation=self._distances)
+        self._world.move(self._world.scene, inflation=self._required_distances)
         return self._planner.check_path(self._world) or self._new_proven_path()
 
     def _new_proven_path(self) -> bool:
         """Find a free path, if need be some more times until one is proven; the last one if none is."""
         planner = self._planner
-        before = self._planner.path
+        path_before = self._planner.path
         stop = self._budget_ends()
-        found: Matrix | None = None
+        new_path: Matrix | None = None
 
         for _ in range(TRIES):
             if not self._new_path(stop):
                 break
-            found = planner.path
-            if found is None or stop() or self._proven(found[:-1], found[1:]):
+            new_path = planner.path
+            if new_path is None or stop() or self._proven(new_path[:-1], new_path[1:]):
                 return True
-            planner.path = before
+            planner.path = path_before
             planner.check_path(self._world)
 
-        if found is None:
+        if new_path is None:
             return False
-        planner.path = found
+        planner.path = new_path
         return planner.check_path(self._world)
 
     def _proven(self, starts: Matrix, ends: Matrix) -> bool:
         """Whether motions, shapes (m, n), keep margin and clearance, whatever obstacles do within a tick."""
-        return bool(self._world.motions_proven(starts, ends, less=self._searched - self._kept).all())
+        less = self._search_clearance - self._proven_clearance
+        return bool(self._world.motions_proven(starts, ends, less=less).all())
 
-    def _surely_free(self, a: Vector, b: Vector) -> bool:
+    def _proven_whatever_moves(self, a: Vector, b: Vector) -> bool:
         """Whether a motion keeps margin and clearance, whatever obstacles did since they were seen and do in the tick.
 
         Other than in the search for a path, what was at rest so far may begin to move, and nothing may reach the base.
         """
-        if self._ways is None or self._possible is None or not self._world.base_apart(self._ways):
+        if self._possible_travels is None or self._required_if_moving is None:  # nothing bounds how far obstacles go
             return False
-        room = None if self._possible == self._distances else self._possible
-        less = self._searched - self._kept
-        return bool(self._world.motions_proven(a[None], b[None], less=less, inflation=room)[0])
+        if not self._world.base_apart(self._possible_travels):
+            return False
+        inflation = None if self._required_if_moving == self._required_distances else self._required_if_moving
+        less = self._search_clearance - self._proven_clearance
+        return bool(self._world.motions_proven(a[None], b[None], less=less, inflation=inflation)[0])
 
     def _new_path(self, stop: Stop) -> bool:
+        """Find a first path, repair the one that there is, or lead it to another goal; whether there is a free one."""
         planner = self._planner
         if planner.path is None:
             return planner.begin(self.q, self._goals, self._world, stop)
@@ -291,15 +312,15 @@ class Loop:
         """Evade a cloud that closes in before it is too near, with a path or without; None if that is not needed."""
         if self._world.blocked or not (self._closes_in() and self._world.valid(self.q)):
             return None
-        place = self._evasion()
-        return None if place is None else ("evade", "an obstacle closes in", place)
+        q = self._evasion()
+        return None if q is None else ("evade", "an obstacle closes in", q)
 
     def _go(self, event: TickEvent) -> tuple[TickEvent, str, Vector]:
         """Go along the free path. Event, reason, configuration."""
-        place = self._step()
-        if place is not self.q:
-            return event, "", place
-        return "wait", "what was seen is too old to go on" if self._blind else "the goal is not free", place
+        q = self._step()
+        if q is not self.q:
+            return event, "", q
+        return "wait", "what was seen is too old to go on" if self._scene_is_old else "the goal is not free", q
 
     def _step(self) -> Vector:
         """Go a step along the path, round corners if that is free; the configuration of the robot then."""
@@ -308,26 +329,26 @@ class Loop:
         if path is None or len(path) < 2:
             return self.q
 
-        place, passed = one_step(path, settings.step, self._max_change)
-        round_corner = bool(passed) and self._world.motion_valid(self.q, place)
-        if passed and not (round_corner and self._proven(self.q[None], place[None])):
-            place, passed = to_first_corner(path, settings.step, self._max_change)
+        q, passed = one_step(path, settings.step, self._max_change)
+        round_corner = bool(passed) and self._world.motion_valid(self.q, q)
+        if passed and not (round_corner and self._proven(self.q[None], q[None])):
+            q, passed = to_first_corner(path, settings.step, self._max_change)
 
-        if self._blind and not self._surely_free(self.q, place):
+        if self._scene_is_old and not self._proven_whatever_moves(self.q, q):
             return self.q
-        self._planner.advance(place, passed, self._world)
-        return place
+        self._planner.advance(q, passed, self._world)
+        return q
 
     def _closes_in(self) -> bool:
         """Whether a cloud comes nearer so fast that it will be too near soon; nothing else tells that it moves."""
-        left = self._distance_left(self.q)
-        return left < REACTION_TICKS * (self._left - left)
+        distance_left = self._distance_left(self.q)
+        return distance_left < REACTION_TICKS * (self._distance_left_before - distance_left)
 
     def _distance_left(self, q: Vector) -> float:
         """The distance of a configuration to obstacles beyond what has to be kept [m]; NaN where all is predicted."""
         if not self._tracker.unforeseen(0.0):
             return np.nan
-        return float(self._ahead(0).clearance(q[None])[0]) - max(self._at_once.values())
+        return float(self._world_ahead(0).clearance(q[None])[0]) - max(self._required_in_tick.values())
 
     def _wait_or_evade(self) -> tuple[TickEvent, str, Vector]:
         """Without a free path: wait, or evade an obstacle that is too near. Event, reason, configuration."""
@@ -340,32 +361,34 @@ class Loop:
             reason = "there is no path" if self._world.valid_batch(goals).any() else "the goal is not free"
             return "wait", reason, self.q
 
-        place = self._evasion()
-        if place is None:
+        q = self._evasion()
+        if q is None:
             return "wait", "an obstacle is too near, and every escape is blocked", self.q
-        return "evade", "an obstacle is too near", place
+        return "evade", "an obstacle is too near", q
 
     def _evasion(self) -> Vector | None:
         """The configuration after an evasive tick, from which the path goes on; None to stand still."""
-        place = evasion(
+        q = evasion(
             self.q, self._planner.path, step=self._settings.step, max_change=self._max_change,
-            distance=max(self._at_once.values()), ahead=self._ahead, alone=self._alone, rng=self._rng,
+            distance=max(self._required_in_tick.values()), ahead=self._world_ahead, alone=self._world_of_arm,
+            rng=self._rng,
         )  # fmt: skip
-        if place is not None:
-            self._planner.rejoin(place)
-        return place
+        if q is not None:
+            self._planner.rejoin(q)
+        return q
 
-    def _ahead(self, ticks: int) -> MovingWorld:
+    def _world_ahead(self, ticks: int) -> MovingWorld:
         """The world without self-collision so many ticks ahead; what cannot be predicted may have come nearer."""
         seconds = ticks * self._settings.tick
-        now = self._world.scene
-        scene = self._tracker.later(now, seconds) if ticks else now
+        scene_now = self._world.scene
+        scene = self._tracker.later(scene_now, seconds) if ticks else scene_now
         unforeseen = self._tracker.unforeseen(seconds)
-        room = {name: way + unforeseen.get(name, 0.0) for name, way in self._aged.items()}
-        self._near.move(scene, inflation=room)
-        return self._near
+        inflation = {name: travel + unforeseen.get(name, 0.0) for name, travel in self._travels_since_seen.items()}
+        self._world_of_obstacles.move(scene, inflation=inflation)
+        return self._world_of_obstacles
 
     def _arrived(self) -> bool:
+        """Whether the robot is at one of its goals."""
         return bool((np.abs(self._goals - self.q).max(axis=1) <= JOINT_TOLERANCE).any())
 
     def _budget_ends(self) -> Stop:
@@ -374,22 +397,23 @@ class Loop:
         end = self._clock() + self._settings.repair_seconds
         return lambda: clock() > end
 
-    def _measured(self, spent: dict[str, float], name: str, work: Callable[..., bool], *arguments: Any) -> bool:
+    def _timed(self, seconds_of_part: dict[str, float], name: str, work: Callable[..., bool], *arguments: Any) -> bool:
+        """What a part of a tick returns; how long it took is written to ``seconds_of_part[name]`` [s]."""
         begin = self._clock()
         result = work(*arguments)
-        spent[name] = self._clock() - begin
+        seconds_of_part[name] = self._clock() - begin
         return result
 
     def _record(
-        self, now: float, q: Vector, event: TickEvent, spent: Mapping[str, float], checked: int, reason: str,
+        self, now: float, q: Vector, event: TickEvent, seconds_of_part: Mapping[str, float], checked: int, reason: str,
         path: Matrix | None = None, proven: bool | None = None,
     ) -> None:  # fmt: skip
         poses = {
             o.name: pose_row(o.pose)
             for o in self._world.scene.obstacles
-            if not np.array_equal(o.pose.homogeneous, self._first[o.name].homogeneous)
+            if not np.array_equal(o.pose.homogeneous, self._first_poses[o.name].homogeneous)
         }
-        self.run.ticks.append(Tick(now, q, event, path, poses, spent, checked, reason, proven))
+        self.run.ticks.append(Tick(now, q, event, path, poses, seconds_of_part, checked, reason, proven))
 
 
 def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:
@@ -400,19 +424,19 @@ def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int
         step: Length of a step [unit of the space].
         max_change: How far each joint can move in a tick, shape (n,).
     """
-    left = 1.0  # of the tick
-    place = path[0]
+    ticks_left = 1.0  # of the tick
+    q = path[0]
     passed = 0
 
     for end in path[1:]:
-        edge = end - place
-        share = _share(edge, step, max_change)  # of a tick that the whole edge takes
-        if share > left:
-            return place + edge * (left / share), passed
-        left -= share
-        place = end
+        edge = end - q
+        ticks_of_edge = _ticks_of(edge, step, max_change)  # of a tick that the whole edge takes
+        if ticks_of_edge > ticks_left:
+            return q + edge * (ticks_left / ticks_of_edge), passed
+        ticks_left -= ticks_of_edge
+        q = end
         passed += 1
-    return place, passed - 1
+    return q, passed - 1
 
 
 def to_first_corner(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:
@@ -420,7 +444,7 @@ def to_first_corner(path: Matrix, step: float, max_change: Vector) -> tuple[Vect
     return one_step(path[:2], step, max_change)
 
 
-def _share(edge: Vector, step: float, max_change: Vector) -> float:
+def _ticks_of(edge: Vector, step: float, max_change: Vector) -> float:
     """How many ticks an edge takes."""
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = np.where(edge == 0.0, 0.0, np.abs(edge) / max_change)

@@ -129,22 +129,23 @@ class ReplanRun:
             problem: That was run; None if it is not known, and nothing is judged anew.
         """
         made, proven = self.moves
-        unproven = {k for k, tick in enumerate(self.ticks) if tick.proven is False}
+        unproven_ticks = {k for k, tick in enumerate(self.ticks) if tick.proven is False}
         text = f"{proven} of {made} moves proven free when they were made" if made else "no move of it is called proven"
 
-        found: tuple[RunViolation, ...] = ()
+        violations: tuple[RunViolation, ...] = ()
         if problem is not None:
             try:
-                found = self.violations(problem)
-                text += "; judged anew: " + (f"{len(found)} faults, the first: {found[0]}" if found else "no fault")
+                violations = self.violations(problem)
+                faults = f"{len(violations)} faults, the first: {violations[0]}" if violations else "no fault"
+                text += f"; judged anew: {faults}"
             except InputError as error:
                 text += f"; not judged anew: {error}"
 
-        unproven |= {each.tick for each in found}
-        last = len(self.ticks) - 2  # from the last tick on nothing is drawn
-        drawn = tuple(sorted({min(k, last) for k in unproven} if last >= 0 else ()))
-        contacts = tuple(_contact(each) for each in found)
-        return Judged(Verdict(made > 0 and proven == made and not found, text, drawn), None, contacts)
+        unproven_ticks |= {each.tick for each in violations}
+        last_drawn = len(self.ticks) - 2  # from the last tick on nothing is drawn
+        drawn = tuple(sorted({min(k, last_drawn) for k in unproven_ticks} if last_drawn >= 0 else ()))
+        contacts = tuple(_contact(each) for each in violations)
+        return Judged(Verdict(made > 0 and proven == made and not violations, text, drawn), None, contacts)
 
     @property
     def arrived(self) -> bool:
@@ -189,14 +190,14 @@ class ReplanRun:
             return f"{number} {noun}{'s' * (number != 1)}"
 
         repairs = self.seconds("repair", "repair")
-        worst = f", the longest {1e3 * repairs.max():.1f} ms" if len(repairs) else ""
-        why = f" ({self.reason})" if self.reason else ""
-        end = f"{self.problem}: {self.outcome}{why} after {self.ticks[-1].time:.2f} s"
+        longest = f", the longest {1e3 * repairs.max():.1f} ms" if len(repairs) else ""
+        reason = f" ({self.reason})" if self.reason else ""
+        end = f"{self.problem}: {self.outcome}{reason} after {self.ticks[-1].time:.2f} s"
         moves, proven = self.moves
-        share = f", {proven} of {moves} moves proven" if moves else ""
+        proven_moves = f", {proven} of {moves} moves proven" if moves else ""
 
-        events = f"{counted('repair', 'repair')}{worst}, {counted('wait', 'wait')}, {counted('evade', 'evasion')}"
-        return f"{end}: {events}, length {self.length:.2f}{share}"
+        events = f"{counted('repair', 'repair')}{longest}, {counted('wait', 'wait')}, {counted('evade', 'evasion')}"
+        return f"{end}: {events}, length {self.length:.2f}{proven_moves}"
 
     def figures(self) -> dict[str, Any]:
         """The run in numbers, for JSON: outcome, times [s], counts of events, length, and wall times of repairs [s]."""
@@ -263,24 +264,24 @@ def load_run(path: str | os.PathLike[str]) -> ReplanRun:
 
 def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
     """What a record says beside its ticks, each entry of the right kind."""
-    given = {name: document[name] for name in _HEADS}
+    heads = {name: document[name] for name in _HEADS}
 
     for name in ("problem", "robot", "planner", "outcome", "reason"):
-        require(given[name], str, name)
-    require(given["joint_names"], list, "joint_names")
-    whole_number(given["seed"], "seed")
+        require(heads[name], str, name)
+    require(heads["joint_names"], list, "joint_names")
+    whole_number(heads["seed"], "seed")
     for name in ("step", "rate"):
-        positive(given[name], name)
-    not_negative(given["margin"], "margin")
-    if given["speed_bound"] is not None:
-        positive(given["speed_bound"], "speed_bound")
+        positive(heads[name], name)
+    not_negative(heads["margin"], "margin")
+    if heads["speed_bound"] is not None:
+        positive(heads["speed_bound"], "speed_bound")
 
-    outcome = one_of(OUTCOMES, given["outcome"], "outcome")
+    outcome = one_of(OUTCOMES, heads["outcome"], "outcome")
     clearance = document.get("clearance")  # older records have none
-    given["clearance"] = None if clearance is None else not_negative(clearance, "clearance")
+    heads["clearance"] = None if clearance is None else not_negative(clearance, "clearance")
     if "scenes_end" in document:
-        given["scenes_end"] = finite_number(document["scenes_end"], "scenes_end")
-    return {**given, "outcome": outcome, "joint_names": tuple(given["joint_names"])}
+        heads["scenes_end"] = finite_number(document["scenes_end"], "scenes_end")
+    return {**heads, "outcome": outcome, "joint_names": tuple(heads["joint_names"])}
 
 
 def _check_times(ticks: list[Tick]) -> None:
@@ -307,7 +308,7 @@ def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
         finite_array(entry["q"], (joints,), "q of a tick"),
         event,
         None if entry["path"] is None else finite_array(entry["path"], (None, joints), "path of a tick"),
-        {name: _placed(values, f"pose of '{name}'") for name, values in entry["poses"].items()},
+        {name: _pose_row(values, f"pose of '{name}'") for name, values in entry["poses"].items()},
         {part: finite_number(value, f"seconds of '{part}'") for part, value in entry["seconds"].items()},
         whole_number(entry["checked"], "checked"),
         str(entry.get("reason", "")),
@@ -315,15 +316,15 @@ def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
     )
 
 
-def _placed(values: ArrayLike, what: str) -> Vector:
+def _pose_row(values: ArrayLike, what: str) -> Vector:
     """x, y, z and a unit quaternion, as written."""
     row = finite_array(values, (7,), what)
     pose(row[:3], row[3:], what)
     return row
 
 
-def _new_points(seen: Snapshot, before: Snapshot | None) -> int:
+def _new_points(snapshot: Snapshot, before: Snapshot | None) -> int:
     """How many points the clouds of a scene have that were not in the one before it."""
-    known = set[int]() if before is None else {id(o.shape) for o in before.scene.obstacles}
-    clouds = (o.shape for o in seen.scene.obstacles if isinstance(o.shape, PointCloud))
-    return sum(len(cloud.points) for cloud in clouds if id(cloud) not in known)
+    known_shapes = set[int]() if before is None else {id(o.shape) for o in before.scene.obstacles}
+    clouds = (o.shape for o in snapshot.scene.obstacles if isinstance(o.shape, PointCloud))
+    return sum(len(cloud.points) for cloud in clouds if id(cloud) not in known_shapes)

@@ -35,26 +35,26 @@ def scenes_data(snapshots: Sequence[Snapshot]) -> Json:
         return numbers[id(shape)]
 
     entries = list[Json]()
-    known = dict[str, Json]()
+    previous_rows = dict[str, Json]()
     allowed: list[list[str]] | None = None
     contacts = list[list[Any]]()
-    for seen in snapshots:
-        entry: Json = {"time": seen.time}
-        rows = {o.name: _obstacle_data(o, number_of(o.shape)) for o in seen.scene.obstacles}
-        entry["obstacles"] = [row for name, row in rows.items() if known.get(name) != row]
-        known = rows
+    for snapshot in snapshots:
+        entry: Json = {"time": snapshot.time}
+        rows = {o.name: _obstacle_data(o, number_of(o.shape)) for o in snapshot.scene.obstacles}
+        entry["obstacles"] = [row for name, row in rows.items() if previous_rows.get(name) != row]
+        previous_rows = rows
 
-        pairs = [list(pair) for pair in seen.scene.allowed_collisions]
+        pairs = [list(pair) for pair in snapshot.scene.allowed_collisions]
         if pairs != allowed:
             entry["allowed_collisions"] = allowed = pairs
-        touching = [[each.first, each.second, each.distance] for each in seen.scene.contacts]
+        touching = [[each.first, each.second, each.distance] for each in snapshot.scene.contacts]
         if touching != contacts:
             entry["contacts"] = contacts = touching
 
-        if not entries and seen.scene.attached:
-            entry["attached"] = [_held_data(held, number_of(held.shape)) for held in seen.scene.attached]
-        entry |= {"unseen": dict(seen.unseen)} if seen.unseen else {}
-        entry |= {"stated": True} if seen.stated else {}
+        if not entries and snapshot.scene.attached:
+            entry["attached"] = [_held_data(held, number_of(held.shape)) for held in snapshot.scene.attached]
+        entry |= {"unseen": dict(snapshot.unseen)} if snapshot.unseen else {}
+        entry |= {"stated": True} if snapshot.stated else {}
         entries.append(entry)
 
     return {"shapes": list(shapes.values()), "scenes": entries}
@@ -71,14 +71,14 @@ def scenes_of(document: Mapping[str, Any]) -> list[Snapshot]:
     require(document["scenes"], list, "scenes")
     shapes = [_shape(entry) for entry in document.get("shapes", [])]
 
-    found = list[Snapshot]()
-    known = dict[str, Obstacle]()
+    snapshots = list[Snapshot]()
+    obstacle_of_name = dict[str, Obstacle]()
     attached: tuple[AttachedObject, ...] = ()
     allowed: list[list[str]] = []
     contacts = list[list[Any]]()
 
     for entry in document["scenes"]:
-        known |= {o.name: o for o in (_obstacle(row, shapes) for row in entry["obstacles"])}
+        obstacle_of_name |= {o.name: o for o in (_obstacle(row, shapes) for row in entry["obstacles"])}
         allowed = entry.get("allowed_collisions", allowed)
         attached = tuple(_held(row, shapes) for row in entry["attached"]) if "attached" in entry else attached
         contacts = entry.get("contacts", contacts)
@@ -87,13 +87,13 @@ def scenes_of(document: Mapping[str, Any]) -> list[Snapshot]:
         unseen = {name: finite_number(age, f"unseen of '{name}'") for name, age in entry.get("unseen", {}).items()}
         pairs = tuple((first, second) for first, second in allowed)
         touching = tuple(Touching(*each) for each in contacts)
-        scene = Scene(tuple(known.values()), attached, pairs, touching)
+        scene = Scene(tuple(obstacle_of_name.values()), attached, pairs, touching)
 
-        if found and time <= found[-1].time:
-            raise InputError(f"scenes: times go backwards: {time:g} s comes after {found[-1].time:g} s")
-        found.append(Snapshot(time, scene, unseen, bool(entry.get("stated", False))))
+        if snapshots and time <= snapshots[-1].time:
+            raise InputError(f"scenes: times go backwards: {time:g} s comes after {snapshots[-1].time:g} s")
+        snapshots.append(Snapshot(time, scene, unseen, bool(entry.get("stated", False))))
 
-    return found
+    return snapshots
 
 
 @lru_cache

@@ -127,8 +127,8 @@ class ReplanSettings:
         if self.max_edge is None:
             return usual
         if self.max_edge < MIN_EDGE_SHARE * usual:
-            least = f"max_edge must be at least {MIN_EDGE_SHARE * usual:.3g}, got {self.max_edge:g}"
-            raise InputError(f"{least}; {usual:.3g} suits this robot")
+            fault = f"max_edge must be at least {MIN_EDGE_SHARE * usual:.3g}, got {self.max_edge:g}"
+            raise InputError(f"{fault}; {usual:.3g} suits this robot")
         return self.max_edge
 
 
@@ -147,10 +147,10 @@ def refuse_renamed(options: Mapping[str, object]) -> None:
 
 def make_planner(settings: ReplanSettings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
-    edge = settings.edge_length(world.robot)
+    edge_length = settings.edge_length(world.robot)
     seed = settings.seed
     kind = REPLANNERS[settings.planner]
     cuts = KernelCuts(world, seed) if has_kernels(world, *KERNELS) else None
     if cuts is not None and kind.repairs_in_kernels:
-        return KernelDrrtCon(world, lower, upper, edge, seed, forgetting=kind.forgetting)
-    return kind.in_box(lower, upper, edge, seed, cuts)
+        return KernelDrrtCon(world, lower, upper, edge_length, seed, forgetting=kind.forgetting)
+    return kind.in_box(lower, upper, edge_length, seed, cuts)

@@ -55,14 +55,14 @@ class SingleTree(DrrtCon):
     def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
         if self._tree is not None:
             self._tree = trimmed(self._tree, motions)
-        return self(self._dense[:1], self._dense[-1:], motions, stop)
+        return self(self._points_at_last_check[:1], self._points_at_last_check[-1:], motions, stop)
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
     ) -> Joined | None:
         """Grow the tree until it reaches the end of ``first``; the way back to its root, or None."""
         del chain
-        aim = first[-1]
+        robot_configuration = first[-1]
         if self._tree is None or not (self._tree.rows[0] == second[0]).all():
             self._tree = ConfigurationTree(second[:1])
 
@@ -71,10 +71,10 @@ class SingleTree(DrrtCon):
                 return None
             self.samples += 1
             at_robot = self._rng.random() < ROBOT_PROBABILITY
-            target = aim if at_robot else self._rng.uniform(self._rules.lower, self._rules.upper)
-            new = extend(self._tree, target, self._rules, one_by_one(motions))
-            if new is not None and (self._tree.rows[new] == aim).all():
-                return joined(first, self._tree.branch(new)[::-1], second, chain=False)
+            target = robot_configuration if at_robot else self._rng.uniform(self._rules.lower, self._rules.upper)
+            vertex = extend(self._tree, target, self._rules, one_by_one(motions))
+            if vertex is not None and (self._tree.rows[vertex] == robot_configuration).all():
+                return joined(first, self._tree.branch(vertex)[::-1], second, chain=False)
         return None
 
 
@@ -82,13 +82,13 @@ def trimmed(tree: ConfigurationTree, motions: MotionQueries) -> ConfigurationTre
     """What is left of a tree when blocked edges and all that hangs on them are cut off; checked in one call."""
     rows = tree.rows
     parents = np.array(tree.parents)
-    keep: Mask = np.ones(len(rows), dtype=bool)
-    keep[1:] = motions.motion_valid_batch(rows[parents[1:]], rows[1:])
+    connected: Mask = np.ones(len(rows), dtype=bool)
+    connected[1:] = motions.motion_valid_batch(rows[parents[1:]], rows[1:])
     for k in range(1, len(rows)):  # parents come before their children
-        keep[k] &= keep[parents[k]]
+        connected[k] &= connected[parents[k]]
 
-    numbers = np.cumsum(keep) - 1
-    left = ConfigurationTree(rows[:1])
-    for k in np.flatnonzero(keep)[1:]:
-        left.add(rows[k], int(numbers[parents[k]]))
-    return left
+    numbers = np.cumsum(connected) - 1
+    trimmed_tree = ConfigurationTree(rows[:1])
+    for k in np.flatnonzero(connected)[1:]:
+        trimmed_tree.add(rows[k], int(numbers[parents[k]]))
+    return trimmed_tree

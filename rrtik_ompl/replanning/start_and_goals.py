@@ -36,8 +36,8 @@ def check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> N
         InputError: It names the pair.
     """
     if not world.valid(q):
-        found = f"scene feed: at its begin the robot is in collision: {world.explain(q)}"
-        raise InputError(f"{found}; move the obstacle or lower its margin")
+        fault = f"scene feed: at its begin the robot is in collision: {world.explain(q)}"
+        raise InputError(f"{fault}; move the obstacle or lower its margin")
     if not moving.valid(q):
         nearest = world.closest(q)
         pair = "" if nearest is None else f" ('{nearest.first}' to '{nearest.second}': {nearest.distance:.3g} m)"
@@ -45,7 +45,7 @@ def check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> N
         raise InputError(f"start: nearer to contact than the margin{pair}; {remedy}")
 
 
-def every_goal(problem: Problem, alone: World, rng: np.random.Generator) -> Matrix:
+def every_goal(problem: Problem, world_of_arm: World, rng: np.random.Generator) -> Matrix:
     """Every configuration that may be the goal, also those that obstacles block now, shape (g, n).
 
     Raises:
@@ -53,10 +53,10 @@ def every_goal(problem: Problem, alone: World, rng: np.random.Generator) -> Matr
     """
     if problem.goal.q is not None:
         return problem.goal.q[None]
-    found = goal_configurations(Problem(alone, problem.start, problem.goal), rng)
-    if len(found.rows) == 0:
-        raise InputError(f"goal: {found.reason}")
-    return found.rows
+    search = goal_configurations(Problem(world_of_arm, problem.start, problem.goal), rng)
+    if len(search.rows) == 0:
+        raise InputError(f"goal: {search.reason}")
+    return search.rows
 
 
 def goal_now(robot: Robot, goal_feed: GoalFeed, now: float) -> Matrix:
@@ -80,5 +80,5 @@ def sampling_box(robot: Robot, ends: Matrix) -> tuple[Vector, Vector]:
 
 def held_pairs(scene: Scene) -> tuple[tuple[str, str], ...]:
     """Allowed collisions that do not concern obstacles."""
-    gone = {o.name for o in scene.obstacles}
-    return tuple(pair for pair in scene.allowed_collisions if not gone & set(pair))
+    obstacle_names = {o.name for o in scene.obstacles}
+    return tuple(pair for pair in scene.allowed_collisions if not obstacle_names & set(pair))

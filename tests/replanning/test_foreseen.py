@@ -105,14 +105,14 @@ def test_a_search_ends_in_the_midst_of_what_takes_long(monkeypatch):
 
 def test_what_a_search_has_to_wait_for_is_not_taken_from_its_time(monkeypatch):
     clock = [0.0]
-    hopeless = in_time._hopeless
+    hopeless = in_time._why_impossible
 
     def compiled(*of):
         clock[0] += 1000.0
         return hopeless(*of)
 
     monkeypatch.setattr("rrtik_ompl.replanning.in_time.time.perf_counter", lambda: clock[0])
-    monkeypatch.setattr(in_time, "_hopeless", compiled)
+    monkeypatch.setattr(in_time, "_why_impossible", compiled)
     assert plan_in_time(crossing(), speed=5.0, limits=FAST, seconds=1.0, seed=1).found
 
 

@@ -126,30 +126,30 @@ def plan_in_time(
     refuse_endless_turns(problem.world.scene)
 
     settings = problem.world.settings
-    wanted = CLEARANCE if clearance is None else not_negative(clearance, "clearance")
+    wanted_clearance = CLEARANCE if clearance is None else not_negative(clearance, "clearance")
     options = _Options(
         slot=1.0 / positive(rate, "rate", "give slots a second, such as 10"),
         horizon=positive(horizon, "horizon", "give the latest arrival [s]"),
         speed=float("inf") if speed is None else positive(speed, "speed", "give it in rad/s or m/s"),
         margin=not_negative(margin, "margin"),
-        clearance=max(wanted, (settings.proving or 0.0) - settings.clearance),
+        clearance=max(wanted_clearance, (settings.proving or 0.0) - settings.clearance),
         limits=limits,
         seed=whole_number(seed, "seed"),
     )
     at_most(options.horizon / options.slot, MOST_SLOTS, "slots of time", "lower horizon or rate")
-    most = whole_number(iterations, "iterations", least=1)
-    limit = positive(seconds, "seconds")
+    max_iterations = whole_number(iterations, "iterations", least=1)
+    time_limit = positive(seconds, "seconds")
 
-    begun = time.perf_counter()
-    search, cut_short = _search(problem, options)
-    reason = _hopeless(search, options, cut_short)
-    end = time.perf_counter() + limit  # kernels may have been compiled and goals been looked for until now
-    rows = None if reason else search.run(most, lambda: time.perf_counter() > end)
+    begin = time.perf_counter()
+    search, reaches_base = _search(problem, options)
+    reason = _why_impossible(search, options, reaches_base)
+    end = time.perf_counter() + time_limit  # kernels may have been compiled and goals been looked for until now
+    rows = None if reason else search.run(max_iterations, lambda: time.perf_counter() > end)
     if rows is None and not reason:
-        reason = _not_found(search, cut_short)
+        reason = _why_not_found(search, reaches_base)
 
     run = None if rows is None else _record(problem, search, rows, options)
-    return TimedPlan(run, reason, options.slot * search.least, search.iterations, time.perf_counter() - begun)
+    return TimedPlan(run, reason, options.slot * search.least_slots, search.iterations, time.perf_counter() - begin)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -166,7 +166,7 @@ class _Options:
 
 
 def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
-    """The search of a problem, and why it has less time than the horizon, or ""."""
+    """The search of a problem, and a line that says when an obstacle reaches the base before the horizon, or ""."""
     robot = problem.robot
     scene = problem.world.scene
     rng = np.random.default_rng(options.seed)
@@ -175,40 +175,40 @@ def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
         require(options.limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
     rates = RateLimits.of(robot) if options.limits is None else options.limits.for_joints(robot.dof)
 
-    alone = problem.world.with_accuracy("conservative").with_scene(Scene((), scene.attached, held_pairs(scene)))
-    goals = every_goal(problem, alone, rng)
+    world_of_arm = problem.world.with_accuracy("conservative").with_scene(Scene((), scene.attached, held_pairs(scene)))
+    goals = every_goal(problem, world_of_arm, rng)
     lower, upper = sampling_box(robot, np.vstack([problem.start, goals]))
 
     worlds = ForeseenWorlds(problem.world, options.slot, options.margin + options.clearance)
-    reached, cut_short = worlds.base_reached(options.horizon)
-    last = int(min(options.horizon, reached) / options.slot + ROUNDING)
+    base_reached_at, reaches_base = worlds.base_reached(options.horizon)
+    last_slot = int(min(options.horizon, base_reached_at) / options.slot + ROUNDING)
 
     pace = Pace(np.maximum(rates.velocity * options.slot, SLOWEST), max(options.speed * options.slot, SLOWEST))
-    return TimeSearch(worlds, pace, Ends(problem.start, goals, lower, upper, last), rng), cut_short
+    return TimeSearch(worlds, pace, Ends(problem.start, goals, lower, upper, last_slot), rng), reaches_base
 
 
-def _hopeless(search: TimeSearch, options: _Options, cut_short: str) -> str:
+def _why_impossible(search: TimeSearch, options: _Options, reaches_base: str) -> str:
     """Why a search need not begin, or ""."""
     if library(PROOF_KERNELS) is None:
         return "motions in time are proven by kernels, and there are none here; install numba"
-    if options.slot * search.least > options.horizon + ROUNDING:
-        return f"speeds allow no arrival before {options.slot * search.least:g} s; raise horizon, speed or rate"
-    if search.least > search.ends.last:
-        return f"{cut_short}, before the goal can be reached"
+    if options.slot * search.least_slots > options.horizon + ROUNDING:
+        return f"speeds allow no arrival before {options.slot * search.least_slots:g} s; raise horizon, speed or rate"
+    if search.least_slots > search.ends.last:
+        return f"{reaches_base}, before the goal can be reached"
     if not search.worlds.free(0, search.ends.start, search.ends.start):
         return "the start is not proven free in the first slot of time; raise rate, or lower margin or clearance"
     return ""
 
 
-def _not_found(search: TimeSearch, cut_short: str) -> str:
+def _why_not_found(search: TimeSearch, reaches_base: str) -> str:
     """Why a search has ended with nothing."""
-    if search.shut:
-        tried = f"the goal is not proven free at any of the {search.shut} arrivals that were tried"
+    if search.blocked_arrivals:
+        what = f"the goal is not proven free at any of the {search.blocked_arrivals} arrivals that were tried"
         remedy = "raise horizon, or lower margin or clearance"
     else:
-        tried = f"no way was found in {search.iterations} iterations"
+        what = f"no way was found in {search.iterations} iterations"
         remedy = "raise horizon, rate, iterations or seconds"
-    return f"{tried}, and {cut_short}" if cut_short else f"{tried}; {remedy}"
+    return f"{what}, and {reaches_base}" if reaches_base else f"{what}; {remedy}"
 
 
 def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Options) -> ReplanRun:
@@ -223,16 +223,23 @@ def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Option
     )  # fmt: skip
 
     run.see(Snapshot(0.0, search.worlds.scene_at(0.0), stated=True))
-    first = {o.name: o.pose for o in search.worlds.scene_at(0.0).obstacles}  # stated poses may be others
+    first_poses = {o.name: o.pose for o in search.worlds.scene_at(0.0).obstacles}  # stated poses may be others
 
     for number, q in enumerate(rows):
-        left = rows[number:]
-        moves = len(left) > 1 and bool((left[1] != q).any())
-        event: TickEvent = "arrive" if len(left) == 1 else "wait" if not moves else "walk" if number else "plan"
-        placed = search.worlds.scene_at(slot * number).obstacles
-        poses = {o.name: pose_row(o.pose) for o in placed if (o.pose.homogeneous != first[o.name].homogeneous).any()}
-        proven = search.worlds.free(number, q, left[1]) if moves else None
-        path = without_points_between(left) if len(left) > 1 else None
+        rows_left = rows[number:]
+        is_moving = len(rows_left) > 1 and bool((rows_left[1] != q).any())
+        event: TickEvent = "walk" if number else "plan"
+        if len(rows_left) == 1:
+            event = "arrive"
+        elif not is_moving:
+            event = "wait"
+
+        obstacles = search.worlds.scene_at(slot * number).obstacles
+        poses = {
+            o.name: pose_row(o.pose) for o in obstacles if (o.pose.homogeneous != first_poses[o.name].homogeneous).any()
+        }
+        proven = search.worlds.free(number, q, rows_left[1]) if is_moving else None
+        path = without_points_between(rows_left) if len(rows_left) > 1 else None
         run.ticks.append(Tick(slot * number, q, event, path, poses, {}, 0, "" if event != "wait" else WAITS, proven))
 
     run.outcome = "arrived"

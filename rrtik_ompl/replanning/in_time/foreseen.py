@@ -36,16 +36,16 @@ class ForeseenWorlds:
     Args:
         world: The robot and the scene, whose obstacles state their motions.
         slot: Length of a slot [s].
-        room: What the arm keeps from every obstacle beside its margin [m].
+        clearance: What the arm keeps from every obstacle beside its margin [m].
 
     Raises:
         InputError: If an obstacle without an end turns.
     """
 
-    def __init__(self, world: World, slot: float, room: float) -> None:
+    def __init__(self, world: World, slot: float, clearance: float) -> None:
         self._world = world.with_accuracy("exact")
         self._slot = slot
-        self._room = room
+        self._clearance = clearance
         self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in world.scene.obstacles}
         self._worlds: dict[bytes, MovingWorld] = {}
         self._keys: dict[int, bytes] = {}  # of the slots' worlds
@@ -53,7 +53,7 @@ class ForeseenWorlds:
 
     def free(self, slot: int, a: Vector, b: Vector) -> bool:
         """Whether the straight motion from a to b, shape (n,), both inside the limits, is proven free in a slot."""
-        return bool(self._in(slot).motions_proven(a[None], b[None])[0])
+        return bool(self._world_in_slot(slot).motions_proven(a[None], b[None])[0])
 
     def steps_free(self, slot: int, rows: Matrix, onward: int, stop: Stop) -> int:
         """How many of the motions from row to row, shape (k, n), are free, the first in a slot, the next in that after.
@@ -78,36 +78,43 @@ class ForeseenWorlds:
         """
         obstacles = {o.name: o for o in self._world.scene.obstacles if o.motion is not None}
         bodies = self._world.bodies
-        found = (float("inf"), "")
+        first_touch = (float("inf"), "")
 
         for pair in self._world.pairs:
-            part, solid = sorted((bodies[k] for k in pair), key=lambda body: body.kind == "obstacle")
-            if part.joint == solid.joint == 0 and solid.name in obstacles:
-                time = self._touch(part, solid, obstacles[solid.name], 0.0, min(until, found[0]))
+            base_part, obstacle_body = sorted((bodies[k] for k in pair), key=lambda body: body.kind == "obstacle")
+            if base_part.joint == obstacle_body.joint == 0 and obstacle_body.name in obstacles:
+                limit = min(until, first_touch[0])
+                time = self._first_touch(base_part, obstacle_body, obstacles[obstacle_body.name], 0.0, limit)
                 if time is not None:
-                    found = time, f"'{solid.name}' reaches '{part.name}' at {time:.3g} s, and the base cannot give way"
+                    pair_reached = f"'{obstacle_body.name}' reaches '{base_part.name}' at {time:.3g} s"
+                    first_touch = time, f"{pair_reached}, and the base cannot give way"
 
-        return found
+        return first_touch
 
-    def _touch(self, part: Body, solid: Body, obstacle: Obstacle, begin: float, end: float) -> float | None:
+    def _first_touch(
+        self, base_part: Body, obstacle_body: Body, obstacle: Obstacle, begin: float, end: float
+    ) -> float | None:
         """When an obstacle first touches a body at rest, None if it is proven apart from it from begin to end [s]."""
         middle = 0.5 * (begin + end)
-        way = travel(obstacle, begin, end, self._radii[obstacle.name])
-        pose = _placed(obstacle, middle) * solid.within
-        if distance(part.geometry, part.placement.homogeneous, solid.geometry, pose.homogeneous, way) is not None:
+        reach = travel(obstacle, begin, end, self._radii[obstacle.name])
+        pose = _pose_at(obstacle, middle) * obstacle_body.within
+        rest = base_part.placement.homogeneous
+        if distance(base_part.geometry, rest, obstacle_body.geometry, pose.homogeneous, reach) is not None:
             return None
 
-        if way <= FINEST:
+        if reach <= FINEST:
             return begin
-        first = self._touch(part, solid, obstacle, begin, middle)
-        return self._touch(part, solid, obstacle, middle, end) if first is None else first
+        first_touch = self._first_touch(base_part, obstacle_body, obstacle, begin, middle)
+        if first_touch is not None:
+            return first_touch
+        return self._first_touch(base_part, obstacle_body, obstacle, middle, end)
 
     def scene_at(self, time: float) -> Scene:
         """Where obstacles are at a time [s]."""
         scene = self._world.scene
-        return replace(scene, obstacles=tuple(replace(o, pose=_placed(o, time)) for o in scene.obstacles))
+        return replace(scene, obstacles=tuple(replace(o, pose=_pose_at(o, time)) for o in scene.obstacles))
 
-    def _in(self, slot: int) -> MovingWorld:
+    def _world_in_slot(self, slot: int) -> MovingWorld:
         """The world in a slot; where all is at rest one world serves every slot."""
         key = self._keys.get(slot)
         if key is not None and key in self._worlds:
@@ -116,13 +123,15 @@ class ForeseenWorlds:
         begin = slot * self._slot
         end = (slot + 1) * self._slot
         scene = self.scene_at(0.5 * (begin + end))
-        kept = {o.name: self._room + travel(o, begin, end, self._radii[o.name]) for o in self._world.scene.obstacles}
-        places = np.array([[*o.pose.homogeneous.ravel(), kept[o.name]] for o in scene.obstacles])
+        required_distances = {
+            o.name: self._clearance + travel(o, begin, end, self._radii[o.name]) for o in self._world.scene.obstacles
+        }
+        places = np.array([[*o.pose.homogeneous.ravel(), required_distances[o.name]] for o in scene.obstacles])
 
         key = self._keys[slot] = blake2b(places.tobytes(), digest_size=16).digest()
         if key not in self._worlds:
             world = self._world_to_place()
-            world.move(scene, inflation=kept)
+            world.move(scene, inflation=required_distances)
             self._worlds[key] = world
         return self._worlds[key]
 
@@ -136,7 +145,7 @@ class ForeseenWorlds:
         return self._worlds.pop(list(self._worlds)[int(self._rng.integers(len(self._worlds)))])
 
 
-def _placed(obstacle: Obstacle, time: float) -> pin.SE3:
+def _pose_at(obstacle: Obstacle, time: float) -> pin.SE3:
     """Where an obstacle is at a time [s]."""
     return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
 
@@ -160,17 +169,17 @@ def travel(obstacle: Obstacle, begin: float, end: float, radius: float) -> float
         return 0.5 * (end - begin) * float(np.linalg.norm(motion.velocity)) + ROUNDING
 
     middle = 0.5 * (begin + end)
-    ways = []
+    travels = []
     for first, last in ((begin, middle), (middle, end)):
         stations = motion.times[(motion.times > first) & (motion.times < last)]
         poses = [motion.pose_at(obstacle.pose, float(time)) for time in (first, *stations, last)]
-        ways.append(sum(_way(a, b, radius, obstacle.name) for a, b in pairwise(poses)))
-    return max(ways) + (ROUNDING if max(ways) > 0.0 else 0.0)
+        travels.append(sum(_travel_bound(a, b, radius, obstacle.name) for a, b in pairwise(poses)))
+    return max(travels) + (ROUNDING if max(travels) > 0.0 else 0.0)
 
 
-def _way(a: pin.SE3, b: pin.SE3, radius: float, name: str) -> float:
+def _travel_bound(a: pin.SE3, b: pin.SE3, radius: float, name: str) -> float:
     angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
-    turned = radius * angle if angle > ROTATION_NOISE else 0.0
-    if not np.isfinite(turned):
+    arc = radius * angle if angle > ROTATION_NOISE else 0.0
+    if not np.isfinite(arc):
         raise InputError(f"obstacle '{name}' has no end and turns: no bound on its way; use a box in its place")
-    return float(np.linalg.norm(b.translation - a.translation)) + turned
+    return float(np.linalg.norm(b.translation - a.translation)) + arc

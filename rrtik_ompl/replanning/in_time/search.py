@@ -70,86 +70,89 @@ class TimeSearch:
         self.pace = pace
         self.ends = ends
         self._rng = rng
-        self._each_least: NDArray[np.int64] = np.maximum(pace.whole_slots(ends.goals - ends.start), 1)
-        self.least = int(self._each_least.min())
+        self._least_slots_of_goals: NDArray[np.int64] = np.maximum(pace.whole_slots(ends.goals - ends.start), 1)
+        self.least_slots = int(self._least_slots_of_goals.min())
         self.iterations = 0
         self._begin_anew(None)
 
     @property
-    def shut(self) -> int:
+    def blocked_arrivals(self) -> int:
         """How many arrivals were tried, if the goal was free at none of them; else 0."""
-        return 0 if self._trees[1].size else len(self._rooted)
+        return 0 if self._trees[1].size else len(self._arrivals_tried)
 
     def _begin_anew(self, earlier: int | None) -> None:
         """A round with new trees; with a last slot that is ``earlier`` than what was found, or the first one."""
         self._trees = (TimeTree(self.pace, 1), TimeTree(self.pace, -1))
         self._trees[0].add(self.ends.start, 0, -1)
-        self._rooted: set[tuple[int, int]] = set()
-        self._hard = earlier is not None
-        first = int(np.ceil(FIRST_SHARE * self.least)) + PIECE
-        self._last = min(self.ends.last, first) if earlier is None else earlier
+        self._arrivals_tried: set[tuple[int, int]] = set()
+        self._must_be_earlier = earlier is not None
+        first_last_slot = int(np.ceil(FIRST_SHARE * self.least_slots)) + PIECE
+        self._last = min(self.ends.last, first_last_slot) if earlier is None else earlier
 
     def run(self, iterations: int, stop: Stop) -> Matrix | None:
         """The earliest arrival that is found: a configuration for each slot, shape (k, n); None if there is none."""
         best: Matrix | None = None
         fruitless = 0  # rounds without an earlier way
-        since = 0  # iterations of the round
+        iterations_of_round = 0
 
-        while self.iterations < iterations and not (stop() or self._done(best, fruitless)):
+        while self.iterations < iterations and not (stop() or self._is_done(best, fruitless)):
             self.iterations += 1
-            since += 1
-            found = self._iterate(stop)
-            found = None if found is None else self._improved(found, stop)
+            iterations_of_round += 1
+            patience = PUT_OFF if self._must_be_earlier else PATIENCE
+            rows = self._iterate(stop)
+            rows = None if rows is None else self._improved(rows, stop)
 
-            if found is not None and (best is None or len(found) < len(best)):
-                best = found
+            if rows is not None and (best is None or len(rows) < len(best)):
+                best = rows
                 fruitless = 0
-            elif best is not None and (found is not None or since >= (PUT_OFF if self._hard else PATIENCE)):
+            elif best is not None and (rows is not None or iterations_of_round >= patience):
                 fruitless += 1
             else:
-                self._last = min(2 * self._last, self.ends.last) if since % PUT_OFF == 0 else self._last
+                if iterations_of_round % PUT_OFF == 0:
+                    self._last = min(2 * self._last, self.ends.last)
                 continue
 
-            since = 0
-            self._begin_anew(None if self._hard else len(best) - 2)
+            iterations_of_round = 0
+            self._begin_anew(None if self._must_be_earlier else len(best) - 2)
         return best
 
-    def _done(self, best: Matrix | None, fruitless: int) -> bool:
+    def _is_done(self, best: Matrix | None, fruitless: int) -> bool:
         """Whether no earlier arrival is possible, or none to be hoped for."""
-        return best is not None and (fruitless >= ROUNDS or len(best) - 1 <= self.least)
+        return best is not None and (fruitless >= ROUNDS or len(best) - 1 <= self.least_slots)
 
     def _iterate(self, stop: Stop) -> Matrix | None:
         """A further arrival, an extension of one tree and a connection to the other; the way if they meet."""
         self._add_arrival()
         grown, other = self._trees[:: 1 if self.iterations % 2 else -1]
 
-        new = self._extend(grown, stop) if grown.size else None
-        if new is None:
+        new_vertex = self._extend(grown, stop) if grown.size else None
+        if new_vertex is None:
             return None
 
-        near = other.nearest(grown.q[new], int(grown.slot[new]))
-        if near is None:
+        nearest_vertex = other.nearest(grown.q[new_vertex], int(grown.slot[new_vertex]))
+        if nearest_vertex is None:
             return None
 
-        end = self._grow(other, near, (grown.q[new], int(grown.slot[new])), self.ends.last, stop)
+        target = grown.q[new_vertex], int(grown.slot[new_vertex])
+        end = self._grow(other, nearest_vertex, target, self.ends.last, stop)
         if end is None or not end[1]:
             return None
 
-        forward, backward = (new, end[0]) if grown.onward > 0 else (end[0], new)
-        return self._way(forward, backward)
+        forward, backward = (new_vertex, end[0]) if grown.onward > 0 else (end[0], new_vertex)
+        return self._rows_through(forward, backward)
 
     def _add_arrival(self) -> None:
         """A root of the tree from the goals, at a random time in which the goal is free."""
         goal = int(self._rng.integers(len(self.ends.goals)))
-        earliest = int(self._each_least[goal])
+        earliest = int(self._least_slots_of_goals[goal])
         if earliest > self._last:
             return
 
         slot = int(self._rng.integers(earliest, self._last + 1))
         q = self.ends.goals[goal]
-        if (goal, slot) not in self._rooted and self.worlds.free(slot - 1, q, q):
+        if (goal, slot) not in self._arrivals_tried and self.worlds.free(slot - 1, q, q):
             self._trees[1].add(q, slot, -1)
-        self._rooted.add((goal, slot))
+        self._arrivals_tried.add((goal, slot))
 
     def _extend(self, tree: TimeTree, stop: Stop) -> int | None:
         """Towards a sample, or standing still; the new vertex."""
@@ -177,25 +180,26 @@ class TimeSearch:
             return None
 
         slot = int(self._rng.integers(earliest, latest + 1))
-        near = tree.nearest(q, slot)
-        return None if near is None else (near, (q, slot))
+        nearest_vertex = tree.nearest(q, slot)
+        return None if nearest_vertex is None else (nearest_vertex, (q, slot))
 
     def _grow(
-        self, tree: TimeTree, vertex: int, to: tuple[Vector, int], most: int, stop: Stop
+        self, tree: TimeTree, vertex: int, to: tuple[Vector, int], max_slots: int, stop: Stop
     ) -> tuple[int, bool] | None:
         """A vertex as far towards a configuration in a slot as is free, at most so many slots.
 
         Returns:
             Its number, and whether it is there.
         """
-        rows, whole = tree.rows_towards(vertex, *to, most)
+        rows, complete = tree.rows_towards(vertex, *to, max_slots)
         begin = int(tree.slot[vertex])
-        free = self.worlds.steps_free(begin if tree.onward > 0 else begin - 1, rows, tree.onward, stop)
-        if free == 0:
+        steps_free = self.worlds.steps_free(begin if tree.onward > 0 else begin - 1, rows, tree.onward, stop)
+        if steps_free == 0:
             return None
-        return tree.add(rows[free], begin + tree.onward * free, vertex), whole and free == len(rows) - 1
+        new_vertex = tree.add(rows[steps_free], begin + tree.onward * steps_free, vertex)
+        return new_vertex, complete and steps_free == len(rows) - 1
 
-    def _way(self, forward: int, backward: int) -> Matrix:
+    def _rows_through(self, forward: int, backward: int) -> Matrix:
         """A configuration for each slot, from the start to the goal at which two vertices meet, shape (k, n)."""
         first, before = self._trees[0].branch(forward)
         second, after = self._trees[1].branch(backward)

@@ -29,8 +29,8 @@ class Pace:
     def slots(self, moves: Matrix) -> Vector:
         """The least number of slots that moves, shape (m, n), take; fractions count. Shape (m,)."""
         joints = (np.abs(moves) / self.change).max(axis=1)
-        found: Vector = np.maximum(joints, np.linalg.norm(moves, axis=1) / self.step)
-        return found
+        slots: Vector = np.maximum(joints, np.linalg.norm(moves, axis=1) / self.step)
+        return slots
 
     def whole_slots(self, moves: Matrix) -> NDArray[np.int64]:
         """The same in whole slots, ``NEVER`` at most, shape (m,)."""
@@ -85,24 +85,24 @@ class TimeTree:
     def nearest(self, q: Vector, slot: int) -> int | None:
         """The vertex from which a configuration is reached in a slot most easily; None if no speed suffices."""
         gap = self.onward * (slot - self.slot)
-        need = self._pace.slots(q - self.q)
-        able = np.flatnonzero((gap > 0) & (need <= gap + ROUNDING))
-        if len(able) == 0:
+        needed = self._pace.slots(q - self.q)
+        reachable = np.flatnonzero((gap > 0) & (needed <= gap + ROUNDING))
+        if len(reachable) == 0:
             return None
-        return int(able[(need[able] + GAP_WEIGHT * gap[able]).argmin()])
+        return int(reachable[(needed[reachable] + GAP_WEIGHT * gap[reachable]).argmin()])
 
-    def rows_towards(self, vertex: int, q: Vector, slot: int, most: int) -> tuple[Matrix, bool]:
+    def rows_towards(self, vertex: int, q: Vector, slot: int, max_slots: int) -> tuple[Matrix, bool]:
         """Configurations slot by slot from a vertex towards q in a slot, at most so many slots; whether q is the last.
 
         Returns:
             Shape (k, n), the vertex first.
         """
         gap = abs(slot - int(self._slot[vertex]))
-        shares = np.arange(min(gap, most) + 1)[:, None] / gap
+        shares = np.arange(min(gap, max_slots) + 1)[:, None] / gap
         rows: Matrix = self._q[vertex] + shares * (q - self._q[vertex])
-        if gap <= most:
+        if gap <= max_slots:
             rows[-1] = q
-        return rows, gap <= most
+        return rows, gap <= max_slots
 
     def branch(self, vertex: int) -> tuple[Matrix, NDArray[np.int64]]:
         """Vertices from the root to one of them: configurations, shape (k, n), and slots, shape (k,)."""
