@@ -143,18 +143,18 @@ def replan_with(
         check_target(file_name(record), (".json",))
 
     source = problem.world.scene if scene_feed is None else scene_feed
-    answer = PATIENCE_SECONDS if feed_patience is None else positive(feed_patience, "feed_patience")
-    silence = SILENCE_SECONDS if feed_patience is None else answer
+    answer_seconds = PATIENCE_SECONDS if feed_patience is None else positive(feed_patience, "feed_patience")
+    silence_seconds = SILENCE_SECONDS if feed_patience is None else answer_seconds
 
     with ExitStack() as open_feeds:
         if isinstance(source, Scene):
             watch: Watch = feed_of(source)
         else:
-            made = partial(feed_of, source, silence)
-            watch = open_feeds.enter_context(PatientFeed(made, answer, "scene feed"))
-        if (given := goal_feed) is not None:
-            goal_feed = open_feeds.enter_context(PatientFeed(lambda: given, answer, "goal feed"))
-        return _run(Loop(problem, watch, settings, goal_feed, clock, silence), settings, record)
+            make_feed = partial(feed_of, source, silence_seconds)
+            watch = open_feeds.enter_context(PatientFeed(make_feed, answer_seconds, "scene feed"))
+        if (given_goal_feed := goal_feed) is not None:
+            goal_feed = open_feeds.enter_context(PatientFeed(lambda: given_goal_feed, answer_seconds, "goal feed"))
+        return _run(Loop(problem, watch, settings, goal_feed, clock, silence_seconds), settings, record)
 
 
 def _run(loop: Loop, settings: ReplanSettings, record: str | os.PathLike[str] | None) -> ReplanRun:

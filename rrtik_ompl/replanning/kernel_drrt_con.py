@@ -59,9 +59,10 @@ class KernelDrrtCon(DrrtCon):
         """See :meth:`DrrtCon.repair`."""
         self.repairs += 1
         seed = int(self._rng.integers(2**62))
-        found: Matrix | None = None
+        new_path: Matrix | None = None
         if self.path is not None:
-            found = self._kernels.repair(seed, stop, forgetting=self._forgetting)
-        self.free = found is not None
-        self.path = self.path if found is None else found
+            new_path = self._kernels.repair(seed, stop, forgetting=self._forgetting)
+        self.free = new_path is not None
+        if new_path is not None:
+            self.path = new_path
         return self.free

@@ -148,9 +148,9 @@ def _obstacle(row: Mapping[str, Any], shapes: Sequence[Shape]) -> Obstacle:
     return Obstacle(name, _numbered(row, shapes), _pose(row["pose"], name), motion, row.get("margin", 0.0))
 
 
-def _held_data(held: AttachedObject, shape: int) -> Json:
-    data: Json = {"name": held.name, "link": held.link, "shape": shape, "pose": pose_row(held.pose).tolist()}
-    return data | {"allow": list(held.allow), "padding": held.padding, "margin": held.margin}
+def _held_data(item: AttachedObject, shape: int) -> Json:
+    data: Json = {"name": item.name, "link": item.link, "shape": shape, "pose": pose_row(item.pose).tolist()}
+    return data | {"allow": list(item.allow), "padding": item.padding, "margin": item.margin}
 
 
 def _held(row: Mapping[str, Any], shapes: Sequence[Shape]) -> AttachedObject:

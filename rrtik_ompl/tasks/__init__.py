@@ -85,12 +85,13 @@ class TaskPlan:
         A motion that nobody has tried to prove, as those of a file, is proved when this is asked, each time anew. False
         too if a contact or the place of a thing is not true, see :meth:`violations`.
         """
-        if not self.found or any(self._standing()):
+        if not self.found or any(self._standing_faults()):
             return False
-        return all(
-            path.proven if path.proof is not None else path.proved(world_of_motion(path, world, stage)).proven
-            for path, world, stage in zip(self.paths, self.worlds, self.stages, strict=True)
-        )
+        for path, world, stage in zip(self.paths, self.worlds, self.stages, strict=True):
+            proved = path if path.proof is not None else path.proved(world_of_motion(path, world, stage))
+            if not proved.proven:
+                return False
+        return True
 
     def violations(self) -> tuple[Violation, ...]:
         """Check all motions again, each in its world, and without each contact once that has ended.
@@ -112,18 +113,18 @@ class TaskPlan:
             >>> set(loaded.task.plan(loaded.world, loaded.start, seed=1).faults())
             {()}
         """
-        found: list[tuple[Violation, ...]] = []
+        faults_of_motions: list[tuple[Violation, ...]] = []
         contacts = self._stood_on()
-        parts = zip(self.paths, self.worlds, self.stages, contacts, self._standing(), strict=True)
+        motions = zip(self.paths, self.worlds, self.stages, contacts, self._standing_faults(), strict=True)
 
-        for path, world, stage, stood_on, standing in parts:
-            wrong = [*standing, *path.violations(world_of_motion(path, world, stage))]
-            ended = sorted({each.until for each in stood_on if each.until is not None})
-            for until in () if standing else ended:  # what is not true is no ground for a check
+        for path, world, stage, stood_on, standing in motions:
+            faults = [*standing, *path.violations(world_of_motion(path, world, stage))]
+            parting_waypoints = sorted({each.until for each in stood_on if each.until is not None})
+            for until in () if standing else parting_waypoints:  # what is not true is no ground for a check
                 rest = path.with_waypoints(path.waypoints[until:])
-                wrong += rest.violations(world_from(world, stood_on, until))
-            found.append(tuple(wrong))
-        return tuple(found)
+                faults += rest.violations(world_from(world, stood_on, until))
+            faults_of_motions.append(tuple(faults))
+        return tuple(faults_of_motions)
 
     def played(self) -> PlayedTask:
         """The plan as a picture plays it: timed by :func:`time_task`, and what is said of it, see :meth:`faults`.
@@ -138,7 +139,7 @@ class TaskPlan:
     def _stood_on(self) -> tuple[tuple[MotionContact, ...], ...]:
         return self.contacts or ((),) * len(self.paths)
 
-    def _standing(self) -> list[list[Violation]]:
+    def _standing_faults(self) -> list[list[Violation]]:
         return standing_faults(self.paths, self.worlds, self._stood_on(), self.end)
 
 
@@ -190,14 +191,14 @@ class Task:
         check_program(steps, world)
 
         given: Any = world.robot.posture(start) if isinstance(start, str) else start
-        begun = Setting.beginning(world, world.robot.configuration(given, "start"))
-        q = usable_configuration(begun.world, given, "start")
-        if never := never_set_down(steps, begun.world, np.array(q)):
-            return TaskPlan(False, (), (), (), (), never)
+        setting = Setting.beginning(world, world.robot.configuration(given, "start"))
+        q = usable_configuration(setting.world, given, "start")
+        if reason := never_set_down(steps, setting.world, np.array(q)):
+            return TaskPlan(False, (), (), (), (), reason)
 
-        limit = positive(seconds, "seconds")
-        search = TaskSearch(Budget(whole_number(seed, "seed"), limit))
-        done = search.run(Branch(begun, np.array(q), steps))
+        time_limit = positive(seconds, "seconds")
+        search = TaskSearch(Budget(whole_number(seed, "seed"), time_limit))
+        done = search.run(Branch(setting, np.array(q), steps))
         if done is None:
             return TaskPlan(False, (), (), (), (), search.reason())
         return TaskPlan(
@@ -223,9 +224,9 @@ def _notes_of(done: Done) -> tuple[str, ...]:
         notes += [f"{branch.step} stands on a contact: {each}" for each in stood_on.get(id(branch), ())]
         if branch.before is not None and branch.step is not None and isinstance(branch.step.stage, Attach):
             stage = branch.step.stage
-            away = _gap(branch.before.after.world, branch.q, stage.object, stage.link)
-            if away > FAR:
-                text = f"'{stage.object}' is {1e3 * away:.0f} mm away from '{stage.link}' when it is attached"
+            distance = _gap(branch.before.after.world, branch.q, stage.object, stage.link)
+            if distance > FAR:
+                text = f"'{stage.object}' is {1e3 * distance:.0f} mm away from '{stage.link}' when it is attached"
                 notes.append(f"{branch.step}: {text}")
     return tuple(notes)
 
@@ -235,7 +236,7 @@ def _gap(world: World, q: Vector, name: str, link: str) -> float:
     robot = world.robot
     bodies = world.bodies
     joint = robot.model.frames[robot.model.getFrameId(link)].parentJoint
-    links = [k for k, body in enumerate(bodies) if body.joint == joint and body.name in robot.link_names]
-    own = [k for k, body in enumerate(bodies) if body.name == name]
-    pairs = measured(bodies, list(product(links, own)), robot.joint_frames(q[None])[0], near_only=False)
+    links_joined = [k for k, body in enumerate(bodies) if body.joint == joint and body.name in robot.link_names]
+    parts = [k for k, body in enumerate(bodies) if body.name == name]
+    pairs = measured(bodies, list(product(links_joined, parts)), robot.joint_frames(q[None])[0], near_only=False)
     return min((pair.distance for pair in pairs), default=0.0)

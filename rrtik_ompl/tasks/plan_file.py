@@ -174,13 +174,13 @@ def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
 
 def _contact_data(contacts: tuple[MotionContact, ...]) -> dict[str, Any]:
     """What a file says of the contacts that a motion stood on."""
-    found = []
+    entries = []
     for each in contacts:
         entry: dict[str, Any] = {"pair": list(each.touching.names), "distance": each.touching.distance}
         entry |= {} if each.until is None else {"until": each.until}
         entry |= {} if each.then is None else {"then": each.then}
-        found.append(entry | ({"allowed": True} if each.allowed else {}))
-    return {"contacts": found} if found else {}
+        entries.append(entry | ({"allowed": True} if each.allowed else {}))
+    return {"contacts": entries} if entries else {}
 
 
 def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[World, JointPath]:

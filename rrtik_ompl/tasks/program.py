@@ -42,34 +42,35 @@ def check_program(steps: tuple[Step, ...], world: World) -> None:
         InputError: If something is attached twice or detached where it is not, or the robot has no gripper joints.
         UnknownNameError: If there is no object, link or posture of a name.
     """
-    _after(steps, {frozenset(item.name for item in world.scene.attached)}, world)
+    _holds_after(steps, {frozenset(item.name for item in world.scene.attached)}, world)
 
 
-def _after(steps: tuple[Step, ...], states: set[Held], world: World) -> set[Held]:
-    """What may be held after some steps; ``states``: what may be held before."""
+def _holds_after(steps: tuple[Step, ...], possible_holds: set[Held], world: World) -> set[Held]:
+    """What may be held after some steps; ``possible_holds``: what may be held before, a set for each choice so far."""
     for step in steps:
         stage = step.stage
         try:
             if isinstance(stage, Alternatives):
-                states = set().union(*(_after(row, states, world) for row in options_of(step)))
+                possible_holds = set().union(*(_holds_after(row, possible_holds, world) for row in options_of(step)))
             elif isinstance(stage, Attach):
-                states = {_attached(stage, held, world) for held in states}
+                possible_holds = {_holds_after_attach(stage, names_held, world) for names_held in possible_holds}
             elif isinstance(stage, Detach):
-                states = {_detached(stage, held, world) for held in states}
+                possible_holds = {_holds_after_detach(stage, names_held, world) for names_held in possible_holds}
             elif isinstance(stage, Gripper):
                 with_gripper(world.robot, stage)
             elif isinstance(stage, MoveTo):
                 _check_goal(stage, world)
-                _check_frames(stage, states, world)
+                _check_frames(stage, possible_holds, world)
         except InputError as error:
             if not str(error).startswith("stage "):
                 raise InputError(f"{step}: {error}") from None
             raise
-    return states
+    return possible_holds
 
 
-def _attached(stage: Attach, held: Held, world: World) -> Held:
-    if stage.object in held:
+def _holds_after_attach(stage: Attach, names_held: Held, world: World) -> Held:
+    """What is held once something is attached; refuses what is held already, and unknown names."""
+    if stage.object in names_held:
         raise InputError(f"'{stage.object}' is held already; detach it first")
     if stage.object not in world.scene.names:
         raise UnknownNameError("obstacle", stage.object, world.scene.names)
@@ -80,18 +81,19 @@ def _attached(stage: Attach, held: Held, world: World) -> Held:
     for name in stage.allow:
         if name not in links and name not in world.scene.names:
             raise UnknownNameError("link or obstacle", name, (*links, *world.scene.names))
-    return held | {stage.object}
+    return names_held | {stage.object}
 
 
-def _detached(stage: Detach, held: Held, world: World) -> Held:
-    if stage.object not in held:
+def _holds_after_detach(stage: Detach, names_held: Held, world: World) -> Held:
+    """What is held once something is detached; refuses what is not held."""
+    if stage.object not in names_held:
         if stage.object not in world.scene.names:
             raise UnknownNameError("attached object", stage.object, world.scene.names)
         raise InputError(f"'{stage.object}' is not held here; attach it first")
-    return held - {stage.object}
+    return names_held - {stage.object}
 
 
-def _check_frames(stage: MoveTo, states: set[Held], world: World) -> None:
+def _check_frames(stage: MoveTo, possible_holds: set[Held], world: World) -> None:
     model = world.robot.model
     for region in stage.constraints:
         name = region.frame
@@ -99,7 +101,7 @@ def _check_frames(stage: MoveTo, states: set[Held], world: World) -> None:
             continue
         if name not in world.scene.names:
             raise UnknownNameError("frame of a constraint", name, (*world.robot.link_names, *world.scene.names))
-        if not all(name in held for held in states):
+        if not all(name in names_held for names_held in possible_holds):
             raise InputError(f"the constraint's frame '{name}' is not held here; attach it first")
 
 

@@ -97,8 +97,8 @@ class Setting:
 
         bodies = setting.world.bodies
         contacts = {frozenset((stage.object, other)): allowed(bodies, stage.object, other) for other in sorted(others)}
-        near = touching_at(setting.world, q, stage.object)
-        contacts |= {each.pair: each.going_on() for each in near if each.distance >= -LITTLE or each.pair in named}
+        touching = touching_at(setting.world, q, stage.object)
+        contacts |= {each.pair: each.going_on() for each in touching if each.distance >= -LITTLE or each.pair in named}
         return setting.with_contacts(contacts.values())
 
     def _detached(self, stage: Detach, q: Vector) -> Setting:

@@ -205,8 +205,8 @@ def _approaches(robot: Robot, bodies: Items[Body], pairs: Pairs) -> dict[tuple[i
 
 def _touching(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> bool:
     """Whether one of some pairs of bodies that never move touches; most are told apart by the balls around them."""
-    near = [(bodies[i], bodies[j]) for i, j in pairs if not far_apart(bodies[i], bodies[j], DISTANCE_TOLERANCE)]
-    return any(fixed_contact(robot, both, ((0, 1),)) is not None for both in near)
+    pairs_nearby = [(bodies[i], bodies[j]) for i, j in pairs if not far_apart(bodies[i], bodies[j], DISTANCE_TOLERANCE)]
+    return any(fixed_contact(robot, both, ((0, 1),)) is not None for both in pairs_nearby)
 
 
 def _doubts(robot: Robot, scene: Scene) -> Iterator[str]:

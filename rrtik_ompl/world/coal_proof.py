@@ -145,8 +145,8 @@ class CoalProof:
 
 def distance_between(robot: Robot, bodies: Sequence[Body], names: tuple[str, str], q: Vector) -> float:
     """The distance between bodies of two names at q, shape (dof,) [m]; nan if there are none."""
-    one, other = ([body for body in bodies if body.name == name] for name in names)
-    return min((_gap(robot, [a, b], q) for a in one for b in other), default=float("nan"))
+    first, second = ([body for body in bodies if body.name == name] for name in names)
+    return min((_gap(robot, [a, b], q) for a in first for b in second), default=float("nan"))
 
 
 def _gap(robot: Robot, pair: Sequence[Body], q: Vector) -> float:

@@ -89,10 +89,10 @@ class ExactChecker:
         tables = self.tables
         covers = solids.covers()
         for number in numbers:
-            taken = tables.take(number, bodies[number], covers[number])
-            if taken is None:
+            moved_tables = tables.take(number, bodies[number], covers[number])
+            if moved_tables is None:
                 return None
-            tables = taken
+            tables = moved_tables
 
         motions = self.motions
         self.motions = {}

@@ -66,11 +66,11 @@ def rooms_between(world: World, ends: NDArray[np.float64], clearance: float | No
 def _rooms(world: World, clearance: float | None) -> Iterator[Room]:
     """What may be kept, the most first."""
     least_clearance = world.settings.kept
-    wanted = max(CLEARANCE if clearance is None else clearance, least_clearance)
-    halved = (wanted * 0.5**k for k in range(HALVINGS))
+    wanted_clearance = max(CLEARANCE if clearance is None else clearance, least_clearance)
+    halved = (wanted_clearance * 0.5**k for k in range(HALVINGS))
     smaller = (half for half in halved if half > least_clearance)
-    for searched in chain((wanted + min(wanted, SPARE),), smaller, (least_clearance,)):
-        yield Room(min(wanted, searched), searched)
+    for searched in chain((wanted_clearance + min(wanted_clearance, SPARE),), smaller, (least_clearance,)):
+        yield Room(min(wanted_clearance, searched), searched)
 
 
 def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> float | None:
@@ -123,14 +123,14 @@ def check_clearance(world: World, clearance: float | None, ends: dict[str, Matri
     if clearance is None:
         return
 
-    wanted = not_negative(clearance, "clearance")
+    wanted_clearance = not_negative(clearance, "clearance")
     for what, q in ends.items():
-        gap = next(iter(world.prover.route(q[None], clearance=wanted).unproven), None)
+        gap = next(iter(world.prover.route(q[None], clearance=wanted_clearance).unproven), None)
         if gap is not None and world.prover.proven(q[None], q[None], clearance=world.settings.kept)[0]:
-            largest = 1e3 * _largest_clearance(world, q, wanted)
+            largest = 1e3 * _largest_clearance(world, q, wanted_clearance)
             pair = f"'{gap.first}' and '{gap.second}'"
             raise InputError(
-                f"clearance: {what} cannot keep {1e3 * wanted:g} mm: {pair}; at most {largest:.3f} mm here"
+                f"clearance: {what} cannot keep {1e3 * wanted_clearance:g} mm: {pair}; at most {largest:.3f} mm here"
             )
 
 

@@ -218,8 +218,8 @@ class MovingWorld:
 
     def _contact_of_base(self) -> str:
         """See ``blocked``; predicted places do not count, for nothing can be done about them."""
-        found = fixed_contact(self.robot, tuple(self._bodies), self._pairs_at_rest)
-        return "" if found is None else f"'{found[0]}' and '{found[1]}' overlap, and the base cannot give way"
+        names = fixed_contact(self.robot, tuple(self._bodies), self._pairs_at_rest)
+        return "" if names is None else f"'{names[0]}' and '{names[1]}' overlap, and the base cannot give way"
 
 
 class MovingProver(Prover):

@@ -112,9 +112,9 @@ def with_reason(verdict: Verdict, world: World, faults: list[str], *, checked: b
 def _faults_of_path(world: World, rows: Matrix) -> list[Fault]:
     """The first violation of each motion of a path."""
     rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
-    found = []
+    faults = []
     for each in route_violations(world, rows, verification_resolution(world)):
         motion = rows[each.edge + 1] - rows[each.edge]
         share = float((each.q - rows[each.edge]) @ motion / max(float(motion @ motion), 1e-300))
-        found.append((each.edge, min(max(share, 0.0), 1.0), each.reason))
-    return found
+        faults.append((each.edge, min(max(share, 0.0), 1.0), each.reason))
+    return faults

@@ -87,8 +87,8 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
         breaches = _not_held(world.constraints, rows)
         collisions = route_violations(world.unheld, rows, resolution)
         edges = {violation.edge for violation in breaches}
-        found = [*breaches, *(violation for violation in collisions if violation.edge not in edges)]
-        return tuple(sorted(found, key=lambda violation: violation.edge))
+        violations = [*breaches, *(violation for violation in collisions if violation.edge not in edges)]
+        return tuple(sorted(violations, key=lambda violation: violation.edge))
 
     counts = _steps(world, rows, resolution)
     if counts.sum() > MAX_CHECKS:
@@ -98,10 +98,10 @@ def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Vio
         )
 
     unproven = np.flatnonzero(~world.prover.proven(rows[:-1], rows[1:], clearance=world.settings.kept))
-    found = []
+    violations = []
     for run in np.split(unproven, np.flatnonzero(np.diff(unproven) > 1) + 1) if len(unproven) else ():
-        found += _sampled(world, rows, counts, run)
-    return tuple(found if world.settings.proving is None else _with_unproven(world, rows, unproven, found))
+        violations += _sampled(world, rows, counts, run)
+    return tuple(violations if world.settings.proving is None else _with_unproven(world, rows, unproven, violations))
 
 
 def _steps(world: World, rows: Matrix, resolution: float) -> Vector:
@@ -111,10 +111,10 @@ def _steps(world: World, rows: Matrix, resolution: float) -> Vector:
 
 
 def _with_unproven(
-    world: World, rows: Matrix, unproven: NDArray[np.int64], found: list[Violation]
+    world: World, rows: Matrix, unproven: NDArray[np.int64], violations: list[Violation]
 ) -> Iterator[Violation]:
     """What was found, and each other motion that is not proven to keep what it must, of those given by numbers."""
-    violation_of_edge = {violation.edge: violation for violation in found}
+    violation_of_edge = {violation.edge: violation for violation in violations}
     clearance = world.settings.proving or 0.0
     proven = world.prover.proven(rows[unproven], rows[unproven + 1], clearance=clearance)
     for edge, is_proven in zip(unproven.tolist(), proven.tolist(), strict=True):

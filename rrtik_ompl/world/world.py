@@ -454,13 +454,13 @@ class World(Judge):
         rows = self._rows(q, 1)
         proven_pairs = self.checks.checker.contacts_of_meshes_kept(rows)
         pairs = tuple(pair for pair in self.pairs if pair not in proven_pairs) if proven_pairs else self.pairs
-        found = list(measured(self.bodies, pairs, self.robot.chain.joint_frames(rows)[0], near_only=True))
+        contacts = list(measured(self.bodies, pairs, self.robot.chain.joint_frames(rows)[0], near_only=True))
 
-        if not found:
+        if not contacts:
             same_pairs = not proven_pairs and self._settings.clearance == 0.0
             certificate = self.checks.certificate if same_pairs else Certificate(self.robot, self.bodies, pairs)
-            found = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
-        return tuple(sorted(found, key=lambda c: c.clearance))
+            contacts = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
+        return tuple(sorted(contacts, key=lambda c: c.clearance))
 
     def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
         """The pair of bodies that is nearest to contact or to its margin at q, or deepest in it; None if there is none.
@@ -469,8 +469,9 @@ class World(Judge):
         """
         if known_free is not True and (touching := self.contacts(q)):
             return touching[0]
-        found = measured(self.bodies, self.pairs, self.robot.chain.joint_frames(self._rows(q, 1))[0], near_only=False)
-        return min(found, key=lambda c: c.clearance, default=None)
+        frames = self.robot.chain.joint_frames(self._rows(q, 1))[0]
+        contacts = measured(self.bodies, self.pairs, frames, near_only=False)
+        return min(contacts, key=lambda c: c.clearance, default=None)
 
     def clearance(self, q: ArrayLike) -> float:
         """Smallest signed distance less its margin at q [m]: negative in collision, +inf if nothing can collide."""

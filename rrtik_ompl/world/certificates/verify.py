@@ -210,9 +210,9 @@ class Motions:
         pose = body.placement.homogeneous
         parts = tuple(placed_solids(convex_parts, np.array([pose] * len(convex_parts)))) or (UNKNOWN,)
         rotation = pose[:3, :3]
-        for part in range(-1, len(parts)):
-            self.solid_numbers[number, part] = len(self.solids)
-            self.solids.append(Solid(parts if part < 0 else (parts[part],), rotation))
+        for part_number in range(-1, len(parts)):
+            self.solid_numbers[number, part_number] = len(self.solids)
+            self.solids.append(Solid(parts if part_number < 0 else (parts[part_number],), rotation))
         return range(len(parts))
 
     def _bounds(self, number: int, base: int) -> Matrix:
@@ -357,7 +357,7 @@ class Motions:
 
         ``normals``: Of the planes, shape (entries, 3), 0 where an entry has none; None if there are no planes at all.
         """
-        found: list[int] = []
+        not_apart: list[int] = []
         for first in range(0, len(entries), AT_ONCE):
             columns = zip(*entries[first : first + AT_ONCE], strict=True)
             motion, pair, first_numbers, second_numbers, begins, widths = map(np.array, columns)
@@ -378,13 +378,14 @@ class Motions:
 
             gaps = self._ball_gaps(first_numbers, second_numbers, poses, self.joint_of_solid[second_numbers] == base)
             if normals is not None:
-                given = normals[first : first + AT_ONCE]
-                gaps = np.where(given.any(axis=1), self._plane_gaps(first_numbers, second_numbers, poses, given), gaps)
+                plane_normals = normals[first : first + AT_ONCE]
+                plane_gaps = self._plane_gaps(first_numbers, second_numbers, poses, plane_normals)
+                gaps = np.where(plane_normals.any(axis=1), plane_gaps, gaps)
 
             sagittas = 0.125 * self.accelerations[pair, motion] * widths**2
             apart = gaps > self.required_gaps[pair] + sagittas  # False for NaN
-            found += (first + np.flatnonzero(~apart)).tolist()
-        return found
+            not_apart += (first + np.flatnonzero(~apart)).tolist()
+        return not_apart
 
     def _measured_apart(self, entry: Entry) -> bool:
         """Whether coal finds two whole bodies farther apart in the middle of an interval than they come nearer."""
