@@ -46,6 +46,10 @@ class Loop:
     Attributes:
         q: The robot's configuration, shape (n,).
         run: The record so far.
+
+    Beside its parts (feed, tracker, planner, worlds) it holds from tick to tick: the last snapshot, and what is to be
+    kept from each obstacle because of its age, see :meth:`_read_scene`; the goals, shape (g, n); and the distance to
+    obstacles that was left at the end of the tick before, by which it sees a cloud close in.
     """
 
     def __init__(
@@ -194,13 +198,16 @@ class Loop:
         self._scene_is_old = self._settings.speed_bound is not None and is_old
         self._travels_since_seen = self._travels.since_seen(scene, ages)
 
-        # What to keep from each obstacle [m]: for what it may do in the tick, also for what it may have done since it
-        # was seen, and for what nobody has ruled out.
+        # What to keep from each obstacle [m]: for what it may do in the tick,
         distance = self._settings.margin + self._search_clearance
-        in_tick = self._travels.in_tick(scene)
-        self._required_in_tick = required_distances(scene, distance, in_tick)
-        travels = {name: travel + self._travels_since_seen[name] for name, travel in in_tick.items()}
+        travels_in_tick = self._travels.in_tick(scene)
+        self._required_in_tick = required_distances(scene, distance, travels_in_tick)
+
+        # also for what it may have done since it was seen,
+        travels = {name: travel + self._travels_since_seen[name] for name, travel in travels_in_tick.items()}
         distances = required_distances(scene, distance, travels)
+
+        # and, in proofs of moves, for what nobody has ruled out; None where nothing bounds that.
         self._possible_travels = self._travels.possible(snapshot, ages)
         required_if_moving: dict[str, float] | None = None
         if self._possible_travels is not None:

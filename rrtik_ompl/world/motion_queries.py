@@ -114,7 +114,9 @@ def has_kernels(world: object, *libraries: str, within: Matrix | None = None) ->
         within: Corners of a box of configurations, shape (m, n), in all of which the kernels must be certain.
     """
     fast = kernel_tables(world)
-    if fast is None or (within is not None and not _certain(fast, world.robot.chain, within)):  # type: ignore[attr-defined]
+    if fast is None:
+        return False
+    if within is not None and not _certain(fast, world.robot.chain, within):  # type: ignore[attr-defined]
         return False
     return all(library(name) is not None for name in libraries)
 

@@ -156,11 +156,15 @@ class Solid:
         """The support function: how far it reaches along unit vectors of the joint's frame [m], (n, 3) -> (n,)."""
         heights = []
         for part in self.parts:
-            distance_from_axis = np.linalg.norm(np.cross(directions, part.axis), axis=1)
-            height = (directions @ part.corners.T).max(axis=1) + part.disc * distance_from_axis + part.radius
-            if part.kind == HALF_SPACE_SOLID:
-                height = np.where(np.abs(directions - part.axis).max(axis=1) <= UNIT, part.disc, np.inf)
-            heights.append(height if part.kind in (CONVEX_SOLID, HALF_SPACE_SOLID) else height + np.inf)
+            if part.kind == HALF_SPACE_SOLID:  # it ends along its normal alone
+                along_normal = np.abs(directions - part.axis).max(axis=1) <= UNIT
+                height = np.where(along_normal, part.disc, np.inf)
+            elif part.kind == CONVEX_SOLID:  # the hull of discs about an axis, all within a radius
+                sines = np.linalg.norm(np.cross(directions, part.axis), axis=1)
+                height = (directions @ part.corners.T).max(axis=1) + part.disc * sines + part.radius
+            else:  # nothing is known of where it ends
+                height = np.full(len(directions), np.inf)
+            heights.append(height)
         return np.asarray(np.max(heights, axis=0))
 
 
