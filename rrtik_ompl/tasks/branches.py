@@ -23,7 +23,7 @@ from rrtik_ompl.planning.tip_motion.rails import straight_rail
 from rrtik_ompl.planning.tip_motion.values import Tolerance
 from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts, parted
 from rrtik_ompl.tasks.finger_motion import finger_motion
-from rrtik_ompl.tasks.handling import arriving_at, handled, left_where, may_touch
+from rrtik_ompl.tasks.handling import contacts_on_arrival, fault_of_setting_down, handled, may_touch
 from rrtik_ompl.tasks.program import Step, options_of
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Alternatives, Gripper, MoveTo, Straight
@@ -47,7 +47,7 @@ class Branch:
         step: What has been done since; None at the start.
         path: Of a straight line; None elsewhere.
         contacts: That a straight line stands on.
-        left: What a motion leaves behind: its setting without the contacts that have ended; None if that is the same.
+        setting_left: What a motion leaves behind: its setting without the contacts that have ended; None if none has.
         arriving: Contacts of what is taken or set down where a motion ends.
         note: What is not certain of fingers that have moved.
         done: How many stages.
@@ -63,7 +63,7 @@ class Branch:
     step: Step | None = None
     path: JointPath | None = None
     contacts: tuple[MotionContact, ...] = ()
-    left: Setting | None = None
+    setting_left: Setting | None = None
     arriving: tuple[Touching, ...] = ()
     note: str = ""
     done: int = 0
@@ -83,7 +83,7 @@ class Branch:
     @property
     def after(self) -> Setting:
         """What surrounds the arm from here on."""
-        return self.setting if self.left is None else self.left
+        return self.setting if self.setting_left is None else self.setting_left
 
     @property
     def moves(self) -> bool:
@@ -209,13 +209,13 @@ class Expander:
             arriving = self._arriving(branch, q) if choices.arrives or branch.after.scene.contacts else ()
             setting = branch.after.arriving(arriving)
             lasting = tuple(each for each in branch.after.scene.contacts if not parted(setting.world, q, each))
-            left = setting.left_with(lasting)
-            yield _following_branch(branch, branch.rest[0], setting, q, left=left, arriving=arriving)
+            setting_left = setting.with_contacts_only(lasting)
+            yield _following_branch(branch, branch.rest[0], setting, q, setting_left=setting_left, arriving=arriving)
         choices.used = len(rows)
 
     def _arriving(self, branch: Branch, q: Vector) -> tuple[Touching, ...]:
         """The contacts of what is taken or set down at a configuration, shape (dof,), to which a motion leads."""
-        return arriving_at(branch.after.world, branch.rest[1:], q)
+        return contacts_on_arrival(branch.after.world, branch.rest[1:], q)
 
     def _after_line(self, branch: Branch, step: Step, stage: Straight) -> Iterator[Branch]:
         """The branch at the end of a straight line of the tip; none, and the reason noted, if it is not reached."""
@@ -237,14 +237,16 @@ class Expander:
 
         path = path_of(setting.world, attempted)
         assert path is not None, "it has come to its end"
-        followed = follow_contacts(path, setting.world, setting.named, arriving)
+        followed = follow_contacts(path, setting.world, setting.grasp_pairs, arriving)
         if followed.fault:
             self.failures.append((branch, step, followed.fault))
             return
 
-        setting_left = setting.left_with(followed.lasting)
+        setting_left = setting.with_contacts_only(followed.lasting)
         contacts = followed.contacts
-        yield _following_branch(branch, step, setting, path.end, followed.path, left=setting_left, contacts=contacts)
+        yield _following_branch(
+            branch, step, setting, path.end, followed.path, setting_left=setting_left, contacts=contacts
+        )
 
     def _follow_line(self, branch: Branch, line: Way) -> tuple[Setting, tuple[Touching, ...], Attempt, str]:
         """Follow a line, in contact at its end only if nothing else is possible.
@@ -266,7 +268,7 @@ class Expander:
         unchecked = follow(world.robot, line.rails[0], branch.q, line.tolerance, centred(world.robot))
         if not unchecked.complete:
             return setting, (), attempted, attempted.reason
-        if too_deep := left_where(world, steps, unchecked.rows[-1]):
+        if too_deep := fault_of_setting_down(world, steps, unchecked.rows[-1]):
             return setting, (), attempted, too_deep
 
         arriving = self._arriving(branch, unchecked.rows[-1])
@@ -304,7 +306,7 @@ def _following_branch(
     q: Vector,
     path: JointPath | None = None,
     *,
-    left: Setting | None = None,
+    setting_left: Setting | None = None,
     arriving: tuple[Touching, ...] = (),
     contacts: tuple[MotionContact, ...] = (),
 ) -> Branch:
@@ -319,7 +321,7 @@ def _following_branch(
         step=step,
         path=path,
         contacts=contacts,
-        left=left,
+        setting_left=setting_left,
         arriving=arriving,
         done=branch.done + 1,
         cost=cost,

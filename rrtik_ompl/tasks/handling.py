@@ -51,7 +51,7 @@ def may_touch(world: World, steps: Sequence[Step]) -> list[Touching]:
     return sorted(contact_of_pair.values(), key=lambda contact: contact.names)
 
 
-def left_where(world: World, steps: Sequence[Step], q: Vector) -> str:
+def fault_of_setting_down(world: World, steps: Sequence[Step], q: Vector) -> str:
     """Why something cannot be set down at q, shape (dof,), because of its depth; "" if it can."""
     obstacle_names = frozenset(world.scene.names)
     for thing in handled(steps, world.robot):
@@ -61,7 +61,7 @@ def left_where(world: World, steps: Sequence[Step], q: Vector) -> str:
     return ""
 
 
-def arriving_at(world: World, steps: Sequence[Step], q: Vector) -> tuple[Touching, ...]:
+def contacts_on_arrival(world: World, steps: Sequence[Step], q: Vector) -> tuple[Touching, ...]:
     """The contacts of what is taken or set down at q, shape (dof,); none where it would be deeper than it may be."""
     contact_of_pair: dict[frozenset[str], Touching] = {}
     for thing in handled(steps, world.robot):

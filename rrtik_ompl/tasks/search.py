@@ -205,13 +205,13 @@ class TaskSearch:
         setting = link.setting
         if setting.scene.contacts:
             world = world_of_motion(path, setting.world, link.step.stage)
-            followed = follow_contacts(path, world, setting.named, link.arriving)
+            followed = follow_contacts(path, world, setting.grasp_pairs, link.arriving)
             if followed.world is not None:  # the path ends where two have parted that it would make touch again
                 detour = self._path_from_parting(link, followed.world, followed.path.end, path.end, effort)
                 if detour is None:
                     return False
                 joined = proved(path_through(path, np.vstack([followed.path.waypoints, detour.waypoints[1:]])), world)
-                followed = follow_contacts(joined, world, setting.named, link.arriving)
+                followed = follow_contacts(joined, world, setting.grasp_pairs, link.arriving)
             if followed.fault:
                 self._note_failure(link, followed.fault)
                 return False

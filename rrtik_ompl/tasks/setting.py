@@ -27,14 +27,16 @@ class Setting:
     Attributes:
         robot: With its fingers as they are held.
         scene: Obstacles, what is held, and contacts.
-        named: Pairs of names that an :class:`Attach` allows as long as it holds something.
+        grasp_pairs: Pairs of names that an :class:`Attach` allows as long as it holds something.
     """
 
-    def __init__(self, like: World, robot: Robot, scene: Scene, named: frozenset[frozenset[str]] = frozenset()) -> None:
-        self._like = like
+    def __init__(
+        self, first_world: World, robot: Robot, scene: Scene, grasp_pairs: frozenset[frozenset[str]] = frozenset()
+    ) -> None:
+        self._first_world = first_world
         self.robot = robot
         self.scene = scene
-        self.named = named
+        self.grasp_pairs = grasp_pairs
 
     @classmethod
     def of(cls, world: World) -> Setting:
@@ -54,7 +56,7 @@ class Setting:
     @cached_property
     def world(self) -> World:
         """The robot in the scene, with the other settings of the first world of the task."""
-        return form_of(self._like, robot=self.robot, scene=self.scene)
+        return form_of(self._first_world, robot=self.robot, scene=self.scene)
 
     def with_contacts(self, contacts: Iterable[Touching]) -> Setting:
         """The same setting with further contacts; of a pair that has one already the new one counts."""
@@ -68,9 +70,9 @@ class Setting:
 
     def with_scene(self, scene: Scene) -> Setting:
         """The same robot in another scene."""
-        return Setting(self._like, self.robot, scene, self.named)
+        return Setting(self._first_world, self.robot, scene, self.grasp_pairs)
 
-    def left_with(self, contacts: tuple[Touching, ...]) -> Setting:
+    def with_contacts_only(self, contacts: tuple[Touching, ...]) -> Setting:
         """The same setting with these contacts and no others."""
         return self if contacts == self.scene.contacts else self.with_scene(replace(self.scene, contacts=contacts))
 
@@ -83,7 +85,7 @@ class Setting:
             UnknownNameError: If there is no object or link of a name.
         """
         if isinstance(stage, Gripper):
-            return Setting(self._like, with_gripper(self.robot, stage), self.scene, self.named)
+            return Setting(self._first_world, with_gripper(self.robot, stage), self.scene, self.grasp_pairs)
         return self._attached(stage, q) if isinstance(stage, Attach) else self._detached(stage, q)
 
     def _attached(self, stage: Attach, q: Vector) -> Setting:
@@ -92,13 +94,15 @@ class Setting:
         scene = self.scene.attaching(stage.object, stage.link, links, pose=pose, padding=stage.padding)
 
         others = frozenset(stage.allow) - frozenset(links)
-        named = self.named | {frozenset((stage.object, other)) for other in others}
-        setting = Setting(self._like, self.robot, scene, named)
+        grasp_pairs = self.grasp_pairs | {frozenset((stage.object, other)) for other in others}
+        setting = Setting(self._first_world, self.robot, scene, grasp_pairs)
 
         bodies = setting.world.bodies
         contacts = {frozenset((stage.object, other)): allowed(bodies, stage.object, other) for other in sorted(others)}
         touching = touching_at(setting.world, q, stage.object)
-        contacts |= {each.pair: each.going_on() for each in touching if each.distance >= -LITTLE or each.pair in named}
+        contacts |= {
+            each.pair: each.going_on() for each in touching if each.distance >= -LITTLE or each.pair in grasp_pairs
+        }
         return setting.with_contacts(contacts.values())
 
     def _detached(self, stage: Detach, q: Vector) -> Setting:
@@ -109,8 +113,8 @@ class Setting:
 
         attached = next(item for item in self.scene.attached if item.name == stage.object)
         pose = self.robot.fk(q, attached.link) * attached.pose
-        named = frozenset(pair for pair in self.named if stage.object not in pair)
-        setting = Setting(self._like, self.robot, self.scene.detaching(stage.object, pose), named)
+        grasp_pairs = frozenset(pair for pair in self.grasp_pairs if stage.object not in pair)
+        setting = Setting(self._first_world, self.robot, self.scene.detaching(stage.object, pose), grasp_pairs)
         touching = touching_at(setting.world, q, stage.object)
         return setting.with_contacts(each.going_on() for each in touching if each.distance >= -DEEPER)
 
