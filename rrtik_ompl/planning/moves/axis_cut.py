@@ -89,14 +89,14 @@ def check_once(motions_free: MotionsFree) -> MotionsFree:
     answers: dict[bytes, bool] = {}
 
     def free(A: Matrix, B: Matrix) -> Mask:
-        turned = np.array([a > b for a, b in zip(A.tolist(), B.tolist(), strict=True)], dtype=bool)[:, None]
-        first = np.where(turned, B, A)
-        second = np.where(turned, A, B)
+        swap = np.array([a > b for a, b in zip(A.tolist(), B.tolist(), strict=True)], dtype=bool)[:, None]
+        first = np.where(swap, B, A)
+        second = np.where(swap, A, B)
         keys = [motion.tobytes() for motion in np.hstack([first, second])]
-        fresh = {key: k for k, key in enumerate(keys) if key not in answers}
-        if fresh:
-            rows = list(fresh.values())
-            answers.update(zip(fresh, motions_free(first[rows], second[rows]).tolist(), strict=True))
+        unknown = {key: k for k, key in enumerate(keys) if key not in answers}
+        if unknown:
+            rows = list(unknown.values())
+            answers.update(zip(unknown, motions_free(first[rows], second[rows]).tolist(), strict=True))
         return np.array([answers[key] for key in keys], dtype=bool)
 
     return free
@@ -109,7 +109,7 @@ def _backward_pass(route: Matrix, motions_free: MotionsFree, axes: Sequence[int]
     new = [route[-1:]]
     while pivot > 0 and not stop():
         test = _earliest_reachable(route, pivot, motions_free, order)
-        new.append(_way(route, pivot, test, motions_free, order))
+        new.append(_moves_to_waypoint(route, pivot, test, motions_free, order))
         pivot = test
 
     new.append(route[:pivot][::-1])
@@ -141,13 +141,13 @@ def _reached(a: Vector, goals: Matrix, motions_free: MotionsFree, order: Sequenc
         there = here.copy()
         there[:, axis] = goals[:, axis]
 
-        open_ = np.flatnonzero(reached & (there[:, axis] != here[:, axis]))
-        if len(open_):
-            reached[open_] = motions_free(here[open_], there[open_])
+        undecided = np.flatnonzero(reached & (there[:, axis] != here[:, axis]))
+        if len(undecided):
+            reached[undecided] = motions_free(here[undecided], there[undecided])
     return reached
 
 
-def _way(route: Matrix, pivot: int, test: int, motions_free: MotionsFree, order: Sequence[int]) -> Matrix:
+def _moves_to_waypoint(route: Matrix, pivot: int, test: int, motions_free: MotionsFree, order: Sequence[int]) -> Matrix:
     """The moves from the pivot to a waypoint before it.
 
     A neighbour is reached by the original edge. That is not tested again if it moves one joint: a doubt by rounding

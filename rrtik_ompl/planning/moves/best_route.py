@@ -48,7 +48,7 @@ class BestRoute:
 
     def take(self, route: Matrix) -> None:
         """Take in a free route, shape (k, n); it is kept if it is better."""
-        if self._gains(route):
+        if self._is_better(route):
             self.route = route
             self._rank = self.rank(route)
 
@@ -62,13 +62,13 @@ class BestRoute:
 
         As far as it comes in time; what has been cut by then stays cut.
         """
-        return self._confirmed_cut(
+        return self._take_if_free(
             double_axis_cut(route, self._queries.in_time, axes=axes, stop=self._queries.stop), route
         )
 
     def cut_parts(self, route: Matrix) -> Matrix:
         """Cuts of parts of a free route that get longer: much of what the cut of the whole gains, much sooner."""
-        return self._confirmed_cut(cut_parts(route, self._queries.in_time, stop=self._queries.stop), route)
+        return self._take_if_free(cut_parts(route, self._queries.in_time, stop=self._queries.stop), route)
 
     def search(self, values: Values, start: Vector, goal: Vector, *, shorter: bool = False) -> Matrix | None:
         """The best route between a start and a goal on a lattice of values, if there is one.
@@ -78,7 +78,7 @@ class BestRoute:
         Raises:
             OutOfTime: If it is time to stop.
         """
-        values = self._of_less_travel(values, start, goal) if shorter else values
+        values = self._values_of_less_travel(values, start, goal) if shorter else values
         found = self._lattice_route(values, start, goal)
         if found is not None:
             self.take(found)
@@ -93,43 +93,52 @@ class BestRoute:
             OutOfTime: If it is time to stop.
         """
         if shorter and last - first == len(route) - 1:  # where a part begins or ends moves may become one
-            values = self._of_less_travel(values, route[0], route[-1])
+            values = self._values_of_less_travel(values, route[0], route[-1])
 
         part = self._lattice_route(values, route[first], route[last])
         if part is not None:
-            whole = merge_moves(np.vstack([route[:first], part, route[last + 1 :]]), tolerance=0.0)
-            if self._gains(whole) and self._confirmed(whole, route):
-                self.route = whole
-                self._rank = self.rank(whole)
+            replaced = merge_moves(np.vstack([route[:first], part, route[last + 1 :]]), tolerance=0.0)
+            if self._is_better(replaced) and self._is_free(replaced, route):
+                self.route = replaced
+                self._rank = self.rank(replaced)
 
-    def _of_less_travel(self, values: Values, start: Vector, goal: Vector) -> Values:
+    def _values_of_less_travel(self, values: Values, start: Vector, goal: Vector) -> Values:
         """Those values that a route between two ends can take with no more travel than the best one."""
         if self.route is None:
             return values
         left = within_travel(values, start, goal, self._costs, self._rank[1])
-        return [v[:1] for v in values] if left is None else left
+        nothing_to_search = [v[:1] for v in values]
+        return nothing_to_search if left is None else left
 
-    def _gains(self, route: Matrix) -> bool:
+    def _is_better(self, route: Matrix) -> bool:
+        """Whether a route, shape (k, n), is to take the place of the best one."""
         return self.rank(route) < self._rank and long_enough(route, self._smallest_move)
 
-    def _confirmed_cut(self, found: Matrix, route: Matrix) -> Matrix:
-        """The cut of a route if it is free, else the route. That is found out even when it is time to stop."""
-        if not self._confirmed(found, route, self._queries.to_the_end):
+    def _take_if_free(self, cut_route: Matrix, route: Matrix) -> Matrix:
+        """Take in the cut of a route if it is free, which is found out even when it is time to stop.
+
+        Returns:
+            The cut route, or else the route.
+        """
+        if not self._is_free(cut_route, route, self._queries.to_the_end):
             return route
-        self.take(found)
-        return found
+        self.take(cut_route)
+        return cut_route
 
     def _lattice_route(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
+        """The best route on a lattice of values, each of its moves checked as a whole; None if there is none."""
         if lattice_size(values) < 2:
             return None
 
         lattice = MoveLattice(values, self._queries, self._costs)
         found = lattice.best_route(start, goal, self._order)
-        return found if found is not None and self._confirmed(found, start[None]) else None
+        if found is None or not self._is_free(found, start[None]):
+            return None
+        return found
 
-    def _confirmed(self, route: Matrix, known: Matrix, free: MotionsFree | None = None) -> bool:
+    def _is_free(self, route: Matrix, known_free: Matrix, motions_free: MotionsFree | None = None) -> bool:
         """Whether every edge of a route is free; those of the known one are. Runs have been checked in pieces."""
-        free = self._queries if free is None else free
-        old = set(edge_keys(known))
-        fresh = [k for k, edge in enumerate(edge_keys(route)) if edge not in old]
-        return not fresh or bool(free(route[fresh], route[np.add(fresh, 1)]).all())
+        motions_free = self._queries if motions_free is None else motions_free
+        known_edges = set(edge_keys(known_free))
+        fresh = [k for k, edge in enumerate(edge_keys(route)) if edge not in known_edges]
+        return not fresh or bool(motions_free(route[fresh], route[np.add(fresh, 1)]).all())

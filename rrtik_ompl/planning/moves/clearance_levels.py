@@ -20,24 +20,26 @@ class Level:
     Args:
         world: As it is.
         clearance: See above; None where nothing is proven.
-        searched: What searches in kernels keep in steps [m].
+        searched_clearance: What searches in kernels keep in steps [m].
     """
 
-    def __init__(self, world: World, clearance: float | None, searched: float) -> None:
+    def __init__(self, world: World, clearance: float | None, searched_clearance: float) -> None:
         self._world = world
-        self._kept = clearance
-        self._searched = searched
+        self._proven_clearance = clearance
+        self._searched_clearance = searched_clearance
         self.clearance = 0.0 if clearance is None else clearance
 
     @cached_property
     def searched(self) -> World:
         """A form whose searches in kernels keep more than the clearance in steps."""
-        return keeping(self._world, self._searched)
+        return keeping(self._world, self._searched_clearance)
 
     @cached_property
     def proving(self) -> World:
         """The same, where motions have to be proven."""
-        return self.searched if self._kept is None else keeping(self._world, self._searched, proven=self._kept)
+        if self._proven_clearance is None:
+            return self.searched
+        return keeping(self._world, self._searched_clearance, proven=self._proven_clearance)
 
 
 def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> list[Level]:
@@ -51,12 +53,17 @@ def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> lis
     room = roomiest(world, ends, clearance)
     if room is None:
         return [Level(world, None, 0.0)]
-    least = world.settings.kept
-    kept = sorted({room.kept, max(min(room.kept, CLEARANCE), least), least}, reverse=True)
-    return [Level(world, each, min(room.searched, each + min(each, CLEARANCE))) for each in kept]
+    smallest = world.settings.kept
+    usual = max(min(room.kept, CLEARANCE), smallest)
+    clearances = sorted({room.kept, usual, smallest}, reverse=True)
+    return [Level(world, proven, min(room.searched, proven + min(proven, CLEARANCE))) for proven in clearances]
 
 
 def roomiest(world: World, ends: Matrix, clearance: float | None) -> Room | None:
-    """As :func:`room_between`, with a centimetre, or what the world keeps, where nothing is said."""
-    wanted = max(PREFERRED_CLEARANCE if clearance is None else clearance, world.settings.kept)
-    return room_between(world, ends, wanted)
+    """As :func:`room_between`, with a centimetre where ``clearance`` is None; never less than the world keeps.
+
+    Returns:
+        What may be kept between two ends, shape (2, dof); None if an end cannot be proven free.
+    """
+    wanted = PREFERRED_CLEARANCE if clearance is None else clearance
+    return room_between(world, ends, max(wanted, world.settings.kept))

@@ -35,7 +35,8 @@ FEW_ROUNDS = 2  # of improvement before the grids, which do more in less time
 
 def rounds_before(rounds: int, joints: Sequence[int]) -> int:
     """How many rounds of improvement to spend where grids come after them, of so many allowed."""
-    return min(rounds, FEW_ROUNDS) if len(joints) <= MOST_JOINTS else rounds
+    grids_follow = len(joints) <= MOST_JOINTS
+    return min(rounds, FEW_ROUNDS) if grids_follow else rounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +61,19 @@ class FineGrids:
     levels: Sequence[Level]
     budget: Budget
 
-    def route(self, pairs: Sequence[tuple[Vector, Vector]], known: Matrix, least: int) -> tuple[Matrix, int] | None:
-        """A route with fewer moves than known, and the number of the level that it keeps, or None.
+    def route(
+        self, pairs: Sequence[tuple[Vector, Vector]], best_known: Matrix, lower_bound: int
+    ) -> tuple[Matrix, int] | None:
+        """A route with fewer moves than known.
 
         Args:
             pairs: Of a start and a goal, shapes (n,), that agree in the joints that must not move.
-            known: The best route so far, shape (k, n), every edge of which is a move.
-            least: No route has fewer moves.
+            best_known: The best route so far, shape (k, n), every edge of which is a move.
+            lower_bound: No route has fewer moves.
+
+        Returns:
+            The route, shape (k, n), and the number of the level that it keeps, the first of `levels` is 0; None if
+            there is no such route.
         """
         best: tuple[Matrix, int] | None = None
         if not 0 < len(self.joints) <= MOST_JOINTS:
@@ -74,72 +81,87 @@ class FineGrids:
 
         rng = np.random.default_rng(self.budget.seed)
         with suppress(OutOfTime):
-            idle = 0
-            for nodes, near in GRIDS:
-                idle += 1
+            grids_without_gain = 0
+            for nodes, near_best in GRIDS:
+                grids_without_gain += 1
                 for start, goal in pairs[:MOST_PAIRS]:
-                    if len(known) - 1 <= least or idle > MOST_IDLE:
+                    if len(best_known) - 1 <= lower_bound or grids_without_gain > MOST_IDLE:
                         return best
 
-                    values = self._values_near(known, nodes, rng) if near else self._values(start, goal, nodes, rng)
-                    first, last = (known[0], known[-1]) if near else (start, goal)
+                    if near_best:
+                        values = self._grid_values_near(best_known, nodes, rng)
+                        first = best_known[0]
+                        last = best_known[-1]
+                    else:
+                        values = self._grid_values(start, goal, nodes, rng)
+                        first = start
+                        last = goal
 
-                    found = self._kept(values, first, last, len(known) - 2)
+                    found = self._roomiest_route(values, first, last, max_moves=len(best_known) - 2)
                     if found is not None:
                         best = found
-                        known = found[0]
-                        idle = 0
+                        best_known = found[0]
+                        grids_without_gain = 0
         return best
 
-    def _values(self, start: Vector, goal: Vector, nodes: int, rng: np.random.Generator) -> Values:
+    def _grid_values(self, start: Vector, goal: Vector, nodes: int, rng: np.random.Generator) -> Values:
         """As many values of each joint as a grid of so many configurations has, at equal distances."""
         values = values_of(np.array([start, goal]))
-        each = self._each(nodes)
+        count = self._values_per_joint(nodes)
         for joint in self.joints:
-            more = spread_values(float(self.lower[joint]), float(self.upper[joint]), each, rng)
+            more = spread_values(float(self.lower[joint]), float(self.upper[joint]), count, rng)
             values[joint] = distinct(np.append(values[joint], more))
         return values
 
-    def _values_near(self, route: Matrix, nodes: int, rng: np.random.Generator) -> Values:
+    def _grid_values_near(self, route: Matrix, nodes: int, rng: np.random.Generator) -> Values:
         """The values of a route, and as many close to each as a grid of so many configurations has."""
         values = values_of(route)
-        each = self._each(nodes)
+        count = self._values_per_joint(nodes)
         for joint in self.joints:
-            own = values[joint]
+            of_route = values[joint]
             low = float(self.lower[joint])
             high = float(self.upper[joint])
-            aside = NEAR * (high - low) * spread_values(-1.0, 1.0, max(each // len(own), 1), rng)
-            values[joint] = distinct(np.append(own, np.clip(np.add.outer(own, aside).ravel(), low, high)))
+            offsets = NEAR * (high - low) * spread_values(-1.0, 1.0, max(count // len(of_route), 1), rng)
+            values[joint] = distinct(np.append(of_route, np.clip(np.add.outer(of_route, offsets).ravel(), low, high)))
         return values
 
-    def _each(self, nodes: int) -> int:
+    def _values_per_joint(self, nodes: int) -> int:
+        """Of a grid of so many configurations, rounded down."""
         return int(nodes ** (1.0 / len(self.joints)))
 
-    def _kept(self, values: Values, start: Vector, goal: Vector, most: int) -> tuple[Matrix, int] | None:
-        """The route of a grid with the fewest moves, at most so many, and the largest clearance that it can keep."""
-        last = len(self.levels) - 1
-        route = self._proven(self.levels[last], values, start, goal, most)
+    def _roomiest_route(self, values: Values, start: Vector, goal: Vector, max_moves: int) -> tuple[Matrix, int] | None:
+        """The route of a grid with the fewest moves, with the largest clearance that needs no more of them.
+
+        Returns:
+            The route and the number of its level of clearance; None if no route has at most `max_moves`.
+        """
+        last_level = len(self.levels) - 1
+        route = self._proven_route(self.levels[last_level], values, start, goal, max_moves)
         if route is None:
             return None
 
-        for number, level in enumerate(self.levels[:last]):
-            roomy = self._proven(level, values, start, goal, len(route) - 1)
+        for number, level in enumerate(self.levels[:last_level]):
+            roomy = self._proven_route(level, values, start, goal, len(route) - 1)
             if roomy is not None:
                 return roomy, number
-        return route, last
+        return route, last_level
 
-    def _proven(self, level: Level, values: Values, start: Vector, goal: Vector, most: int) -> Matrix | None:
-        """The route of a grid with the fewest moves, at most so many, that is proven to keep a level."""
+    def _proven_route(self, level: Level, values: Values, start: Vector, goal: Vector, max_moves: int) -> Matrix | None:
+        """The route of a grid with the fewest moves, at most `max_moves`, that is proven to keep a level, or None.
+
+        Lazy: the grid is checked in steps; where the proof of a route fails, its segments are closed, and the grid is
+        searched again.
+        """
         in_steps = BatchedMotionQueries(level.searched.motion_valid_batch, self.budget.over)
         proving = BatchedMotionQueries(level.proving.motion_valid_batch, self.budget.over)
         lattice = MoveLattice(values, in_steps, self.costs)
 
         for _ in range(MOST_PROOFS):
-            route = lattice.best_route(start, goal, range(len(start)), most)
+            route = lattice.best_route(start, goal, range(len(start)), max_moves)
             if route is None or not long_enough(route, self.smallest_move):
                 return None
             if proving(route[:-1], route[1:]).all():
                 return route
-            if lattice.closed_on(route, proving) == 0:
+            if lattice.close_colliding_segments(route, proving) == 0:  # the same route would come again
                 return None
         return None

@@ -16,7 +16,7 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector, distinct
 from rrtik_ompl.world.motion_queries import MotionsFree
 
 Costs: TypeAlias = NDArray[np.float64]  # one number for each configuration of a lattice
-Index: TypeAlias = tuple[int, ...]  # the place of a configuration in a lattice
+Index: TypeAlias = tuple[int, ...]  # of a configuration in a lattice: for each axis the number of its value
 
 ROUNDING = 1e-12  # of a sum of travels, relative
 
@@ -40,158 +40,190 @@ class MoveLattice:
 
     def __init__(self, values: Sequence[Vector], motions_free: MotionsFree, costs: Vector) -> None:
         self.values = [distinct(v) for v in values]
-        # Joints that rest have no axis: an array has 64 at most.
-        self._joints = [joint for joint, v in enumerate(self.values) if len(v) > 1] or [0]
-        self._varied = [self.values[joint] for joint in self._joints]
-        self._shape = tuple(len(v) for v in self._varied)
+        # Joints that rest have no axis: an array has 64 at most. For each axis: its joint, its values, those times the
+        # cost of travel, and for each segment between neighbours along it whether that is free.
+        self._axis_joints = [joint for joint, v in enumerate(self.values) if len(v) > 1] or [0]
+        self._axis_values = [self.values[joint] for joint in self._axis_joints]
+        self._shape = tuple(len(v) for v in self._axis_values)
         self.size = int(np.prod(self._shape))
-        self._places = [self.values[joint] * costs[joint] for joint in self._joints]
-        self._open = self._open_segments(motions_free)
+        self._weighted_values = [self.values[joint] * costs[joint] for joint in self._axis_joints]
+        self._segment_is_free = self._free_segments(motions_free)
 
-    def best_route(self, start: Vector, goal: Vector, order: Sequence[int], most: int | None = None) -> Matrix | None:
+    def best_route(
+        self, start: Vector, goal: Vector, order: Sequence[int], max_moves: int | None = None
+    ) -> Matrix | None:
         """The route with the fewest moves between two configurations of the lattice, the least travel among those.
+
+        Breadth-first by moves: the least travel with which each configuration is reached in at most 0, 1, 2, ... moves.
 
         Args:
             start: Shape (n,).
             goal: Shape (n,).
             order: All joints; among equal routes the one whose last moves come first here.
-            most: Moves that a route may have; any number if None.
+            max_moves: Moves that a route may have; any number if None.
 
         Returns:
             Shape (moves + 1, n), or None if there is no such route.
         """
-        end = self._index(goal)
-        steps = self._steps()
+        goal_index = self._index(goal)
+        step_costs = self._step_costs()
 
-        levels = [np.full(self._shape, np.inf)]
-        levels[0][self._index(start)] = 0.0
+        # costs_by_moves[k]: the least travel to each configuration in at most k moves, infinite where k do not do
+        costs_by_moves = [np.full(self._shape, np.inf)]
+        costs_by_moves[0][self._index(start)] = 0.0
 
-        while not np.isfinite(levels[-1][end]):
-            if len(levels) - 1 == most:
+        while not np.isfinite(costs_by_moves[-1][goal_index]):
+            if len(costs_by_moves) - 1 == max_moves:
                 return None
-            levels.append(_after_a_move(levels[-1], steps))
-            if (np.isfinite(levels[-1]) == np.isfinite(levels[-2])).all():
+            costs_by_moves.append(_costs_after_a_move(costs_by_moves[-1], step_costs))
+            reached = np.isfinite(costs_by_moves[-1])
+            reached_before = np.isfinite(costs_by_moves[-2])
+            if (reached == reached_before).all():
                 return None
 
-        return self._traced(levels, end, [self._joints.index(joint) for joint in order if joint in self._joints])
+        axis_order = [self._axis_joints.index(joint) for joint in order if joint in self._axis_joints]
+        return self._route_back_from(costs_by_moves, goal_index, axis_order)
 
-    def closed_on(self, route: Matrix, motions_free: MotionsFree) -> int:
-        """Check the segments of a route of the lattice anew, and close those that are not free; returns their number.
+    def close_colliding_segments(self, route: Matrix, motions_free: MotionsFree) -> int:
+        """Check the segments of a route of the lattice anew, and close those that are not free.
 
         Args:
             route: Shape (k, n).
             motions_free: Which straight motions are free, for batches of shape (m, n).
+
+        Returns:
+            How many segments were closed.
         """
-        places = [np.array(self._index(q)) for q in route]
-        closed = 0
-        for one, other in pairwise(places):
-            axis = int(np.flatnonzero(one != other)[0])
-            low, high = sorted((int(one[axis]), int(other[axis])))
-            line = np.repeat(one[:, None], high - low + 1, axis=1)
-            line[axis] = np.arange(low, high + 1)
-            rows = self._rows(line)
+        indices = [np.array(self._index(q)) for q in route]
+        num_closed = 0
+        for here, there in pairwise(indices):
+            axis = int(np.flatnonzero(here != there)[0])
+            low, high = sorted((int(here[axis]), int(there[axis])))
+            run_indices = np.repeat(here[:, None], high - low + 1, axis=1)  # shape (axes, configurations)
+            run_indices[axis] = np.arange(low, high + 1)
+            configurations = self._configurations(run_indices)
 
-            hit = np.flatnonzero(~motions_free(rows[:-1], rows[1:]))
-            _line(self._open[axis], tuple(one.tolist()), axis)[low + hit] = False
-            closed += len(hit)
-        return closed
+            colliding = np.flatnonzero(~motions_free(configurations[:-1], configurations[1:]))
+            _line(self._segment_is_free[axis], tuple(here.tolist()), axis)[low + colliding] = False
+            num_closed += len(colliding)
+        return num_closed
 
-    def _open_segments(self, motions_free: MotionsFree) -> list[Mask]:
+    def _free_segments(self, motions_free: MotionsFree) -> list[Mask]:
         """For each axis which motions from one value to the next are free, in the shape of the lattice less one."""
-        rows = self._rows(np.indices(self._shape).reshape(len(self._shape), -1))
-        inside = motions_free(rows, rows).reshape(self._shape)
-        numbers = np.arange(self.size).reshape(self._shape)
+        rows = self._configurations(np.indices(self._shape).reshape(len(self._shape), -1))
+        is_free = motions_free(rows, rows).reshape(self._shape)
+        row_numbers = np.arange(self.size).reshape(self._shape)
 
-        found = [_both_ends(inside, joint) for joint in range(len(self._shape))]
-        tails = [_without_last(numbers, joint)[open_] for joint, open_ in enumerate(found)]
-        heads = [_without_first(numbers, joint)[open_] for joint, open_ in enumerate(found)]
+        # only segments with two free ends are asked about
+        candidates = [_both_ends_free(is_free, axis) for axis in range(len(self._shape))]
+        tails = [_without_last(row_numbers, axis)[mask] for axis, mask in enumerate(candidates)]
+        heads = [_without_first(row_numbers, axis)[mask] for axis, mask in enumerate(candidates)]
+        motion_is_free = motions_free(rows[np.concatenate(tails)], rows[np.concatenate(heads)])
 
-        free = motions_free(rows[np.concatenate(tails)], rows[np.concatenate(heads)])
+        answers = np.split(motion_is_free, np.cumsum([len(part) for part in tails])[:-1])
+        for mask, answer in zip(candidates, answers, strict=True):
+            mask[mask] = answer
+        return candidates
 
-        parts = np.split(free, np.cumsum([len(part) for part in tails])[:-1])
-        for open_, part in zip(found, parts, strict=True):
-            open_[open_] = part
-        return found
-
-    def _rows(self, places: NDArray[np.int64]) -> Matrix:
-        """The configurations at places given for each axis, shape (axes, m), as rows, shape (m, n)."""
-        rows = np.repeat(np.array([[v[0] for v in self.values]]), places.shape[1], axis=0)
-        rows[:, self._joints] = np.stack([v[k] for v, k in zip(self._varied, places, strict=True)], axis=1)
+    def _configurations(self, indices: NDArray[np.int64]) -> Matrix:
+        """The configurations at indices given for each axis, shape (axes, m), as rows, shape (m, n)."""
+        rows = np.repeat(np.array([[values[0] for values in self.values]]), indices.shape[1], axis=0)
+        columns = [values[index] for values, index in zip(self._axis_values, indices, strict=True)]
+        rows[:, self._axis_joints] = np.stack(columns, axis=1)
         return rows
 
     def _index(self, q: Vector) -> Index:
-        return tuple(int(np.searchsorted(v, q[joint])) for v, joint in zip(self._varied, self._joints, strict=True))
+        """Where in the lattice a configuration of it is, shape (n,)."""
+        pairs = zip(self._axis_values, self._axis_joints, strict=True)
+        return tuple(int(np.searchsorted(values, q[joint])) for values, joint in pairs)
 
-    def _steps(self) -> list[tuple[int, Costs]]:
+    def _step_costs(self) -> list[tuple[int, Costs]]:
         """Axes with more than one value, and what each step along them costs, that axis first; infinite if closed."""
-        axes = [axis for axis, count in enumerate(self._shape) if count > 1]
-        opened = [self._open[axis].swapaxes(axis, 0) for axis in axes]
-        gaps = [np.diff(self._places[axis]).reshape(-1, *[1] * (len(self._shape) - 1)) for axis in axes]
-        return [(axis, np.where(open_, gap, np.inf)) for axis, open_, gap in zip(axes, opened, gaps, strict=True)]
+        found = []
+        for axis, count in enumerate(self._shape):
+            if count > 1:
+                travel_costs = np.diff(self._weighted_values[axis]).reshape(-1, *[1] * (len(self._shape) - 1))
+                is_free = self._segment_is_free[axis].swapaxes(axis, 0)
+                found.append((axis, np.where(is_free, travel_costs, np.inf)))
+        return found
 
-    def _traced(self, levels: list[Costs], end: Index, order: Sequence[int]) -> Matrix:
-        """The route to a configuration, from the last move to the first."""
-        indices = [end]
-        for level in range(len(levels) - 1, 0, -1):
+    def _route_back_from(self, costs_by_moves: list[Costs], goal_index: Index, axis_order: Sequence[int]) -> Matrix:
+        """The route to a configuration, traced from the last move to the first; shape (moves + 1, n)."""
+        indices = [goal_index]
+        for moves in range(len(costs_by_moves) - 1, 0, -1):
             here = indices[-1]
-            wanted = float(levels[level][here])
-            indices.append(next(self._origins(levels[level - 1], here, wanted, order)))
-        return self._rows(np.array(indices[::-1]).T)
+            cost = float(costs_by_moves[moves][here])
+            indices.append(next(self._predecessors(costs_by_moves[moves - 1], here, cost, axis_order)))
+        return self._configurations(np.array(indices[::-1]).T)
 
-    def _origins(self, before: Costs, here: Index, wanted: float, order: Sequence[int]) -> Iterator[Index]:
-        """Where a move to a configuration may come from."""
-        for joint in order:
-            low, high = self._run(joint, here)
-            travel = np.abs(self._places[joint][low : high + 1] - self._places[joint][here[joint]])
-            sums = _line(before, here, joint)[low : high + 1] + travel
-            for k in np.flatnonzero(sums <= wanted * (1.0 + ROUNDING) + ROUNDING):
-                if low + k != here[joint]:
-                    yield (*here[:joint], low + int(k), *here[joint + 1 :])
+    def _predecessors(
+        self, costs_before: Costs, here: Index, cost: float, axis_order: Sequence[int]
+    ) -> Iterator[Index]:
+        """Where the last move of a route that reaches a configuration at some cost may come from.
 
-    def _run(self, joint: int, here: Index) -> tuple[int, int]:
-        """First and last place of the run of a joint that contains a configuration."""
-        open_ = _line(self._open[joint], here, joint)
-        blocked = np.flatnonzero(~open_)
-        after = int(np.searchsorted(blocked, here[joint]))
-        low = int(blocked[after - 1]) + 1 if after > 0 else 0
-        return low, int(blocked[after]) if after < len(blocked) else len(open_)
+        ``costs_before`` are the least costs with one move fewer.
+        """
+        for axis in axis_order:
+            low, high = self._free_run(axis, here)
+            travel = np.abs(self._weighted_values[axis][low : high + 1] - self._weighted_values[axis][here[axis]])
+            sums = _line(costs_before, here, axis)[low : high + 1] + travel
+            for k in np.flatnonzero(sums <= cost * (1.0 + ROUNDING) + ROUNDING):  # as cheap as the best, but rounding
+                if low + k != here[axis]:
+                    yield (*here[:axis], low + int(k), *here[axis + 1 :])
+
+    def _free_run(self, axis: int, here: Index) -> tuple[int, int]:
+        """First and last index on an axis of the run that contains a configuration; segment k joins k and k + 1."""
+        is_free = _line(self._segment_is_free[axis], here, axis)
+        blocked = np.flatnonzero(~is_free)
+        next_blocked = int(np.searchsorted(blocked, here[axis]))
+        low = int(blocked[next_blocked - 1]) + 1 if next_blocked > 0 else 0
+        high = int(blocked[next_blocked]) if next_blocked < len(blocked) else len(is_free)
+        return low, high
 
 
-def _after_a_move(costs: Costs, steps: list[tuple[int, Costs]]) -> Costs:
-    """The least costs after one more move, or as before where no move helps: carried along all runs, both ways."""
+def _costs_after_a_move(costs: Costs, step_costs: list[tuple[int, Costs]]) -> Costs:
+    """The least costs after one more move, or as before where no move helps: carried along all runs, both ways.
+
+    Args:
+        costs: Least costs so far, in the shape of the lattice.
+        step_costs: See `MoveLattice._step_costs`.
+
+    Returns:
+        In the shape of the lattice.
+    """
     best = costs.copy()
-    for axis, step in steps:
-        source = costs.swapaxes(axis, 0)
-        sink = best.swapaxes(axis, 0)
-        count = len(step)
+    for axis, cost_of_step in step_costs:
+        before = costs.swapaxes(axis, 0)
+        after = best.swapaxes(axis, 0)  # a view: what is written here is written to `best`
+        count = len(cost_of_step)
         for forward in (True, False):
-            carried = np.full(source.shape[1:], np.inf)
+            carried = np.full(before.shape[1:], np.inf)
             for k in range(count) if forward else range(count - 1, -1, -1):
                 tail, head = (k, k + 1) if forward else (k + 1, k)
-                np.minimum(carried, source[tail], out=carried)
-                carried += step[k]
-                np.minimum(sink[head, ...], carried, out=sink[head, ...])
+                np.minimum(carried, before[tail], out=carried)
+                carried += cost_of_step[k]
+                np.minimum(after[head, ...], carried, out=after[head, ...])
     return best
 
 
-def _line(cells: NDArray[Any], here: Index, joint: int) -> NDArray[Any]:
-    """The cells along a joint through a place."""
-    place: tuple[Any, ...] = (*here[:joint], slice(None), *here[joint + 1 :])
-    line: NDArray[Any] = cells[place]
+def _line(cells: NDArray[Any], here: Index, axis: int) -> NDArray[Any]:
+    """The cells along an axis through an index, a view."""
+    selection: tuple[Any, ...] = (*here[:axis], slice(None), *here[axis + 1 :])
+    line: NDArray[Any] = cells[selection]
     return line
 
 
-def _without_last(cells: NDArray[Any], joint: int) -> NDArray[Any]:
-    """All but the last of the cells along a joint."""
-    return cells.take(range(cells.shape[joint] - 1), axis=joint)
+def _without_last(cells: NDArray[Any], axis: int) -> NDArray[Any]:
+    """All but the last of the cells along an axis."""
+    return cells.take(range(cells.shape[axis] - 1), axis=axis)
 
 
-def _without_first(cells: NDArray[Any], joint: int) -> NDArray[Any]:
-    """All but the first of the cells along a joint."""
-    return cells.take(range(1, cells.shape[joint]), axis=joint)
+def _without_first(cells: NDArray[Any], axis: int) -> NDArray[Any]:
+    """All but the first of the cells along an axis."""
+    return cells.take(range(1, cells.shape[axis]), axis=axis)
 
 
-def _both_ends(inside: NDArray[np.bool_], joint: int) -> NDArray[np.bool_]:
-    """Which segments along a joint have two free ends."""
-    open_: NDArray[np.bool_] = _without_last(inside, joint) & _without_first(inside, joint)
-    return open_
+def _both_ends_free(is_free: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
+    """Which segments along an axis have two free ends."""
+    both_free: NDArray[np.bool_] = _without_last(is_free, axis) & _without_first(is_free, axis)
+    return both_free

@@ -25,6 +25,11 @@ PROBES = 4  # stretches of a colliding motion in the middle of which the depth i
 MOST_CORNERS = 256
 START, FREE, GOAL = range(3)  # where the free joint is
 
+# what is known of a part of its range, see `OneFreeValue._verdict`
+REFUTED = "refuted"
+MIDDLE_IS_FREE = "middle is free"
+UNDECIDED = "undecided"
+
 Place: TypeAlias = tuple[int, int]  # which of the other joints have arrived, a set of bits; where the free joint is
 Step: TypeAlias = tuple[Place, Place]
 
@@ -44,24 +49,28 @@ def sharper_bound(world: World, joints: Sequence[int], start: Vector, goal: Vect
         else c + 1 (3 for c = 1).
     """
     changing = np.flatnonzero(moved(start, goal)).tolist()
-    known = 3 if len(changing) == 1 else len(changing) + 1
-    twice = [j for j in joints if j not in changing] if len(changing) == 1 else changing
-    proofs = (OneFreeValue(world, start, goal, joint, stop).refuted() for joint in twice)
-    return known + 1 if all(proofs) else known
+    if len(changing) == 1:  # another joint leaves and returns
+        bound = 3
+        may_move_twice = [j for j in joints if j not in changing]
+    else:
+        bound = len(changing) + 1
+        may_move_twice = changing
+    proofs = (OneFreeValue(world, start, goal, joint, stop).refuted() for joint in may_move_twice)
+    return bound + 1 if all(proofs) else bound
 
 
 def remembered(world: World, joints: Sequence[int], stop: Stop) -> Callable[[Vector, Vector], int]:
     """:func:`sharper_bound` of a world, computed once for each start and goal; again if it was stopped."""
-    known: dict[tuple[bytes, bytes], int] = {}
+    bounds: dict[tuple[bytes, bytes], int] = {}
 
     def bound(start: Vector, goal: Vector) -> int:
         ends = (start.tobytes(), goal.tobytes())
-        if ends not in known:
+        if ends not in bounds:
             found = sharper_bound(world, joints, start, goal, stop)
             if stop():
                 return found
-            known[ends] = found
-        return known[ends]
+            bounds[ends] = found
+        return bounds[ends]
 
     return bound
 
@@ -85,7 +94,7 @@ class OneFreeValue:
         self._stop = stop
 
         self._others = [k for k in np.flatnonzero(moved(start, goal)).tolist() if k != joint]
-        self._full = (1 << len(self._others)) - 1
+        self._all_arrived = (1 << len(self._others)) - 1  # the mask of a place where all others have arrived
         self._depth = OverlapDepth(world.robot, world.bodies, world.pairs)
 
         ends = start[joint], goal[joint]
@@ -94,50 +103,59 @@ class OneFreeValue:
 
     def refuted(self) -> bool:
         """Whether there is a proof that something collides on every such route."""
-        if self._full >= MOST_CORNERS:
+        if self._all_arrived >= MOST_CORNERS:
             return False
 
-        corners = range(self._full + 1)
-        self._stretches = {(mask, end): self._stretch(mask, end) for end in (START, GOAL) for mask in corners}
+        corners = range(self._all_arrived + 1)
+        self._free_ranges = {(mask, end): self._free_range(mask, end) for end in (START, GOAL) for mask in corners}
         steps = [step for end in (START, GOAL) for step in self._steps_of_others(end)]
-        self._standing = {step for step in steps if self._is_free(step, 0.0)}
+        self._free_steps = {step for step in steps if self._step_is_free(step, 0.0)}
 
         parts = [(self._lower, self._upper)]
-        for _ in range(MOST_WORK // (self._full + 1)):
+        for _ in range(MOST_WORK // (self._all_arrived + 1)):
             if not parts:
                 return True
             low, high = parts.pop()
-            verdict = None if self._stop() else self._verdict(low, high)
-            if verdict is None or high - low < SMALLEST_PART * (self._upper - self._lower):
+            if self._stop():
                 return False
-            if verdict is False:
+
+            verdict = self._verdict(low, high)
+            too_small = high - low < SMALLEST_PART * (self._upper - self._lower)
+            if verdict == MIDDLE_IS_FREE or too_small:
+                return False
+            if verdict == UNDECIDED:
                 parts += [(low, 0.5 * (low + high)), (0.5 * (low + high), high)]
         return False
 
-    def _verdict(self, low: float, high: float) -> bool | None:
-        """Whether no value of a part makes a free route; None if its middle does."""
+    def _verdict(self, low: float, high: float) -> str:
+        """Whether some value from ``low`` to ``high`` of the free joint makes a free route.
+
+        Returns:
+            REFUTED if none does, MIDDLE_IS_FREE if that in the middle does, UNDECIDED if halves are to be looked at.
+        """
         middle = 0.5 * (low + high)
         refuted = set[Step]()
         while True:
             route = self._route(low, high, refuted)
             if route is None:
-                return True
+                return REFUTED
             free = [step for step in pairwise(route) if step[0][1] == step[1][1] == FREE]
 
-            fresh = {step for step in free if self._collides_deeply(step, middle, 0.5 * (high - low))}
+            fresh = {step for step in free if self._step_is_refuted(step, middle, 0.5 * (high - low))}
             if not fresh:
-                return None if all(self._is_free(step, middle) for step in pairwise(route)) else False
+                middle_is_free = all(self._step_is_free(step, middle) for step in pairwise(route))
+                return MIDDLE_IS_FREE if middle_is_free else UNDECIDED
             refuted |= fresh
 
     def _route(self, low: float, high: float, refuted: set[Step]) -> list[Place] | None:
         """A route from start to goal on which nothing is known to collide for all values of a part, or None."""
         origin: dict[Place, Place | None] = {(0, START): None}
-        for here in ((mask, state) for state in (START, FREE, GOAL) for mask in range(self._full + 1)):
+        for here in ((mask, state) for state in (START, FREE, GOAL) for mask in range(self._all_arrived + 1)):
             if here in origin:
-                for there in self._open_from(here, low, high, refuted):
+                for there in self._next_places(here, low, high, refuted):
                     origin.setdefault(there, here)
 
-        place: Place | None = (self._full, GOAL)
+        place: Place | None = (self._all_arrived, GOAL)
         if place not in origin:
             return None
 
@@ -147,15 +165,17 @@ class OneFreeValue:
             place = origin[place]
         return route[::-1]
 
-    def _open_from(self, here: Place, low: float, high: float, refuted: set[Step]) -> Iterator[Place]:
+    def _next_places(self, here: Place, low: float, high: float, refuted: set[Step]) -> Iterator[Place]:
         """The next places of a route."""
         mask, state = here
         for step in self._steps_from(here):
-            if step in self._standing if state != FREE else step not in refuted:
+            may_be_free = step not in refuted if state == FREE else step in self._free_steps
+            if may_be_free:
                 yield step[1]
-        if state != GOAL:
-            least, most = self._stretches[mask, START if state == START else GOAL]
-            if low <= most and high >= least:
+
+        if state != GOAL:  # the free joint moves: away from its start, or to its goal
+            lowest, highest = self._free_ranges[mask, START if state == START else GOAL]
+            if low <= highest and high >= lowest:
                 yield mask, state + 1
 
     def _steps_from(self, here: Place) -> list[Step]:
@@ -164,7 +184,8 @@ class OneFreeValue:
         return [(here, (mask | 1 << k, state)) for k in range(len(self._others)) if not mask >> k & 1]
 
     def _steps_of_others(self, state: int) -> list[Step]:
-        return [step for mask in range(self._full + 1) for step in self._steps_from((mask, state))]
+        """All moves of the other joints while the free joint is in a state."""
+        return [step for mask in range(self._all_arrived + 1) for step in self._steps_from((mask, state))]
 
     def _configuration(self, place: Place, value: float) -> Vector:
         """Where the arm is at a place; ``value`` is that of the free joint where it is free."""
@@ -175,17 +196,18 @@ class OneFreeValue:
         q[self._joint] = (self._start[self._joint], value, self._goal[self._joint])[state]
         return q
 
-    def _is_free(self, step: Step, value: float) -> bool:
+    def _step_is_free(self, step: Step, value: float) -> bool:
+        """Whether the world finds a move free, the free joint at a value where it is free."""
         return self._world.motion_valid(*(self._configuration(place, value) for place in step))
 
-    def _stretch(self, mask: int, end: int) -> tuple[float, float]:
+    def _free_range(self, mask: int, end: int) -> tuple[float, float]:
         """Between which values the free joint could move to or from an end of its motion, while the others rest."""
-        rows = self._between(((mask, FREE), (mask, FREE)), (self._lower, self._upper))
+        rows = self._step_configurations(((mask, FREE), (mask, FREE)), (self._lower, self._upper))
         here = self._configuration((mask, end), 0.0)[self._joint]
         hits = rows[~self._world.valid_batch(rows), self._joint]
         return hits[hits <= here].max(initial=self._lower), hits[hits >= here].min(initial=self._upper)
 
-    def _between(self, step: Step, values: tuple[float, float]) -> Matrix:
+    def _step_configurations(self, step: Step, values: tuple[float, float]) -> Matrix:
         """Configurations of a move as dense as the world checks it, shape (k, n).
 
         ``values``: of the free joint, where it is free, at the begin and at the end.
@@ -196,13 +218,13 @@ class OneFreeValue:
         rows: Matrix = (1.0 - shares) * a + shares * b
         return rows
 
-    def _collides_deeply(self, step: Step, value: float, reach: float) -> bool:
-        """Whether a move collides wherever the free joint is within ``reach`` of a value."""
-        rows = self._between(step, (value, value))
-        needed = float(self._world.weights[self._joint]) * reach
+    def _step_is_refuted(self, step: Step, value: float, half_width: float) -> bool:
+        """Whether a move collides wherever the free joint is within ``half_width`` of a value."""
+        rows = self._step_configurations(step, (value, value))
+        needed_depth = float(self._world.weights[self._joint]) * half_width
 
         hits = np.flatnonzero(~self._world.valid_batch(rows))
 
         stretches = sorted(np.split(hits, np.flatnonzero(np.diff(hits) > 1) + 1), key=len, reverse=True)
         probes = [stretch[len(stretch) // 2] for stretch in stretches[:PROBES] if len(stretch)]
-        return any(self._depth.travel(rows[k]) > needed for k in probes)
+        return any(self._depth.travel(rows[k]) > needed_depth for k in probes)

@@ -23,7 +23,7 @@ MOST_DEPTHS = 20_000  # computed: each takes some 30 microseconds
 AT_ONCE = 256  # of them between two looks at the clock
 
 
-def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector, most: int, stop: Stop) -> int:
+def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector, known_moves: int, stop: Stop) -> int:
     """No route between two configurations, shapes (n,), that moves these joints alone has fewer moves.
 
     Args:
@@ -31,11 +31,11 @@ def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector
         joints: Those that may move.
         start: Where the moves begin.
         goal: Where they end; the same as the start in all other joints.
-        most: Moves of a route that is known.
+        known_moves: Moves of a route that is known.
         stop: True ends the work.
 
     Returns:
-        At most ``most``; 0 if there are not two joints, one has no limits, or there was no time.
+        At most ``known_moves``; 0 if there are not two joints, one has no limits, or there was no time.
     """
     chosen = list(joints)
     lower = world.robot.lower[chosen]
@@ -44,66 +44,68 @@ def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector
         return 0
 
     depth = OverlapDepth(world.robot, world.bodies, world.pairs)
-    left = MOST_DEPTHS
+    depths_left = MOST_DEPTHS
     bound = 0
-    closed = np.zeros((1, 1), dtype=bool)
+    cell_is_closed = np.zeros((1, 1), dtype=bool)
 
-    for count in CELLS:
-        closed = closed.repeat(count // len(closed), axis=0).repeat(count // closed.shape[1], axis=1)
-        half = 0.5 * (upper - lower) / count
-        places = np.argwhere(~closed)
-        rows = np.repeat(start[None], len(places), axis=0)
-        rows[:, chosen] = lower + (2 * places + 1) * half
-        hits = np.flatnonzero(~world.valid_batch(rows))
-        if len(hits) > left or stop():
+    for cells_per_joint in CELLS:
+        finer = cells_per_joint // len(cell_is_closed)
+        cell_is_closed = cell_is_closed.repeat(finer, axis=0).repeat(finer, axis=1)
+        half_cell = 0.5 * (upper - lower) / cells_per_joint
+        cells = np.argwhere(~cell_is_closed)
+        middles = np.repeat(start[None], len(cells), axis=0)
+        middles[:, chosen] = lower + (2 * cells + 1) * half_cell
+        colliding = np.flatnonzero(~world.valid_batch(middles))
+        if len(colliding) > depths_left or stop():
             break
-        left -= len(hits)
+        depths_left -= len(colliding)
 
-        deep = _deep(depth, rows[hits], float(world.weights[chosen] @ (half + SAME)), stop)
-        if deep is None:
+        reach_of_cell = float(world.weights[chosen] @ (half_cell + SAME))
+        is_deep = _deeper_than(depth, middles[colliding], reach_of_cell, stop)
+        if is_deep is None:
             break
-        closed[tuple(places[hits[deep]].T)] = True
+        cell_is_closed[tuple(cells[colliding[is_deep]].T)] = True
 
-        ends = [_cell(q[chosen], lower, half, count) for q in (start, goal)]
-        bound = _moves_between(closed, ends[0], ends[1], most)
-        if bound == most:
+        ends = [_cell(q[chosen], lower, half_cell, cells_per_joint) for q in (start, goal)]
+        bound = _moves_between(cell_is_closed, ends[0], ends[1], known_moves)
+        if bound == known_moves:
             break
     return bound
 
 
-def _deep(depth: OverlapDepth, rows: Matrix, reach: float, stop: Stop) -> Mask | None:
+def _deeper_than(depth: OverlapDepth, rows: Matrix, reach: float, stop: Stop) -> Mask | None:
     """Which configurations, shape (m, n), collide more deeply than a reach [m]; None if there is no time."""
-    found = np.zeros(len(rows), dtype=bool)
+    is_deep = np.zeros(len(rows), dtype=bool)
 
     for k, q in enumerate(rows):
         if k % AT_ONCE == 0 and stop():
             return None
-        found[k] = depth.travel(q) > reach
-    return found
+        is_deep[k] = depth.travel(q) > reach
+    return is_deep
 
 
-def _cell(values: Vector, lower: Vector, half: Vector, count: int) -> tuple[int, int]:
+def _cell(values: Vector, lower: Vector, half_cell: Vector, cells_per_joint: int) -> tuple[int, int]:
     """The cell that two joint values are in."""
-    first, second = np.clip((values - lower) // (2.0 * half), 0, count - 1).astype(int).tolist()
+    first, second = np.clip((values - lower) // (2.0 * half_cell), 0, cells_per_joint - 1).astype(int).tolist()
     return first, second
 
 
-def _moves_between(closed: Mask, start: tuple[int, int], goal: tuple[int, int], most: int) -> int:
+def _moves_between(cell_is_closed: Mask, start: tuple[int, int], goal: tuple[int, int], max_moves: int) -> int:
     """Fewest moves along rows of open cells, at most so many."""
-    reached = np.zeros_like(closed)
+    reached = np.zeros_like(cell_is_closed)
     reached[start] = True
-    for moves in range(most):
+    for moves in range(max_moves):
         if reached[goal]:
             return moves
-        reached = reached | _swept(reached, closed) | _swept(reached.T, closed.T).T
-    return most
+        reached = reached | _swept(reached, cell_is_closed) | _swept(reached.T, cell_is_closed.T).T
+    return max_moves
 
 
-def _swept(reached: Mask, closed: Mask) -> Mask:
+def _swept(reached: Mask, cell_is_closed: Mask) -> Mask:
     """The cells that a move along the second axis reaches."""
-    runs = np.cumsum(np.insert(closed, 0, True, axis=1), axis=1)[:, 1:]  # grows at closed cells
-    runs += (closed.shape[1] + 2) * np.arange(len(closed))[:, None]
+    runs = np.cumsum(np.insert(cell_is_closed, 0, True, axis=1), axis=1)[:, 1:]  # grows at closed cells
+    runs += (cell_is_closed.shape[1] + 2) * np.arange(len(cell_is_closed))[:, None]
     met = np.zeros(int(runs.max()) + 1, dtype=bool)
-    met[runs[reached & ~closed]] = True
-    swept: Mask = met[runs] & ~closed
+    met[runs[reached & ~cell_is_closed]] = True
+    swept: Mask = met[runs] & ~cell_is_closed
     return swept

@@ -74,8 +74,8 @@ class MoveSearch:
     ) -> None:
         budget = Budget() if budget is None else budget
         self.pairs = [(s, g) for s, g in product(starts, goals)]
-        self._bounds = [lower_bound(s, g) for s, g in self.pairs]
-        self._differing = min(self._bounds)
+        self._bounds = [lower_bound(s, g) for s, g in self.pairs]  # for each pair; no route of it has fewer moves
+        self._min_bound = min(self._bounds)  # at the begin
         self._lower = lower
         self._upper = upper
 
@@ -88,12 +88,16 @@ class MoveSearch:
         travel = np.ones(count) if costs is None else costs
         self._best = BestRoute(self._queries, travel, order, shortest)
 
-        self._unkept = None if all_free is None else BatchedMotionQueries(all_free, budget.over)
-        self._any = self._best if self._unkept is None else BestRoute(self._unkept, travel, order, shortest)
+        # what raises the bound, see `all_free`; the same as above if no clearance is kept
+        self._queries_without_clearance: BatchedMotionQueries | None = None
+        self._best_without_clearance = self._best
+        if all_free is not None:
+            self._queries_without_clearance = BatchedMotionQueries(all_free, budget.over)
+            self._best_without_clearance = BestRoute(self._queries_without_clearance, travel, order, shortest)
 
         self._movable = [j for j in range(count) if j not in frozen and lower[j] < upper[j]]
         self._most_nodes = most_nodes
-        self._prove = prove
+        self._prove = prove  # None once it has been called
         self._offers: list[Matrix] = []
         self.rounds = 0
 
@@ -125,7 +129,10 @@ class MoveSearch:
     @property
     def motions(self) -> int:
         """How many straight motions have been checked."""
-        return self._queries.asked + (0 if self._unkept is None else self._unkept.asked)
+        asked = self._queries.asked
+        if self._queries_without_clearance is not None:
+            asked += self._queries_without_clearance.asked
+        return asked
 
     def raise_bound(self, pair: int, bound: int) -> None:
         """Take note that no route between a start and a goal, counted as in ``pairs``, has fewer moves."""
@@ -146,18 +153,20 @@ class MoveSearch:
         with suppress(OutOfTime):
             for number, (start, goal) in enumerate(self.pairs):
                 values = values_of(np.array([start, goal]))
-                least = self._bounds[number]
-                if not 0 < least <= self.moves:
+                fewest = self._bounds[number]
+                if not 0 < fewest <= self.moves:
                     continue
                 if lattice_size(values) > self._most_nodes:
                     self._try_plain_orders(start, goal)
                     continue
 
                 found = self._best.search(values, start, goal)
-                if (found is None or transitions(found) > least) and self._any is not self._best:
-                    found = self._any.search(values, start, goal)
-                if found is None or transitions(found) > least:
-                    self.raise_bound(number, 3 if least == 1 else least + 1)
+                needs_more = found is None or transitions(found) > fewest
+                if needs_more and self._best_without_clearance is not self._best:
+                    found = self._best_without_clearance.search(values, start, goal)
+                    needs_more = found is None or transitions(found) > fewest
+                if needs_more:
+                    self.raise_bound(number, 3 if fewest == 1 else fewest + 1)
 
     def _try_plain_orders(self, start: Vector, goal: Vector) -> None:
         """Take in the moves of the joints from the last to the first, or from the first to the last, if free."""
@@ -166,11 +175,13 @@ class MoveSearch:
             if self._queries(route[:-1], route[1:]).all():
                 self._best.take(route)
 
-    def _try_some_corners(self) -> None:
+    def _try_corners_of_large_boxes(self) -> None:
         """Take in a route without a detour if one is found where the corners are too many for all to be tried."""
         for start, goal in self.pairs:
-            many = lattice_size(values_of(np.array([start, goal]))) > self._most_nodes
-            orders = staircase_orders(start, goal, self._queries) if many and not self.direct else []
+            too_many = lattice_size(values_of(np.array([start, goal]))) > self._most_nodes
+            if not too_many or self.direct:
+                continue
+            orders = staircase_orders(start, goal, self._queries)
             if orders:
                 self._best.take(np.vstack([start, axis_moves(start, goal, orders[0])]))
 
@@ -182,29 +193,29 @@ class MoveSearch:
         if self.direct:
             return
         with suppress(OutOfTime):
-            self._try_some_corners()
+            self._try_corners_of_large_boxes()
             if not self.proven:
                 self._offers = [self._cut(offered) for offered in self._offers]
                 self._cut_again()
 
             for joint in self._movable:
-                self._free_values([joint])
+                self._search_with_free_values([joint])
             for offered in self._offers:
                 if not self.proven:
                     self._rearrange(offered)
 
             for joints in islice(self._free_joints(), rounds):
-                self._sharpen()
+                self._sharpen_bound()
                 if self.proven:
                     break
                 self.rounds += 1
-                self._free_values(joints)
+                self._search_with_free_values(joints)
                 self._cut_again()
                 if self.route is not None:
-                    self._around(self.route)
+                    self._improve_part(self.route)
 
-            self._other_orders()
-            self._less_travel()
+            self._reorder_detours()
+            self._reduce_travel()
 
     def _cut(self, offered: Matrix) -> Matrix:
         """A free route cut by both methods, whichever is better."""
@@ -212,13 +223,16 @@ class MoveSearch:
 
     def _cut_again(self) -> None:
         """Further cuts of the best route, joints in random orders, until several in a row gain no move."""
-        idle = 0
-        while self.route is not None and not self.proven and idle < CUTS:
+        cuts_without_gain = 0
+        while self.route is not None and not self.proven and cuts_without_gain < CUTS:
             if self._queries.stop():
                 raise OutOfTime
             before = self.moves
             self._best.cut(self.route, self._rng.permutation(self.route.shape[1]).tolist())
-            idle = idle + 1 if self.moves == before else 0
+            if self.moves == before:
+                cuts_without_gain += 1
+            else:
+                cuts_without_gain = 0
 
     def _rearrange(self, route: Matrix) -> None:
         """The best route that the values of a route allow; part by part if they are many."""
@@ -229,13 +243,13 @@ class MoveSearch:
             first = last
 
     def _window(self, route: Matrix, first: int) -> int:
-        """The last waypoint of the longest part from ``first`` on whose values fit in a lattice."""
+        """The number of the last waypoint of the longest part from ``first`` on whose values fit in a lattice."""
         last = first + 1
         while last + 1 < len(route) and lattice_size(values_of(route[first : last + 2])) <= self._most_nodes:
             last += 1
         return last
 
-    def _sharpen(self) -> None:
+    def _sharpen_bound(self) -> None:
         """Prove a better bound where that would settle the matter."""
         if self._prove is None or self.moves != self.bound + 1:
             return
@@ -246,8 +260,11 @@ class MoveSearch:
             if lower_bound(start, goal) < self._bounds[number] < self.moves:  # its corners are settled
                 self.raise_bound(number, prove(start, goal))
 
-    def _free_values(self, joints: Sequence[int]) -> None:
-        """Routes from corner to corner, some joints free; none if a lattice cannot hold the corners."""
+    def _search_with_free_values(self, joints: Sequence[int]) -> None:
+        """Search for a route between corners where some joints take many values, unless the corners alone are too many.
+
+        The pair of a start and a goal is drawn among those that may have a better route.
+        """
         promising = [k for k, bound in enumerate(self._bounds) if bound <= self.moves]
         if promising:
             start, goal = self.pairs[int(self._rng.choice(promising))]
@@ -255,8 +272,8 @@ class MoveSearch:
             if lattice_size(values) <= self._most_nodes:
                 self._best.search(values, start, goal, shorter=self.proven)
 
-    def _around(self, route: Matrix) -> None:
-        """The values of a part of a route and further ones of some joints."""
+    def _improve_part(self, route: Matrix) -> None:
+        """Replace a part of a route, at random, by the best on its values and further ones of some joints."""
         first = int(self._rng.integers(len(route) - 1))
         last = self._window(route, first)
         while first > 0 and lattice_size(values_of(route[first - 1 : last + 1])) <= self._most_nodes // SPARE:
@@ -265,7 +282,7 @@ class MoveSearch:
         joints = self._some_joints(MOST_FREE)
         self._best.replace(route, first, last, self._with_spread(route[first : last + 1], joints))
 
-    def _less_travel(self) -> None:
+    def _reduce_travel(self) -> None:
         """Move the free values of the best route by less and less, as long as its travel gets less."""
         for width in WIDTHS:
             for _ in range(REPEATS):
@@ -279,33 +296,36 @@ class MoveSearch:
                 if self.route is before:
                     break
 
-    def _other_orders(self) -> None:
+    def _reorder_detours(self) -> None:
         """Let the joints that make detours in the best route make others, in other orders."""
         if self.route is not None:
             values = values_of(self.route)
             ends = values_of(self.route[[0, -1]])
             detours = [j for j in self._movable if len(values[j]) > len(ends[j])]
             if detours:
-                self._free_values(detours)
+                self._search_with_free_values(detours)
 
     def _with_spread(self, rows: Matrix, joints: Sequence[int]) -> Values:
+        """The values of rows, shape (k, n), and as many more of some joints as a lattice may have."""
         return with_spread(values_of(rows), joints, self._lower, self._upper, self._most_nodes, self._rng)
 
-    def _some_joints(self, most: int) -> list[int]:
-        """One to ``most`` joints that may move, at random."""
-        count = int(self._rng.integers(1, min(most, len(self._movable)) + 1)) if self._movable else 0
-        return self._rng.choice(self._movable, size=count, replace=False).tolist() if count else []
+    def _some_joints(self, max_count: int) -> list[int]:
+        """One to ``max_count`` joints that may move, at random."""
+        if not self._movable:
+            return []
+        count = int(self._rng.integers(1, min(max_count, len(self._movable)) + 1))
+        return self._rng.choice(self._movable, size=count, replace=False).tolist()
 
     def _free_joints(self) -> Iterator[list[int]]:
         """Which joints are free, without end: all pairs in random order, all sets of three, each alone, and again.
 
         Never more than can have free values in a route that is better by a move.
         """
-        alone = False  # each joint alone comes before all others, see `improve`
+        smallest_size = 2  # `improve` has tried each joint alone before
         while self._movable:
-            for size in range(1 if alone else 2, MOST_FREE + 1):
+            for size in range(smallest_size, MOST_FREE + 1):
                 sets = list(combinations(self._movable, size))
                 for k in self._rng.permutation(len(sets)):
-                    if size <= max(self.moves - 1 - self._differing, 1):
+                    if size <= max(self.moves - 1 - self._min_bound, 1):
                         yield list(sets[k])
-            alone = True
+            smallest_size = 1

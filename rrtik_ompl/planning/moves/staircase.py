@@ -76,17 +76,17 @@ def one_joint_moves(
     if faults:
         raise InputError(f"path to convert: motion {faults[0].edge + 1} is not valid: {faults[0].reason}")
 
-    least = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
+    finest_step = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
     check_route_clearance(world, clearance, path.waypoints)
 
-    for kept in provable_clearances(world, path.waypoints, clearance):
+    for kept_clearance in provable_clearances(world, path.waypoints, clearance):
         with suppress(InputError):  # no staircase keeps so much; one that keeps less may
-            rows = _converted(path.waypoints, keeping(world, 0.0, proven=kept), least)
-            return proved(path_through(path, rows), world, clearance=kept)
+            rows = _converted(path.waypoints, keeping(world, 0.0, proven=kept_clearance), finest_step)
+            return proved(path_through(path, rows), world, clearance=kept_clearance)
 
     for density in DENSITIES:
         finer = form_of(world, motion_resolution=max(world.motion_resolution / density, FINEST_RESOLUTION))
-        rows = _converted(path.waypoints, finer, least)
+        rows = _converted(path.waypoints, finer, finest_step)
         if not violations_of(world, rows):
             return proved(path_through(path, rows), world)
 
@@ -124,23 +124,23 @@ def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_free: M
     layers = []
 
     for _ in places:
-        tried = [(corner, k) for corner in frontier for k in places if not corner >> k & 1]
-        tails = np.array([_corner(a, b, joints, corner) for corner, _ in tried])
-        heads = np.array([_corner(a, b, joints, corner | 1 << k) for corner, k in tried])
+        candidates = [(corner, k) for corner in frontier for k in places if not corner >> k & 1]
+        tails = np.array([_corner(a, b, joints, corner) for corner, _ in candidates])
+        heads = np.array([_corner(a, b, joints, corner | 1 << k) for corner, k in candidates])
 
-        free = [step for step, ok in zip(tried, motions_free(tails, heads), strict=True) if ok]
+        free = [step for step, ok in zip(candidates, motions_free(tails, heads), strict=True) if ok]
         layers.append(free)
         frontier = sorted({corner | 1 << k for corner, k in free})[:WIDEST]
         if not frontier:
             return {}
 
-    alive = {(1 << len(joints)) - 1}
+    leads_to_end = {(1 << len(joints)) - 1}
     steps = dict[int, list[int]]()
     for layer in reversed(layers):  # backwards, so that steps into dead ends fall away
         for corner, k in layer:
-            if corner | 1 << k in alive:
+            if corner | 1 << k in leads_to_end:
                 steps.setdefault(corner, []).append(k)
-        alive = set(steps)
+        leads_to_end = set(steps)
     return steps
 
 

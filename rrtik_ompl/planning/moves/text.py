@@ -69,9 +69,9 @@ def _sentence(move: Move) -> str:
         end = float(wrapped(end))
 
     word = words[0] if move.change > 0.0 else words[1]
-    far = _rounded(factor * abs(move.change))
+    distance = _rounded(factor * abs(move.change))
     target = _rounded(factor * end)
-    return f"{_said(move.joint)} {word} {far} {unit} to {target.replace('-', 'minus ')}"
+    return f"{_said(move.joint)} {word} {distance} {unit} to {target.replace('-', 'minus ')}"
 
 
 def _rounded(value: float) -> str:

@@ -45,12 +45,12 @@ def with_spread(
         most_nodes: Largest size.
         rng: Shifts the new values.
     """
-    others = lattice_size([v for joint, v in enumerate(values) if joint not in joints])
-    each = int((most_nodes / others) ** (1.0 / len(joints)))
+    size_of_others = lattice_size([v for joint, v in enumerate(values) if joint not in joints])
+    values_per_joint = int((most_nodes / size_of_others) ** (1.0 / len(joints)))
 
     found = list(values)
     for joint in joints:
-        count = min(each - len(values[joint]), MOST_VALUES)
+        count = min(values_per_joint - len(values[joint]), MOST_VALUES)
         if count > 0:
             more = spread_values(float(lower[joint]), float(upper[joint]), count, rng)
             found[joint] = distinct(np.append(values[joint], more))
@@ -70,21 +70,21 @@ def near_values(route: Matrix, width: float, lower: Vector, upper: Vector, most_
     values = values_of(route)
     free = [v[(v != ends[0]) & (v != ends[1])] for v, ends in zip(values, route[[0, -1]].T, strict=True)]
 
-    best = values
+    widest_that_fits = values
     for count in range(1, STEPS_ASIDE + 1):
-        aside = width * 0.5 ** np.arange(count)
-        steps = np.outer(upper - lower, np.concatenate([-aside, aside]))
+        distances = width * 0.5 ** np.arange(count)
+        steps = np.outer(upper - lower, np.concatenate([-distances, distances]))
         moved = [np.add.outer(f, step).ravel() for f, step in zip(free, steps, strict=True)]
         moved = [np.clip(m, low, high) for m, low, high in zip(moved, lower, upper, strict=True)]
 
         wider = [distinct(np.append(v, m)) for v, m in zip(values, moved, strict=True)]
         if lattice_size(wider) > most_nodes:
             break
-        best = wider
-    return best
+        widest_that_fits = wider
+    return widest_that_fits
 
 
-def within_travel(values: Values, start: Vector, goal: Vector, costs: Vector, most: float) -> Values | None:
+def within_travel(values: Values, start: Vector, goal: Vector, costs: Vector, max_travel: float) -> Values | None:
     """The values that a route of no more than some travel can take; None if there is no such route.
 
     Args:
@@ -92,12 +92,14 @@ def within_travel(values: Values, start: Vector, goal: Vector, costs: Vector, mo
         start: Where the route begins, shape (n,).
         goal: Where it ends.
         costs: Cost of each joint's travel, shape (n,).
-        most: Travel of the whole route.
+        max_travel: Travel of the whole route, in the unit of the costs.
     """
     low = np.minimum(start, goal)
     high = np.maximum(start, goal)
-    spare = most - float(costs @ (high - low))
-    if spare < 0.0:
+    spare_travel = max_travel - float(costs @ (high - low))
+    if spare_travel < 0.0:
         return None
-    aside = [2.0 * cost * np.maximum(a - v, v - b) for v, a, b, cost in zip(values, low, high, costs, strict=True)]
-    return [v[way <= spare] for v, way in zip(values, aside, strict=True)]
+
+    joints = zip(values, low, high, costs, strict=True)
+    detour_costs = [2.0 * cost * np.maximum(a - v, v - b) for v, a, b, cost in joints]
+    return [v[detour <= spare_travel] for v, detour in zip(values, detour_costs, strict=True)]
