@@ -25,7 +25,7 @@ class Aims:
         seconds_left: How long there is time.
 
     Attributes:
-        none_needed: Whether the planner finds configurations at the goal itself, so that there is nothing to aim at.
+        finds_goals_itself: Whether the planner finds configurations at the goal by itself: there is nothing to aim at.
     """
 
     def __init__(
@@ -38,13 +38,13 @@ class Aims:
         seed: int,
         seconds_left: Callable[[], float],
     ) -> None:
-        self.none_needed = traits.finds_goals and isinstance(problem.goal, TipGoal)
+        self.finds_goals_itself = traits.finds_goals and isinstance(problem.goal, TipGoal)
         self._problem = problem
         self._clearance = clearance
         self._attempts = attempts
         self._one_goal = traits.one_goal
-        self._in_joints = problem.goal.q is not None
-        self._long_ways = self._in_joints and has_continuous(problem.robot) and attempts > 1
+        self._goal_in_joints = problem.goal.q is not None
+        self._has_long_way = self._goal_in_joints and has_continuous(problem.robot) and attempts > 1
         self._goals = GoalSearch(problem, seed, seconds_left=seconds_left)
 
     @property
@@ -63,38 +63,41 @@ class Aims:
         Some planners take the first row alone. So the newest ones come first or, if there is nothing new, at each
         attempt another one does.
         """
-        if self.none_needed:
+        if self.finds_goals_itself:
             return np.zeros((0, self._problem.robot.dof))
 
-        known = len(self._goals.rows)
-        newer = attempt > 0 and self._goals.more()
-        rows = self._roomy()
-        if self.short_way(attempt):
+        num_known = len(self._goals.rows)
+        found_more = attempt > 0 and self._goals.more()
+        rows = self._find_with_clearance()
+        if self.is_short_way(attempt):
             return rows[:1]  # the goal as it is given; in the others a joint goes the other way round
 
-        first = known if newer else attempt
+        first = num_known if found_more else attempt
         return np.roll(rows, -first, axis=0) if first else rows
 
-    def short_way(self, attempt: int) -> bool:
+    def is_short_way(self, attempt: int) -> bool:
         """Whether an attempt goes the short way round alone."""
-        return self._long_ways and attempt == 0
+        return self._has_long_way and attempt == 0
 
-    def others_after(self, attempt: int) -> bool:
+    def changes_after(self, attempt: int) -> bool:
         """Whether later attempts would aim at other configurations than this one."""
-        if self.none_needed or attempt == self._attempts - 1:
+        if self.finds_goals_itself or attempt == self._attempts - 1:
             return False
         return not self._goals.exhausted or (self._one_goal and attempt + 1 < len(self._goals.rows))
 
-    def _roomy(self) -> Matrix:
-        """All that is known to be at the goal or, at one of the tip, those that keep the clearance if any does."""
+    def _find_with_clearance(self) -> Matrix:
+        """Configurations at the goal, shape (k, dof); of the tip, those that keep the clearance if any does.
+
+        Searches for more of them, round after round, until one does.
+        """
         rows = self._goals.first()
-        if self._clearance is None or self._in_joints:
+        if self._clearance is None or self._goal_in_joints:
             return rows
 
         for _ in range(MAX_ROUNDS):
-            kept = self._problem.world.prover.proven(rows, rows, clearance=self._clearance)
-            if kept.any():
-                return rows[kept]
+            keeps_clearance = self._problem.world.prover.proven(rows, rows, clearance=self._clearance)
+            if keeps_clearance.any():
+                return rows[keeps_clearance]
             if not self._goals.more():
                 break
             rows = self._goals.rows

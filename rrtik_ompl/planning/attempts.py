@@ -141,8 +141,10 @@ class Turn:
 
         traits = traits_of(planner.factory)
         seeds = attempt_seeds(self.budget.seed, request.restarts)
-        kept = {"clearance": request.clearance} if traits.leaves_room and request.clearance is not None else {}
-        self.parameters: Mapping[str, object] = {**kept, **request.parameters}
+        parameters = dict(request.parameters)
+        if traits.leaves_room and request.clearance is not None:
+            parameters = {"clearance": request.clearance} | parameters
+        self.parameters: Mapping[str, object] = parameters
         self._problem = problem
         self._request = request
         self._traits = traits
@@ -157,9 +159,10 @@ class Turn:
         )
         self._check = SecondCheck(problem, planner, request, seed=seeds[0])
 
-        self._made: dict[Kind, int] = dict.fromkeys(KINDS, 0)
-        self._spent: dict[Kind, int] = dict.fromkeys(KINDS, 0)  # motions checked, see `take`
-        self._forms: dict[bool, Problem] = {}  # for strict attempts, by whether motions have to be proven
+        # what has come of the attempts so far
+        self._num_attempts: dict[Kind, int] = dict.fromkeys(KINDS, 0)
+        self._motions_spent: dict[Kind, int] = dict.fromkeys(KINDS, 0)  # checked by attempts of a kind, see `take`
+        self._strict_problems: dict[bool, Problem] = {}  # by whether motions have to be proven
 
     def rows(self) -> Iterator[Row]:
         """The table: attempts until there is a path, no time, or nothing better to be expected."""
@@ -167,23 +170,23 @@ class Turn:
             _refuse_if_it_breaks_constraints(self.planner)
         load_kernels_for(self._problem, self.planner.factory)
         self.budget = self.budget.begun_now()
-        if self._decided():
+        if self._decide_without_attempts():
             return
 
         for number in range(len(self._seeds)):
-            if self._over():
+            if self._is_over():
                 return
 
             self.totals["attempts"] += 1
             aims = self._aims.of(number)
-            if len(aims) == 0 and not self._aims.none_needed:
+            if len(aims) == 0 and not self._aims.finds_goals_itself:
                 if self._aims.exhausted:
                     return
                 continue  # a round of inverse kinematics in vain counts as an attempt
 
             if number == 0:
                 yield from self._quick(aims)
-                if self._over():
+                if self._is_over():
                     return
             yield self._strict(number, aims) or self._plain(number, aims)
 
@@ -195,12 +198,12 @@ class Turn:
             describes_path = key in self._traits.path_statistics
             self.totals[key] = value if describes_path else self.totals.get(key, 0) + value
 
-        self._made[row.kind] += 1
-        self._spent[row.kind] += int(outcome.statistics.get("checked_motions", 0))
-        self._spent[row.kind] += EFFORT_ITERATIONS * MOTIONS_PER_ITERATION  # what an attempt costs beside
+        self._num_attempts[row.kind] += 1
+        self._motions_spent[row.kind] += int(outcome.statistics.get("checked_motions", 0))
+        self._motions_spent[row.kind] += EFFORT_ITERATIONS * MOTIONS_PER_ITERATION  # what an attempt costs beside
 
-        self.path = self._check.accepted(outcome)
-        self.totals["rejected"] = self._check.rejected
+        self.path = self._check.accept(outcome)  # None: another attempt follows
+        self.totals["rejected"] = self._check.num_rejected
 
     def finish(self) -> None:
         """Say how long the attempts took and, where none was accepted, fall back on the best path, or say why not."""
@@ -210,7 +213,8 @@ class Turn:
 
         if not self.reason:
             self.path = self._check.best
-            self.reason = "" if self.path is not None else self._check.reason or self._aims.reason
+            if self.path is None:
+                self.reason = self._check.reason or self._aims.reason
 
         if self.path is None and self.seconds >= self.budget.seconds:
             attempts = self.totals["attempts"]
@@ -231,105 +235,118 @@ class Turn:
             problem=self._problem,
         )
 
-    def _decided(self) -> bool:
-        """Whether it is known without any attempt what comes of the turn: its path or reason then says it."""
+    def _decide_without_attempts(self) -> bool:
+        """Set the path where the start is at the goal, or the reason where no path can be accepted.
+
+        Returns:
+            Whether either was the case, so that there is nothing to attempt.
+        """
         at_goal = _starts_at_goal(self._problem)  # some planners would find a detour
         if at_goal:  # no attempt will check the options
             check_options(self.planner.factory, self.planner.name, self._request.parameters)
 
-        self.reason = self._check.impossible()
+        self.reason = self._check.why_impossible()
         if at_goal and not self.reason:
-            self.path = self._check.still()
+            self.path = self._check.resting_path()
         return at_goal or self.reason != ""
 
-    def _over(self) -> bool:
+    def _is_over(self) -> bool:
         """Whether there is a path, no time or iterations left, or nothing better to be expected."""
-        if self.path is not None or self._good_enough() or self._separated():
+        if self.path is not None or self._best_will_do() or self._goal_is_unreachable():
             return True
-        left = self._iterations_left()
-        return self.budget.over() or (left is not None and left <= 0)
+        iterations_left = self._iterations_left()
+        no_iterations_left = iterations_left is not None and iterations_left <= 0
+        return self.budget.over() or no_iterations_left
 
-    def _good_enough(self) -> bool:
+    def _best_will_do(self) -> bool:
         """Whether the best path that is not proven with the clearance wanted will do: others came to no more."""
         best = self._check.best
         if best is None:
             return False
-        return self._check.settled or self._check.open > (BRIEF_ROUNDS if best.proven else ROUNDS)
+        max_rounds = BRIEF_ROUNDS if best.proven else ROUNDS
+        return self._check.cannot_improve or self._check.num_unproven > max_rounds
 
-    def _separated(self) -> bool:
+    def _goal_is_unreachable(self) -> bool:
         """Whether path constraints keep start and goal apart, as far as the planner sees."""
-        seen = self.totals.get("separated", 0)
-        return seen > 0 and (self._aims.exhausted or seen > SEPARATED)
+        times_seen = self.totals.get("separated", 0)
+        return times_seen > 0 and (self._aims.exhausted or times_seen > SEPARATED)
 
     def _quick(self, aims: Matrix) -> list[Row]:
         """A brief attempt on what the kernels can prove; none where they cannot prove an end."""
         if not self._traits.supports_iteration_limit or self._problem.world.accuracy != "exact":
             return []
-        if self._aims.none_needed and not self._traits.kernels:
+        if self._aims.finds_goals_itself and not self._traits.kernels:
             return []
 
-        proven = self._problem.with_accuracy("conservative")
-        free = proven.world.checks.free(np.concatenate([proven.start[None], aims]))
-        aims = aims[free[1:]]
-        if not free[0] or (len(aims) == 0 and not self._aims.none_needed):
+        conservative = self._problem.with_accuracy("conservative")
+        is_free = conservative.world.checks.free(np.concatenate([conservative.start[None], aims]))
+        start_is_free = is_free[0]
+        aims = aims[is_free[1:]]
+        nothing_to_aim_at = len(aims) == 0 and not self._aims.finds_goals_itself
+        if not start_is_free or nothing_to_aim_at:
             return []
-        return [Row("quick", proven, aims, self._budget(0, effort=1), checked=True)]
+        return [Row("quick", conservative, aims, self._budget(0, effort=1), checked=True)]
 
     def _strict(self, number: int, aims: Matrix) -> Row | None:
         """An attempt with room to spare; None if it is not due, or no aim has that room."""
         if not self._strict_is_due(number):
             return None
 
-        earlier = self._made["strict"]
+        earlier = self._num_attempts["strict"]
         proving = not self._traits.kernels or earlier >= IN_KERNELS
-        if proving not in self._forms:
-            self._forms[proving] = self._check.strict(proving=proving)
-        form = self._forms[proving]
-        roomy = aims[form.world.checks.free(aims)]
-        if len(roomy) == 0 and not self._aims.none_needed:
+        if proving not in self._strict_problems:
+            self._strict_problems[proving] = self._check.strict_problem(proving=proving)
+        strict_problem = self._strict_problems[proving]
+        roomy = aims[strict_problem.world.checks.free(aims)]
+        if len(roomy) == 0 and not self._aims.finds_goals_itself:
             return None
 
-        base = 2 if proving else 4
-        effort = base ** (earlier + 1) if self._traits.supports_iteration_limit else None
+        growth = 2 if proving else 4
+        effort = growth ** (earlier + 1) if self._traits.supports_iteration_limit else None
         share = ANYTIME_SHARE if self._traits.anytime else self._share(number)
-        return Row("strict", form, roomy, self._budget(number, effort, share))
+        return Row("strict", strict_problem, roomy, self._budget(number, effort, share))
 
     def _strict_is_due(self, number: int) -> bool:
-        """Whether an attempt keeps more than the clearance: half of the effort, from the first unproven path on."""
-        if not self._check.proves or self._traits.leaves_room:
+        """Whether the next attempt is a strict one: half of the effort goes to them, from the first unproven path on."""
+        if not self._check.wants_proofs or self._traits.leaves_room:
             return False
         if self._traits.anytime and number == 0 and len(self._seeds) > 1:
             return True  # an optimal path touches what it goes round, so it would not be proven
-        if self._check.open == 0:
+        if self._check.num_unproven == 0:
             return False
-        return self._traits.anytime or self._made["strict"] == 0 or self._spent["strict"] < self._spent["plain"]
+        if self._traits.anytime or self._num_attempts["strict"] == 0:
+            return True
+        return self._motions_spent["strict"] < self._motions_spent["plain"]
 
     def _plain(self, number: int, aims: Matrix) -> Row:
         """An attempt with exact checks."""
-        dense = self._traits.anytime or self._check.rejected
-        form = densely_checked(self._problem) if dense else self._problem
-        checked = form.world.accuracy == "exact"  # by the problem and by the search for goals
+        dense = self._traits.anytime or self._check.num_rejected
+        problem = densely_checked(self._problem) if dense else self._problem
+        checked = problem.world.accuracy == "exact"  # by the problem and by the search for goals
         budget = self._budget(number, self._plain_effort(number), self._share(number))
-        return Row("plain", form, aims, budget, checked)
+        return Row("plain", problem, aims, budget, checked)
 
     def _plain_effort(self, number: int) -> int | None:
-        """Of an attempt after which others aim elsewhere, of planners that have it; None for all there is time for."""
+        """How much an attempt may try, in units of `EFFORT_ITERATIONS`; None for as much as there is time for."""
         if not self._traits.supports_iteration_limit:
             return None
-        if self._aims.short_way(number):
+        if self._aims.is_short_way(number):
             return SHORT_WAY_EFFORT
-        return 2**number if self._aims.others_after(number) else None
+        return 2**number if self._aims.changes_after(number) else None
 
     def _share(self, number: int) -> float:
-        """Of time and iterations left, what an attempt gets: half for the short way round, before the long one."""
-        return 0.5 if self._aims.short_way(number) else 1.0
+        """The share of time and iterations left for an attempt: half for the short way round, before the long one."""
+        return 0.5 if self._aims.is_short_way(number) else 1.0
 
     def _budget(self, number: int, effort: int | None, share: float = 1.0) -> Budget:
-        """Of one attempt: a share of the time, and iterations by its effort, as far as there are any left."""
-        left = self._iterations_left()
-        if left is not None:
-            most = max(math.ceil(self._share(number) * left / EFFORT_ITERATIONS), 1)
-            effort = most if effort is None else min(effort, most)
+        """The budget of one attempt: a share of the time, and iterations by its effort, as far as there are any left.
+
+        An ``effort`` of None sets no limit of iterations but that of all attempts together.
+        """
+        iterations_left = self._iterations_left()
+        if iterations_left is not None:
+            affordable_effort = max(math.ceil(self._share(number) * iterations_left / EFFORT_ITERATIONS), 1)
+            effort = affordable_effort if effort is None else min(effort, affordable_effort)
         iterations = None if effort is None else effort * EFFORT_ITERATIONS
         seconds = max(share * self.budget.left, SHORTEST)
         return Budget(self._seeds[number], seconds, iterations, self.budget.stop)

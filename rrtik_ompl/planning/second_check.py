@@ -26,10 +26,10 @@ class SecondCheck:
     steps, and the best such path is kept in mind.
 
     Attributes:
-        best: The best path that is not proven with the clearance wanted, or None.
+        best: The best path so far that is valid but not proven with the clearance wanted, or None.
         reason: Why the last path was not accepted, in a line; "" if it was.
-        rejected: How many paths are not valid.
-        open: How many are valid, but not proven.
+        num_rejected: How many paths are not valid.
+        num_unproven: How many are valid, but not proven.
 
     Args:
         problem: What is solved.
@@ -40,33 +40,38 @@ class SecondCheck:
     """
 
     def __init__(self, problem: Problem, planner: NamedPlanner, request: Request, *, seed: int) -> None:
-        self.best: JointPath | None = None
-        self.reason = ""
-        self.rejected = 0
-        self.open = 0
+        # what is to be checked
         self._problem = problem
         self._name = planner.name
         self._traits = traits_of(planner.factory)
         self._proof = request.proof
         self._clearance = request.clearance
-        self._ruled = any(option in request.parameters for option in MOVE_RULES)
+        self._moves_are_restricted = any(option in request.parameters for option in MOVE_RULES)
         self._seed = seed
-        self._ends_proven = True
+
+        # what has come of the paths so far
+        self.best: JointPath | None = None
+        self.reason = ""
+        self.num_rejected = 0
+        self.num_unproven = 0
+        self._ends_can_be_proven = True  # until the ends of a path could not
 
     @property
-    def proves(self) -> bool:
+    def wants_proofs(self) -> bool:
         """Whether paths are to be proven at all."""
         return self._proof != "off"
 
     @property
-    def settled(self) -> bool:
+    def cannot_improve(self) -> bool:
         """Whether there is a path that cannot be made better: its ends themselves are not proven free."""
-        return self.best is not None and not self._ends_proven
+        return self.best is not None and not self._ends_can_be_proven
 
-    def impossible(self) -> str:
+    def why_impossible(self) -> str:
         """Why there can be no proven path if that is required, in a line; "" if there may be one."""
         world = self._problem.world
-        for what, q in fixed_ends(self._problem).items() if self._proof == "required" else ():
+        if self._proof != "required":
+            return ""
+        for what, q in fixed_ends(self._problem).items():
             if world.motion_proven(q, q):
                 continue
             near = world.closest(q)
@@ -76,15 +81,15 @@ class SecondCheck:
             return f"the {what} is not proven free: {self._first_gap(np.stack([q, q]))}"
         return ""
 
-    def still(self) -> JointPath:
+    def resting_path(self) -> JointPath:
         """The path that stays at the start, with a proof of the clearance, or of what there is of it."""
         path = JointPath.of(self._problem.robot, self._problem.start[None])
-        if not self.proves:
+        if not self.wants_proofs:
             return path
-        room = self._room(path.waypoints)
+        room = self._provable_room(path.waypoints)
         return proved_as_clear(path, self._problem.world, 0.0 if room is None else room.kept)
 
-    def strict(self, *, proving: bool) -> Problem:
+    def strict_problem(self, *, proving: bool) -> Problem:
         """The problem for searches that leave room: motions keep more than the clearance in steps, and may be proven.
 
         Where they are not proven, see :func:`leaving_room`.
@@ -92,14 +97,20 @@ class SecondCheck:
         Args:
             proving: Whether motions have to be proven, which searches in kernels cannot.
         """
-        room = self._room(self._problem.start[None]) or Room(0.0, 0.0)
-        strict = densely_checked(self._problem)
+        room = self._provable_room(self._problem.start[None]) or Room(0.0, 0.0)
+        dense = densely_checked(self._problem)
         if proving:
-            return strict.with_world(keeping(strict.world, room.searched, proven=room.kept))
-        return strict.with_world(leaving_room(strict.world, room))
+            return dense.with_world(keeping(dense.world, room.searched, proven=room.kept))
+        return dense.with_world(leaving_room(dense.world, room))
 
-    def accepted(self, outcome: Attempt) -> JointPath | None:
-        """The path of an attempt if it is accepted."""
+    def accept(self, outcome: Attempt) -> JointPath | None:
+        """Check the path of an attempt, and take note of what comes of it.
+
+        Returns:
+            A path that the planner's search may end with: that of the attempt, with its proof and with detours where
+            it needed them, or `best` where no path can be proven. None if the search is to go on: there was no path,
+            it is not valid (`num_rejected`), or it is valid but not proven (`num_unproven`, and perhaps `best`).
+        """
         if outcome.rows is None:
             why = f": {outcome.reason}" if outcome.reason else f" with '{outcome.status}'"  # or else OMPL's words
             self.reason = f"{self._name} ended{why}"
@@ -109,26 +120,35 @@ class SecondCheck:
         path = JointPath.of(problem.robot, outcome.rows)
         if not (path.start == problem.start).all() or not _at_goal(problem, path.end):
             self.reason = f"the path of {self._name} does not lead from the start to the goal"
-            self.rejected += 1
+            self.num_rejected += 1
             return None
 
-        proven = self._proven(path) if self.proves else None
-        return proven if proven is not None else self._checked(path)
+        if self.wants_proofs:
+            proven = self._prove_with_detours(path)
+            if proven is not None:
+                self.reason = ""
+                return proven
+        return self._check_in_steps(path)
 
-    def _proven(self, path: JointPath) -> JointPath | None:
-        """The path, with detours where it needs them, if it is proven to keep the clearance."""
-        room = self._room(path.waypoints[[0, -1]])
+    def _prove_with_detours(self, path: JointPath) -> JointPath | None:
+        """The path, with detours where it needs them, with a proof that all of it keeps the clearance.
+
+        Returns:
+            None if there is no such proof: its ends cannot be proven free, which is remembered; detours may not be
+            made, as they might break a rule or a constraint; or they did not help.
+        """
+        room = self._provable_room(path.waypoints[[0, -1]])
         if room is None:
-            self._ends_proven = False
+            self._ends_can_be_proven = False
             return None
 
         world = self._problem.world
         leaves_room = self._traits.leaves_room
         first = proved_as_clear(path, world, room.kept) if leaves_room else proved(path, world, clearance=room.kept)
         if first.proven:
-            self.reason = ""
             return first
-        if self._ruled or self._problem.constraints:  # a detour might break them
+        detours_might_break_rules = self._moves_are_restricted or bool(self._problem.constraints)
+        if detours_might_break_rules:
             return None
 
         repaired = with_detours(
@@ -139,39 +159,46 @@ class SecondCheck:
             one_joint=self._traits.one_joint,
             proof=None if leaves_room else first.proof,
         )
-        mended = None if repaired is None else proved(path_through(path, repaired), world, clearance=room.kept)
-        if mended is None or not mended.proven:
+        if repaired is None:
             return None
-        self.reason = ""
-        return mended
+        with_detour = proved(path_through(path, repaired), world, clearance=room.kept)
+        return with_detour if with_detour.proven else None
 
-    def _checked(self, path: JointPath) -> JointPath | None:
-        """The path if no proof is wanted and the check in steps agrees; else it may become the best one."""
+    def _check_in_steps(self, path: JointPath) -> JointPath | None:
+        """Check a path without the clearance, by a proof or else in steps, and keep it in mind if it is the best one.
+
+        Returns:
+            The path if no proof is wanted and it is valid; the best path where none can be proven; else None, and
+            the counts and the reason say why.
+        """
         world = self._problem.world
-        if self.proves:
-            path = proved(path, world)
+        if self.wants_proofs:
+            path = proved(path, world)  # with no more clearance than the world keeps
         faults = () if path.proven else violations_of(world, path.waypoints)
         if faults:
-            self.rejected += 1
+            self.num_rejected += 1
             self.reason = f"the path of {self._name} was rejected by the second check: {faults[0].reason}"
             return None
 
         self.reason = ""
-        if not self.proves:
+        if not self.wants_proofs:
             return path
 
-        self.open += 1
+        self.num_unproven += 1
         if path.proven or self._proof == "preferred":
-            self.best = path if self.best is None or _rank(path) < _rank(self.best) else self.best
+            if self.best is None or _rank(path) < _rank(self.best):
+                self.best = path
         else:
             self.reason = f"no path that is proven free: {self._first_gap(path.waypoints)}"
-        return self.best if self.settled else None
+        return self.best if self.cannot_improve else None
 
-    def _room(self, ends: Matrix) -> Room | None:
-        room = roomiest if self._traits.leaves_room else room_between
-        return room(self._problem.world, ends, self._clearance)
+    def _provable_room(self, ends: Matrix) -> Room | None:
+        """The clearance that paths between ends, shape (k, dof), can be proven to keep; None if there is none."""
+        room_of = roomiest if self._traits.leaves_room else room_between
+        return room_of(self._problem.world, ends, self._clearance)
 
     def _first_gap(self, rows: Matrix) -> str:
+        """The first motion of a route, shape (k, dof), that is not proven, in words; "" if all are."""
         world = self._problem.world
         proof = world.prover.route(rows, clearance=world.settings.kept)
         return str(next(iter(proof.unproven), ""))
@@ -186,9 +213,12 @@ def fixed_ends(problem: Problem) -> dict[str, Vector]:
 def _at_goal(problem: Problem, q: Vector) -> bool:
     """Whether a configuration, shape (dof,), is at the goal; most are its joint values to the bit."""
     wanted = problem.goal.q
-    return bool(wanted is not None and (q == wanted).all()) or problem.reached(q)
+    if wanted is not None and (q == wanted).all():
+        return True
+    return problem.reached(q)
 
 
 def _rank(path: JointPath) -> tuple[int, float]:
-    """Motions that are not proven, then length: what is to be small."""
-    return 0 if path.proof is None else len(path.proof.unproven), path.length
+    """What is to be small: the number of motions that are not proven, then the length."""
+    num_unproven = 0 if path.proof is None else len(path.proof.unproven)
+    return num_unproven, path.length
