@@ -307,7 +307,7 @@ class Turn:
         return Row("strict", strict_problem, roomy, self._budget(number, effort, share))
 
     def _strict_is_due(self, number: int) -> bool:
-        """Whether the next attempt is a strict one: half of the effort goes to them, from the first unproven path on."""
+        """Whether the next attempt is strict: half of the effort goes to these, from the first unproven path on."""
         if not self._check.wants_proofs or self._traits.leaves_room:
             return False
         if self._traits.anytime and number == 0 and len(self._seeds) > 1:

@@ -83,22 +83,26 @@ class _Work:
         self, problem: Problem, first: Plan, planner: NamedPlanner, request: Request, how: Improvement
     ) -> None:
         assert first.path is not None
-        self.best = first.path
-        self.bound = least_cost(problem, how.objective)
-        self.rounds = 0
+
+        # what was asked
         self._problem = problem
         self._first = first
         self._planner = planner
         self._request = request
         self._how = how
         self._one_joint = first.path.one_joint_at_a_time
-        self._bounded = BOUND_OPTION in planner_options(planner.factory) and not self._one_joint
+        self._takes_bound = BOUND_OPTION in planner_options(planner.factory) and not self._one_joint
 
         seconds = min(how.seconds, request.budget.seconds - first.seconds)
         self._budget = replace(request.budget, seconds=seconds).begun_now()
-        self._least = self._cost(first.path)
-        self.course = [(first.seconds, self._least[1])]
-        self._idle = 0  # rounds in a row that gained nothing
+
+        # what has come of it so far
+        self.best = first.path
+        self.bound = least_cost(problem, how.objective)
+        self.rounds = 0
+        self._best_cost = self._cost(first.path)
+        self.course = [(first.seconds, self._best_cost[1])]  # seconds and cost
+        self._rounds_without_gain = 0  # in a row
         self._shortenings = 0
 
     def clock(self) -> float:
@@ -108,48 +112,50 @@ class _Work:
     def run(self) -> None:
         """Go on until the time is up, nothing is gained any more, or the path costs as little as can be."""
         seeds = np.random.default_rng([self._request.budget.seed, 1])
-        paths = [self._shortened(self.best, self._quick)]
-        while self._how.strategy == "restart-shorten" and self._idle < PATIENCE:
-            if self._done():
+        paths = [self._shortened(self.best, self._quick_checks)]
+        while self._how.strategy == "restart-shorten" and self._rounds_without_gain < PATIENCE:
+            if self._is_done():
                 return
 
             self.rounds += 1
-            self._idle += 1  # until `_take` sees a gain
+            self._rounds_without_gain += 1  # `_keep_if_best` sets it back where it sees a gain
             (turn,) = walk([self._turn(int(seeds.integers(2**31)))])
             if turn.path is not None:
-                paths.append(self._shortened(turn.path, self._quick))
+                paths.append(self._shortened(turn.path, self._quick_checks))
 
-            if len(paths) == PLANS or self._idle >= PATIENCE:
-                self._settle(min(paths, key=self._cost, default=self.best))
+            if len(paths) == PLANS or self._rounds_without_gain >= PATIENCE:
+                self._shorten_further(min(paths, key=self._cost, default=self.best))
                 paths = []
-        self._settle(self.best)
+        self._shorten_further(self.best)
 
     @property
-    def _quick(self) -> int | None:
+    def _quick_checks(self) -> int | None:
         """Checks by which it is seen what a path is worth; ways to shorten single-joint moves know no such limit."""
         return None if self._one_joint else QUICK_CHECKS
 
     def _turn(self, seed: int) -> Turn:
         """Another plan; by a planner that takes a bound, one whose path is not much longer than the best."""
         request = self._request
-        if self._bounded:
+        if self._takes_bound:
             bound = BOUND * COSTS["length"](self.best, self._problem)
             limits = {BOUND_OPTION: bound, ITERATION_LIMIT: BOUNDED_SAMPLES}
             request = replace(request, restarts=0, parameters={**limits, **request.parameters})
         budget = replace(request.budget, seconds=self._budget.left, seed=seed)
         return Turn(self._problem, self._planner, request, budget)
 
-    def _settle(self, path: JointPath) -> None:
+    def _shorten_further(self, path: JointPath) -> None:
         """Shorten a path as long as that gains something, if it is worth it."""
-        if self._one_joint or self._cost(path)[1] > WORTH * self._least[1]:
+        if self._one_joint or self._cost(path)[1] > WORTH * self._best_cost[1]:
             return
         before = np.inf
-        while self._cost(path)[1] < before * (1.0 - SETTLED) and not self._done():
+        while self._cost(path)[1] < before * (1.0 - SETTLED) and not self._is_done():
             before = self._cost(path)[1]
             path = self._shortened(path, None)
 
-    def _done(self) -> bool:
-        return self._budget.left <= LEAST_SECONDS or self._least[1] <= self.bound * (1.0 + GAIN)
+    def _is_done(self) -> bool:
+        """Whether the time is up, or the best path costs as little as can be."""
+        is_optimal = self._best_cost[1] <= self.bound * (1.0 + GAIN)
+        return self._budget.left <= LEAST_SECONDS or is_optimal
 
     def _shortened(self, path: JointPath, checks: int | None) -> JointPath:
         """A path after some work, kept if it is the best; as it was if there is no time, or it does not move."""
@@ -162,10 +168,10 @@ class _Work:
         single = self._one_joint and path.one_joint_at_a_time
         found = shortened(path, self._problem, Wishes(budget, single, clearance=clearance))
 
-        self._take(found)
+        self._keep_if_best(found)
         return found
 
-    def _take(self, candidate: JointPath) -> None:
+    def _keep_if_best(self, candidate: JointPath) -> None:
         """Keep a path if it is the best: proven and of single-joint moves if the first one is."""
         if self._one_joint and not candidate.one_joint_at_a_time:
             return
@@ -173,15 +179,16 @@ class _Work:
             return
 
         cost = self._cost(candidate)
-        if cost >= self._least:
+        if cost >= self._best_cost:
             return
-        if cost < (self._least[0], self._least[1] * (1.0 - GAIN)):
-            self._idle = 0
+        if cost < (self._best_cost[0], self._best_cost[1] * (1.0 - GAIN)):
+            self._rounds_without_gain = 0
 
         self.best = candidate
-        self._least = cost
+        self._best_cost = cost
         self.course.append((self.clock(), cost[1]))
 
     def _cost(self, path: JointPath) -> tuple[int, float]:
-        """What is to be small; of single-joint moves their number first."""
-        return (path.transitions if self._one_joint else 0), COSTS[self._how.objective](path, self._problem)
+        """What is to be small: the number of moves, 0 unless they are single-joint moves, then the objective."""
+        num_moves = path.transitions if self._one_joint else 0
+        return num_moves, COSTS[self._how.objective](path, self._problem)

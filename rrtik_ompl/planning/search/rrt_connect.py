@@ -58,7 +58,7 @@ class RrtConnect:
         self._rules = rules
         self._motion_free = motion_free
         self._rng = rng
-        self._side = 1  # of the tree that grew last
+        self._last_side = 1  # of the tree that grew last
         self._limit = np.inf if rules.max_iterations is None else rules.max_iterations
 
     @property
@@ -78,7 +78,7 @@ class RrtConnect:
         extent = rules.upper - rules.lower
         while not stop() and self.iterations < self._limit:
             self.iterations += 1
-            side = self._side = self._next_side()
+            side = self._last_side = self._next_side()
             growing = self.trees[side]
             other = self.trees[1 - side]
             vertex = extend(growing, lower + extent * self._rng.random(len(lower)), rules, motion_free)
@@ -93,7 +93,7 @@ class RrtConnect:
 
     def _next_side(self) -> int:
         """Number of the tree that grows next."""
-        side = 1 - self._side
+        side = 1 - self._last_side
         larger = self.trees[side].size > self.trees[1 - side].size
         return 1 - side if self._rules.balanced and larger else side
 
@@ -158,6 +158,6 @@ def path_between(first: Matrix, second: Matrix) -> Matrix:
     return np.vstack([first, second[::-1][int(shared) :]])
 
 
-def _towards(start: Vector, end: Vector, length: float, most: float) -> Vector:
-    """The end, or the point at a distance of ``most`` from the start on the straight line to it."""
-    return end if length <= most else start + (end - start) * (most / length)
+def _towards(start: Vector, end: Vector, length: float, max_length: float) -> Vector:
+    """The end, or the point at a distance of ``max_length`` from the start on the straight line to it."""
+    return end if length <= max_length else start + (end - start) * (max_length / length)

@@ -46,7 +46,7 @@ class Method:
         moves_only: Whether it takes nothing but such a path.
         leaves_room: Whether it keeps a clearance itself, where that costs no move.
         samples: Whether it checks motions in steps, by the problem's world alone.
-        chooses: Whether it leaves single-joint moves to other methods, and takes no path that is longer.
+        delegates_moves: Whether it leaves single-joint moves to other methods, and takes no path that is longer.
     """
 
     run: Callable[[Matrix, Task, Problem], Matrix]
@@ -55,7 +55,7 @@ class Method:
     moves_only: bool = False
     leaves_room: bool = False
     samples: bool = False
-    chooses: bool = False
+    delegates_moves: bool = False
 
 
 def _ompl(route: Matrix, task: Task, problem: Problem) -> Matrix:
@@ -91,10 +91,11 @@ METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
         "retraction": Method(lambda route, task, _: retract(route, task)),
         "corners": Method(lambda route, task, _: snap_corners(route, task), can_keep_moves=False),
         "ompl": Method(_ompl, can_keep_moves=False, samples=True),
-        "auto": Method(lambda route, task, _: best_in_time(route, task), chooses=True),
+        "auto": Method(lambda route, task, _: best_in_time(route, task), delegates_moves=True),
     }
 )
-_HELD = Method(along_constraints, can_keep_moves=False, samples=True)  # in place of these, under path constraints
+# under path constraints in place of these
+_ALONG_CONSTRAINTS = Method(along_constraints, can_keep_moves=False, samples=True)
 _CUTS = ("auto", "random", "shortcut")
 _SINGLE_JOINT = METHODS["fewest-moves"], METHODS["axis-rounds"]  # in whose place "auto" is asked for single-joint moves
 
@@ -168,7 +169,7 @@ def shorten(
         called(on_better, "on_better", "a path")
     if stop is not None:
         called(stop, "stop")
-    single = _single(path, method, one_joint) or rules is not None
+    single = _keeps_single_joint_moves(path, method, one_joint) or rules is not None
 
     require(problem, Problem, "problem of a path to shorten")
     one_of(METHODS, method, "shortening method")
@@ -177,7 +178,7 @@ def shorten(
     if checks is not None and whole_number(checks, "checks") < 1:
         raise InputError("checks must be 1 or more, got 0")
     whole_number(seed, "seed")
-    _refuse(path, problem)
+    _refuse_what_cannot_be_shortened(path, problem)
     check_route_clearance(problem.world, clearance, path.waypoints)
 
     if single and not path.one_joint_at_a_time:
@@ -202,16 +203,17 @@ def shortened(
     on_better: Callable[[JointPath], object] | None = None,
 ) -> JointPath:
     """What :func:`shorten` does with a path that is known to be valid, by wishes that make sense for it."""
-    chosen = _method(method, problem, wishes.one_joint)
-    head, tail = _parts(path.waypoints, wishes.rules)
+    chosen = _method_for(method, problem, wishes.one_joint)
+    head, tail = _split_before_last_joints(path.waypoints, wishes.rules)
     if len(head) < 2:
         return path
     if on_better is not None:
         wishes = replace(wishes, on_better=lambda rows: on_better(path_through(path, np.vstack([rows, tail]))))
 
-    for each in _SINGLE_JOINT if chosen.chooses and wishes.one_joint else (chosen,):
-        found = _in_forms(path, problem, each, (head, tail), wishes)
-        if not chosen.chooses or found.length <= path.length:
+    delegated = chosen.delegates_moves and wishes.one_joint
+    for candidate in _SINGLE_JOINT if delegated else (chosen,):
+        found = _shorten_in_forms(path, problem, candidate, (head, tail), wishes)
+        if not chosen.delegates_moves or found.length <= path.length:
             return found
     return _with_proof(path, problem)
 
@@ -221,7 +223,7 @@ def _with_proof(path: JointPath, problem: Problem) -> JointPath:
     return path if path.proven_in(problem.world) else proved(path, problem.world)
 
 
-def _in_forms(
+def _shorten_in_forms(
     path: JointPath, problem: Problem, chosen: Method, parts: tuple[Matrix, Matrix], wishes: Wishes
 ) -> JointPath:
     """The path after a method, in the first form of the problem in which that leads to one that is accepted."""
@@ -235,15 +237,18 @@ def _in_forms(
     for form in acceptance.forms():
         task, found = _run(chosen, form, head, replace(wishes, budget=wishes.budget.part(form.share)), single)
         rows = np.vstack([found, tail])
-        if not (rows[[0, -1]] == path.waypoints[[0, -1]]).all() or not (rules is None or rules.kept_by(rows)):
+        ends_stay = (rows[[0, -1]] == path.waypoints[[0, -1]]).all()
+        if not ends_stay or (rules is not None and not rules.kept_by(rows)):
             continue
 
         shorter = acceptance.accepted(path_through(path, rows))
         if shorter is None:
             continue
 
-        counted = 1.0 if single else weights_of(problem.robot)
-        if chosen.keeps_moves or task.rank(shorter.waypoints * counted) <= task.rank(path.waypoints * counted):
+        joint_weights = 1.0 if single else weights_of(problem.robot)
+        if chosen.keeps_moves:
+            return shorter
+        if task.rank(shorter.waypoints * joint_weights) <= task.rank(path.waypoints * joint_weights):
             return shorter
     return acceptance.input
 
@@ -263,12 +268,14 @@ def _run(chosen: Method, form: Form, route: Matrix, wishes: Wishes, single: bool
     return task, weighted.back(chosen.run(weighted.there(route), task, weighted.problem), route[[0, -1]])
 
 
-def _single(path: JointPath, method: ShorteningMethod, one_joint: bool | None) -> bool:
+def _keeps_single_joint_moves(path: JointPath, method: ShorteningMethod, one_joint: bool | None) -> bool:
     """Whether the moves of a path have to stay single-joint moves."""
-    return one_joint if one_joint is not None else method == "auto" and path.one_joint_at_a_time
+    if one_joint is not None:
+        return one_joint
+    return method == "auto" and path.one_joint_at_a_time
 
 
-def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
+def _split_before_last_joints(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
     """A route up to where the joints that move last begin, and the rest."""
     if rules is None:
         return route, route[:0]
@@ -277,12 +284,14 @@ def _parts(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
     return route[: rules.head(route)], route[rules.head(route) :]
 
 
-def _method(name: ShorteningMethod, problem: Problem, one_joint: bool) -> Method:
+def _method_for(name: ShorteningMethod, problem: Problem, one_joint: bool) -> Method:
     """The method of a name, or what takes its place under path constraints."""
-    return _HELD if problem.constraints and name in _CUTS and not one_joint else METHODS[name]
+    if problem.constraints and name in _CUTS and not one_joint:
+        return _ALONG_CONSTRAINTS
+    return METHODS[name]
 
 
-def _refuse(path: JointPath, problem: Problem) -> None:
+def _refuse_what_cannot_be_shortened(path: JointPath, problem: Problem) -> None:
     """Refuse a path that cannot be shortened."""
     if len(path.waypoints) < 2:
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")

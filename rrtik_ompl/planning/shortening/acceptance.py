@@ -63,13 +63,13 @@ class Acceptance:
         self._seed = wishes.budget.seed
         self._one_joint = one_joint
         self._leaves_room = leaves_room
-        self._samples = samples
-        room = roomiest if leaves_room else room_between
-        self._room = room(problem.world, path.waypoints[[0, -1]], wishes.clearance)
+        self._checks_in_steps = samples
+        room_of = roomiest if leaves_room else room_between
+        self._room = room_of(problem.world, path.waypoints[[0, -1]], wishes.clearance)
 
-        known = path.proven_in(problem.world) and self._keeps(path)
-        self.input = path if known else self._proved(path)
-        self._input_keeps = self._keeps(self.input)
+        input_is_settled = path.proven_in(problem.world) and self._keeps_clearance(path)
+        self.input = path if input_is_settled else self._proved(path)
+        self._input_keeps_clearance = self._keeps_clearance(self.input)
 
     def forms(self) -> list[Form]:
         """The problem in the forms in which to shorten, one after the other.
@@ -82,26 +82,31 @@ class Acceptance:
         if self._leaves_room:
             return [Form(dense, dense.world, 1.0)]
 
-        found = [] if self._room is None else self._roomy_forms(dense, self._room)
-        if not self._input_keeps:
-            found.append(Form(dense, dense.world, 1.0))
-        return found
+        forms = [] if self._room is None else self._forms_with_room(dense, self._room)
+        if not self._input_keeps_clearance:
+            forms.append(Form(dense, dense.world, 1.0))
+        return forms
 
-    def _roomy_forms(self, dense: Problem, room: Room) -> list[Form]:
+    def _forms_with_room(self, dense: Problem, room: Room) -> list[Form]:
         """Those that leave room; where the input does not keep the clearance, with time left for one that need not."""
-        wider = min(room.searched, room.kept + SPARE)
-        last = 1.0 if self._input_keeps else 0.5
-        if not self._samples:
-            return [Form(dense, proven_motions(dense.world, wider, self.input.waypoints), last)]
+        searched_clearance = min(room.searched, room.kept + SPARE)
+        last_share = 1.0 if self._input_keeps_clearance else 0.5
+        if not self._checks_in_steps:
+            return [Form(dense, proven_motions(dense.world, searched_clearance, self.input.waypoints), last_share)]
 
-        roomy = keeping(dense.world, wider)
-        proving = keeping(dense.world, wider, proven=room.kept)
-        return [Form(dense.with_world(roomy), roomy, 0.7), Form(dense.with_world(proving), proving, last)]
+        roomy = keeping(dense.world, searched_clearance)
+        proving = keeping(dense.world, searched_clearance, proven=room.kept)
+        return [Form(dense.with_world(roomy), roomy, 0.7), Form(dense.with_world(proving), proving, last_share)]
 
     def accepted(self, shorter: JointPath) -> JointPath | None:
-        """The path, with what is proven of it and with detours where it needs them, or None."""
+        """Whether a shortened path may be returned in place of the input.
+
+        Returns:
+            The path, with what is proven of it and with detours where it needs them. None if it may not: it keeps less
+            of the clearance than the input, or is proven in less, or is not valid.
+        """
         proved = self._proved(shorter)
-        if self._keeps(proved):
+        if self._keeps_clearance(proved):
             return proved
 
         if self._room is not None and not self._one_joint:
@@ -113,16 +118,17 @@ class Acceptance:
         # the clearance cannot be had: a path that is no worse than the input in what is proven will do
         if self._leaves_room and proved.proven:
             return proved
-        if self._input_keeps or (self.input.proven and not proved.proven):
+        is_worse = self._input_keeps_clearance or (self.input.proven and not proved.proven)
+        if is_worse or violations_of(self._problem.world, shorter.waypoints):
             return None
-        return None if violations_of(self._problem.world, shorter.waypoints) else proved
+        return proved
 
     def _proved(self, path: JointPath) -> JointPath:
         """The path with a proof of the clearance, or of less."""
-        kept = 0.0 if self._room is None else self._room.kept
-        return proved_as_clear(path, self._problem.world, kept)
+        clearance = 0.0 if self._room is None else self._room.kept
+        return proved_as_clear(path, self._problem.world, clearance)
 
-    def _keeps(self, proved: JointPath) -> bool:
+    def _keeps_clearance(self, proved: JointPath) -> bool:
         """Whether a path is proven to keep the clearance."""
         proof = proved.proof
         return self._room is not None and proof is not None and proof.proven and proof.clearance >= self._room.kept

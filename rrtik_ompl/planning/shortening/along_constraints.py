@@ -44,11 +44,11 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
             break
 
         i, j = pair
-        way = search.connect(route[i], route[j], ask=ask) if j > i + 1 else None
+        walk = search.connect(route[i], route[j], ask=ask) if j > i + 1 else None
         task.asked += int(search.statistics()["motions"])
         failures += 1
-        if way is not None and route_length(way) < route_length(route[i : j + 1]) - SHORTER:
-            route = np.vstack([route[:i], way, route[j + 1 :]])
+        if walk is not None and route_length(walk) < route_length(route[i : j + 1]) - SHORTER:
+            route = np.vstack([route[:i], walk, route[j + 1 :]])
             failures = 0
             task.report(route)
 

@@ -37,12 +37,12 @@ def best_in_time(route: Matrix, task: Task) -> Matrix:
         return _without_kernels(route, task)
 
     best = _best_start(route, task, world)
-    rounds = idle = 0
-    while not task.expired() and idle < IDLE_ROUNDS and (task.bounded or rounds < ROUNDS_WITHOUT_LIMIT):
+    rounds = rounds_without_gain = 0
+    while not task.expired() and rounds_without_gain < IDLE_ROUNDS and (task.bounded or rounds < ROUNDS_WITHOUT_LIMIT):
         seed = STARTS + rounds
         found = _taut(_cut(best, task, seed, ROUND_TRIES, PULLS), task, world, seed, ROUND_CHECKS)
         rounds += 1
-        idle = idle + 1 if length_of(found) > (1.0 - LEAST_GAIN) * length_of(best) else 0
+        rounds_without_gain = rounds_without_gain + 1 if length_of(found) > (1.0 - LEAST_GAIN) * length_of(best) else 0
         best = task.better(best, found)
         task.report(best)
     return best

@@ -40,8 +40,8 @@ def snap_corners(route: Matrix, task: Task) -> Matrix:
     """
     if len(route) < 3:
         return route
-    for careful in (False, True):
-        found = _Corners(task, careful).pulled(without_repeats(route))
+    for checks_parts in (False, True):
+        found = _Corners(task, checks_parts).pulled(without_repeats(route))
         if task.confirmed(found, route):
             found = task.better(route, found)
             task.report(found)
@@ -53,31 +53,31 @@ class _Corners:
     """The answers so far, and how small a gain is worth a check.
 
     Attributes:
-        least: The smallest gain of length that is worth a check.
-        careful: Whether parts of free motions are checked too.
+        min_gain: The smallest gain of length that is worth a check.
+        checks_parts: Whether parts of free motions are checked too.
     """
 
-    def __init__(self, task: Task, careful: bool) -> None:
+    def __init__(self, task: Task, checks_parts: bool) -> None:
         self.task = task
-        self.careful = careful
-        self.least = 0.0
+        self.checks_parts = checks_parts
+        self.min_gain = 0.0
         self._answers: dict[frozenset[bytes], bool] = {}
 
     def pulled(self, route: Matrix) -> Matrix:
         """Rounds of pulling and cutting, until the chords gain nothing more."""
-        rows = self._few(list(route))
+        rows = self._keep_last_seen(list(route))
         share = FIRST_GAIN
         self.task.report(np.array(rows))
         for number in range(MAX_CORNER_ROUNDS):
             if self.task.expired():
                 break
 
-            whole = _length(rows)
-            self.least = share * whole
-            rows = self._swept(rows, nearly_done=number > 0)
-            before = _length(rows)
-            rows = self._cut_off(rows)
-            if number > 0 and before - _length(rows) < ROUND * whole:
+            total_length = _length(rows)
+            self.min_gain = share * total_length
+            rows = self._pull_bends(rows, nearly_done=number > 0)
+            length_before = _length(rows)
+            rows = self._cut_bends(rows)
+            if number > 0 and length_before - _length(rows) < ROUND * total_length:
                 break
             share = LEAST_GAIN if number == 0 else FINER * share
         return without_repeats(np.array(rows))
@@ -90,9 +90,9 @@ class _Corners:
 
     def _part_free(self, a: Vector, b: Vector) -> bool:
         """Whether a part of a free motion is free."""
-        return not self.careful or self._free(a, b)
+        return not self.checks_parts or self._free(a, b)
 
-    def _few(self, route: list[Vector]) -> list[Vector]:
+    def _keep_last_seen(self, route: list[Vector]) -> list[Vector]:
         """From waypoint to waypoint, each the last one seen by bisection; as the first phase of retraction."""
         rows = [route[0]]
         here = 0
@@ -106,13 +106,13 @@ class _Corners:
             here = seen
         return rows
 
-    def _swept(self, rows: list[Vector], *, nearly_done: bool) -> list[Vector]:
+    def _pull_bends(self, rows: list[Vector], *, nearly_done: bool) -> list[Vector]:
         """Every bend dropped or pulled to its corner, one after the other."""
         rows = list(rows)
         k = 1
         while k < len(rows) - 1:
             a, bend, b = rows[k - 1 : k + 2]
-            if _detour(a, bend, b) <= self.least:
+            if _detour(a, bend, b) <= self.min_gain:
                 k += 1
             elif self._free(a, b):
                 del rows[k]
@@ -133,25 +133,25 @@ class _Corners:
 
         Where the route is nearly done little is to be expected: the search then begins at the near end.
         """
-        way = far - near
-        rest = float(np.linalg.norm(far - near))
+        segment = far - near
+        segment_length = float(np.linalg.norm(far - near))
 
         def visible(share: float) -> bool:
-            return self._free(eye, near + share * way)
+            return self._free(eye, near + share * segment)
 
         def length(share: float) -> float:
-            return float(np.linalg.norm(near + share * way - eye)) + (1.0 - share) * rest
+            return float(np.linalg.norm(near + share * segment - eye)) + (1.0 - share) * segment_length
 
-        first = _first_below(length, length(0.0) - self.least) if nearly_done else 1.0
+        first = _first_below(length, length(0.0) - self.min_gain) if nearly_done else 1.0
         seen, hidden = _bracket(visible, first)
         if nearly_done and seen == 0.0:
             return near  # and what is nearer than the first place is not worth a check
-        while length(seen) - length(hidden) > self.least:
+        while length(seen) - length(hidden) > self.min_gain:
             middle = 0.5 * (seen + hidden)
             seen, hidden = (middle, hidden) if visible(middle) else (seen, middle)
-        return near if seen == 0.0 else near + seen * way
+        return near if seen == 0.0 else near + seen * segment
 
-    def _cut_off(self, rows: list[Vector]) -> list[Vector]:
+    def _cut_bends(self, rows: list[Vector]) -> list[Vector]:
         """Bends replaced by two where a chord across them is free and gains enough, and these two likewise."""
         done = [rows[0]]
         ahead = rows[:0:-1]
@@ -169,21 +169,29 @@ class _Corners:
         if min(sides) == 0.0:
             return None
 
-        back = (a - bend) / sides[0]
-        on = (b - bend) / sides[1]
-        gain = 2.0 - float(np.linalg.norm(back - on))  # per distance from the bend
-        free = self.least / max(gain, 1e-300)
-        hidden = min(sides)
-        if free >= hidden or not self._free(bend + free * back, bend + free * on):
+        to_a = (a - bend) / sides[0]
+        to_b = (b - bend) / sides[1]
+
+        def is_free(distance: float) -> bool:
+            return self._free(bend + distance * to_a, bend + distance * to_b)
+
+        # distances from the bend: the shortest that is worth a chord, and one at which a chord is not free, or too far
+        gain_per_distance = 2.0 - float(np.linalg.norm(to_a - to_b))
+        free = self.min_gain / max(gain_per_distance, 1e-300)  # an infinite distance where nothing can be gained
+        blocked = min(sides)
+        if free >= blocked or not is_free(free):
             return None
 
-        while hidden > CHORD * free and gain * (hidden - free) > self.least:
-            middle = min(float(np.sqrt(free * hidden)), 0.5 * (free + hidden))
-            middle_free = self._free(bend + middle * back, bend + middle * on)
-            free, hidden = (middle, hidden) if middle_free else (free, middle)
+        while blocked > CHORD * free and gain_per_distance * (blocked - free) > self.min_gain:
+            middle = min(float(np.sqrt(free * blocked)), 0.5 * (free + blocked))
+            if is_free(middle):
+                free = middle
+            else:
+                blocked = middle
 
-        ends = bend + free * back, bend + free * on
-        return ends if self._part_free(a, ends[0]) and self._part_free(ends[1], b) else None
+        ends = bend + free * to_a, bend + free * to_b
+        sides_are_free = self._part_free(a, ends[0]) and self._part_free(ends[1], b)
+        return ends if sides_are_free else None
 
 
 def _bracket(visible: Callable[[float], bool], first: float) -> tuple[float, float]:
@@ -202,17 +210,17 @@ def _length(rows: list[Vector]) -> float:
 
 
 def _detour(a: Vector, bend: Vector, b: Vector) -> float:
-    """How much longer the path from a to b is over the bend."""
+    """How much longer the path from a to b is over the bend than straight."""
     return float(np.linalg.norm(bend - a) + np.linalg.norm(b - bend) - np.linalg.norm(b - a))
 
 
-def _first_below(length: Callable[[float], float], wanted: float) -> float:
+def _first_below(length: Callable[[float], float], max_length: float) -> float:
     """The smallest share, to a part in a million, at which a length that falls is as small as wanted; 1 if nowhere."""
     low = 0.0
     high = 1.0
     while high - low > 1e-6:
         middle = 0.5 * (low + high)
-        if length(middle) > wanted:
+        if length(middle) > max_length:
             low = middle
         else:
             high = middle

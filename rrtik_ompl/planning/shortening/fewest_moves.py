@@ -85,25 +85,25 @@ def fewest_moves(
     if rounds < 0:
         raise InputError(f"rounds: expected at least 0, got {rounds}")
 
-    kept = MoveRules.of_robot(world.robot) if rules is None else rules
+    move_rules = MoveRules.of_robot(world.robot) if rules is None else rules
     budget = Budget() if budget is None else budget
-    work = _Work(rows, world, kept, rounds, budget)
+    work = _Work(rows, world, move_rules, rounds, budget)
     levels = clearance_levels(world, rows[[0, -1]], clearance)
 
     best = rows
     bound = lower_bound(rows[0], rows[-1])
-    taken = False  # whether `best` is from a level that keeps more: a later one has to save a move then
+    moves_to_save = 0  # 1 once `best` is from a level: a later one, which keeps less, has to save a move
     for level in levels:
-        if taken and (transitions(best) == bound or budget.over()):
+        if moves_to_save > 0 and (transitions(best) == bound or budget.over()):
             break
-        search = work.improved(level, best)
+        search = work.search_level(level, best)
         bound = max(bound, search.bound)
-        if search.route is not None and transitions(search.route) <= transitions(best) - taken:
+        if search.route is not None and transitions(search.route) <= transitions(best) - moves_to_save:
             best = search.route
-            taken = True
+            moves_to_save = 1
 
     if transitions(best) > bound and rounds > 0 and not budget.over():
-        best, bound = work.finer(levels, best, bound)
+        best, bound = work.search_fine_grids(levels, best, bound)
     return MovesFound(best, transitions(best), bound)
 
 
@@ -124,11 +124,11 @@ class _Work:
         return [joint for joint in range(self.world.robot.dof) if joint not in resting]
 
     @cached_property
-    def prove(self) -> Proof:
-        """A sharper bound, the same on all levels."""
+    def sharper_bound_of_ends(self) -> Proof:
+        """A function that sharpens the bound between a start and a goal, the same on all levels; it remembers both."""
         return remembered(self.world, self.joints, self.budget.over)
 
-    def improved(self, level: Level, offered: Matrix) -> MoveSearch:
+    def search_level(self, level: Level, offered: Matrix) -> MoveSearch:
         """A search on a level of clearance that starts from a route, if that keeps it."""
         search = MoveSearch(
             self.rows[:1],
@@ -139,17 +139,21 @@ class _Work:
             costs=self.rules.joint_costs,
             frozen=[*self.rules.frozen_joints, *self.rules.last_joints],
             smallest_move=self.rules.smallest_move,
-            prove=self.prove,
+            prove=self.sharper_bound_of_ends,
             all_free=self.world.motion_valid_batch,
         )
-        if _free(level, offered):
+        if _keeps_level(level, offered):
             search.offer(offered)
         search.try_corner_routes()
         search.improve(rounds_before(self.rounds, self.joints))
         return search
 
-    def finer(self, levels: list[Level], best: Matrix, bound: int) -> tuple[Matrix, int]:
-        """A better bound of the best route, and what fine grids add to it."""
+    def search_fine_grids(self, levels: list[Level], best: Matrix, bound: int) -> tuple[Matrix, int]:
+        """Look for fewer moves on fine grids.
+
+        Returns:
+            The best route, shape (k, n), which may be the one given, and a bound of its moves that is no lower.
+        """
         ends = self.rows[0], self.rows[-1]
         limits = turning_limits(self.world.robot, self.rows)
         bound = max(bound, reach_bound(self.world, self.joints, *ends, transitions(best), self.budget.over))
@@ -159,11 +163,13 @@ class _Work:
             return best, bound
 
         route, level = found
-        search = self.improved(levels[level], route)
-        return (best if search.route is None else search.route), max(bound, search.bound)
+        search = self.search_level(levels[level], route)
+        if search.route is not None:
+            best = search.route
+        return best, max(bound, search.bound)
 
 
-def _free(level: Level, route: Matrix) -> bool:
+def _keeps_level(level: Level, route: Matrix) -> bool:
     """Whether a route keeps a level."""
     return bool(level.proving.motion_valid_batch(route[:-1], route[1:]).all())
 

@@ -95,17 +95,23 @@ def _one_cut(route: Matrix, task: Task, rng: np.random.Generator, share: float) 
     """The route after a random cut, or None if that gains nothing or is not free."""
     places = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(route, axis=0), axis=1)))
     first, second = sorted(_place(places, rng, share) for _ in range(2))
-    i, j = (min(int(np.searchsorted(places, p, side="right")) - 1, len(route) - 2) for p in (first, second))
-    if i == j:
+    first_edge = _edge_at(places, first)
+    second_edge = _edge_at(places, second)
+    if first_edge == second_edge:
         return None
 
-    a = _point(route, places, i, first)
-    b = _point(route, places, j, second)
+    a = _point(route, places, first_edge, first)
+    b = _point(route, places, second_edge, second)
     cut = np.vstack([a[None], task.moves(a, b)])
-    new = without_repeats(np.vstack([route[: i + 1], cut, route[j + 1 :]]))
+    new = without_repeats(np.vstack([route[: first_edge + 1], cut, route[second_edge + 1 :]]))
     if task.rank(new) >= task.rank(route) or not task.free_batch(cut[:-1], cut[1:]).all():
         return None
     return new if task.confirmed(new, route) else None
+
+
+def _edge_at(places: Vector, place: float) -> int:
+    """The number of the edge on which a place is; ``places`` are those of the waypoints."""
+    return min(int(np.searchsorted(places, place, side="right")) - 1, len(places) - 2)
 
 
 def _place(places: Vector, rng: np.random.Generator, share: float) -> float:

@@ -14,16 +14,16 @@ def sequential_cut(route: Matrix, task: Task) -> Matrix:
 
     Waypoints are tried from the last one on back to the next, which needs no check.
     """
-    kept = [route[:1]]
+    cut_route = [route[:1]]
     pivot = 0
     last = len(route) - 1
     while pivot < last:
         found = task.first_link(route[pivot], route[last : pivot + 1 : -1])
         if found is None:
-            kept.append(route[pivot + 1 : pivot + 2])
+            cut_route.append(route[pivot + 1 : pivot + 2])
             pivot += 1
         else:
-            kept.append(found[1])
+            cut_route.append(found[1])
             pivot = last - found[0]
-        task.report(np.vstack([*kept, route[pivot + 1 :]]))
-    return without_repeats(np.vstack(kept))
+        task.report(np.vstack([*cut_route, route[pivot + 1 :]]))
+    return without_repeats(np.vstack(cut_route))
