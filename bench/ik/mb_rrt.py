@@ -58,7 +58,7 @@ def arcs(report: Report, rng: np.random.Generator, goals: int = 200) -> None:
                 for _ in range(goals):
                     lengths = np.full(count, 10.0) if kind == "equal" else rng.uniform(0.5, 20.0, count)
                     links = Links(lengths, dimension)
-                    goal = rng.uniform(links.folded[0], links.reach) * directions(1, dimension, rng)[0]
+                    goal = rng.uniform(links.min_span[0], links.reach) * directions(1, dimension, rng)[0]
                     run = grow_on_arcs(links, goal, rng=rng)
                     errors.append(run.misses[0] / links.reach)
                     beyond += run.outside(1e-12)

@@ -7,7 +7,7 @@ from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, frozen, whole_number
 from rrtik_ompl.base.errors import InputError, require
-from rrtik_ompl.ik.goal_configurations import LARGEST, GoalSearch
+from rrtik_ompl.ik.goal_configurations import MAX_TOTAL, GoalSearch
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
 from rrtik_ompl.world.problem import Problem
@@ -50,8 +50,8 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
             InputError: If the space does not fit the robot, or a number makes no sense.
         """
         require(problem, Problem, "problem of a goal sampler")
-        if isinstance(most, bool) or not isinstance(most, int) or not 1 <= most <= LARGEST:
-            raise InputError(f"most: expected a whole number from 1 to {LARGEST}, got {most!r}")
+        if isinstance(most, bool) or not isinstance(most, int) or not 1 <= most <= MAX_TOTAL:
+            raise InputError(f"most: expected a whole number from 1 to {MAX_TOTAL}, got {most!r}")
         if si is None:
             si = space_information(problem, problem.start[None], ValidityCallback(problem.world))
 

@@ -127,7 +127,7 @@ def test_a_search_without_time_ends_after_a_round_and_leaves_mb_rrt_what_time_th
     problem = Problem(world, HERE, PositionGoal([5.0, 0.0, 0.0]))
     asked, solve = [], goal_configurations.solve_ik
     monkeypatch.setattr(goal_configurations, "solve_ik", lambda *a, **b: asked.append(b["seconds"]) or solve(*a, **b))
-    monkeypatch.setattr(goal_configurations, "_fits", lambda method, *_: method == "mb-rrt")
+    monkeypatch.setattr(goal_configurations, "_method_fits", lambda method, *_: method == "mb-rrt")
     search = GoalSearch(problem, 0, seconds_left=lambda: left)
     assert len(search.first()) == 0
     assert asked == ([left] if left else [])
@@ -243,7 +243,7 @@ def test_a_goal_out_of_reach_says_how_near_the_arm_came_and_ends_at_once(quiet_o
 
 def test_a_goal_that_only_other_walks_reach_is_not_said_to_be_missed_by_nothing(monkeypatch):
     problem = load_problem("puma_pose")
-    monkeypatch.setattr(GoalSearch, "_round", lambda self, goal: np.zeros((0, 6)))
+    monkeypatch.setattr(GoalSearch, "_solve_ik_round", lambda self, goal: np.zeros((0, 6)))
     search = GoalSearch(problem, np.random.default_rng(0))
     assert len(search.first()) == 0
     assert "in 4 rounds; walks from other starts do reach it" in search.reason

@@ -32,7 +32,7 @@ def growth(drawing: Drawing, quick: bool) -> None:
     links = Links([10.0] * 4)
     whole = grow(links, GOAL, tolerance=1e-9, rng=np.random.default_rng(0), passes=PASSES[-1], stop=False)
     for panel, passes in zip(drawing.subplots(1, len(PASSES), sharey=True), PASSES, strict=True):
-        for index, radius in enumerate(links.remaining[1:-1], start=1):
+        for index, radius in enumerate(links.max_span[1:-1], start=1):
             _circle(panel, radius, COLORS[index])
         for index in range(1, links.count + 1):
             parents = whole.nodes[index - 1][whole.parents[index - 1][:passes]]

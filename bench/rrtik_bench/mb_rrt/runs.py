@@ -144,6 +144,6 @@ def laws(rng: np.random.Generator) -> tuple[float, float]:
     nodes = one_link(np.zeros((count, 2)), samples, 10.0, rng)
     far = float(np.linalg.norm(goal))
     angle = np.arctan2(nodes[:, 1], nodes[:, 0]) - np.arctan2(goal[1], goal[0])
-    law = 0.5 + np.arcsin(np.clip(far * np.sin(np.sort(angle)) / links.remaining[1], -1.0, 1.0)) / np.pi
+    law = 0.5 + np.arcsin(np.clip(far * np.sin(np.sort(angle)) / links.max_span[1], -1.0, 1.0)) / np.pi
     ks = float(np.abs(law - (np.arange(count) + 0.5) / count).max())
-    return ks, float((np.linalg.norm(nodes - goal, axis=1) > links.remaining[1]).mean())
+    return ks, float((np.linalg.norm(nodes - goal, axis=1) > links.max_span[1]).mean())

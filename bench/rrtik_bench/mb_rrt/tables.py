@@ -149,7 +149,7 @@ def example(quick: bool) -> list[Row]:
     """The worked example of surface sampling: 4 links of 10 cm, goal (20, 30)."""
     del quick
     links, goal = Links([10.0] * 4), np.array([20.0, 30.0])
-    far, near = float(np.linalg.norm(goal)), float(links.remaining[1])
+    far, near = float(np.linalg.norm(goal)), float(links.max_span[1])
     tangent = float(np.degrees(np.arcsin(near / far)))
     edge = float(np.degrees(np.arccos((far**2 + 10.0**2 - near**2) / (2.0 * far * 10.0))))
     ks, outside = laws(np.random.default_rng(0))

@@ -23,7 +23,7 @@ def tree_aims(
     rng: np.random.Generator,
     *,
     seconds: float = 1.0,
-    most: int = MAX_CONFIGURATIONS,
+    max_count: int = MAX_CONFIGURATIONS,
 ) -> Matrix:
     """Free configurations at a goal, nearest to a posture first.
 
@@ -33,10 +33,10 @@ def tree_aims(
         near: Shape (dof,).
         rng: Random numbers.
         seconds: Time limit.
-        most: Configurations at most.
+        max_count: Configurations at most.
 
     Returns:
-        Shape (k, dof), k <= ``most``, none if none was found in time.
+        Shape (k, dof), k <= ``max_count``, none if none was found in time.
     """
     deadline = time.monotonic() + seconds
     robot = world.robot
@@ -49,10 +49,10 @@ def tree_aims(
         found = search(robot, target, near=near, accept=accept, rng=rng, deadline=deadline, world=world)
         rows = np.vstack([rows, robot.clamp(found.q)])
         rows = rows[goal.satisfied(robot, rows) & world.valid_batch(rows)] if len(rows) else rows
-        if found.timed_out or len(rows) >= most:
+        if found.timed_out or len(rows) >= max_count:
             break
 
-    away = joint_difference(robot, rows, near)
-    order = np.argsort(np.linalg.norm(away, axis=1), kind="stable")[:most]
-    nearest: Matrix = np.where(robot.continuous, near + away[order], rows[order])
+    differences = joint_difference(robot, rows, near)
+    order = np.argsort(np.linalg.norm(differences, axis=1), kind="stable")[:max_count]
+    nearest: Matrix = np.where(robot.continuous, near + differences[order], rows[order])
     return nearest

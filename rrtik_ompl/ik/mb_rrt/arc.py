@@ -1,7 +1,7 @@
 """Sampling on the arc of intersection: every node inside its solution region, every pass exactly at the goal.
 
 [3] proposes it and leaves it open. A node is useful if and only if the rest of the chain can span its
-distance from the goal, ``folded[i] <= |x - g| <= remaining[i]``. By the law of cosines that is an interval of the
+distance from the goal, ``min_span[i] <= |x - g| <= max_span[i]``. By the law of cosines that is an interval of the
 cosine of the angle between the edge and the direction to the goal, in the plane and in space alike.
 """
 
@@ -14,7 +14,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.links import Links, directions
 from rrtik_ompl.ik.mb_rrt.run import TreeSearch
 
-NOWHERE = 1e-150  # of a distance: a direction over a shorter one loses digits, as squares vanish
+MIN_DISTANCE = 1e-150  # a direction over a shorter distance loses digits: squares smaller than 1e-300 vanish
 
 
 def grow_on_arcs(links: Links, goal: ArrayLike, *, rng: np.random.Generator, passes: int = 1) -> TreeSearch:
@@ -31,37 +31,37 @@ def grow_on_arcs(links: Links, goal: ArrayLike, *, rng: np.random.Generator, pas
     """
     target = links.reachable(goal)
     chains = arc_chains(links, np.tile(target, (passes, 1)), rng)
-    own = (np.zeros(passes, dtype=np.int64), *(np.arange(passes),) * (links.count - 1))
+    parents = (np.zeros(passes, dtype=np.int64), *(np.arange(passes),) * (links.count - 1))
     misses = np.linalg.norm(chains[:, -1] - target, axis=1)
     levels = (chains[:1, 0], *chains[:, 1:].transpose(1, 0, 2))
-    return TreeSearch(links, target, levels, own, misses, min(passes, 1))
+    return TreeSearch(links, target, levels, parents, misses, min(passes, 1))
 
 
 def arc_chains(links: Links, goals: Matrix, rng: np.random.Generator) -> NDArray[np.float64]:
     """A random solution for each of many goals within reach, shape (m, dimension): nodes, (m, n + 1, dimension)."""
-    at = np.zeros((len(goals), links.dimension))
-    nodes = [at]
+    node = np.zeros((len(goals), links.dimension))
+    nodes = [node]
     for index in range(1, links.count + 1):
-        at = at + links.lengths[index - 1] * _edge_directions(links, goals, at, index, rng)
-        nodes.append(at)
+        node = node + links.lengths[index - 1] * _edge_directions(links, goals, node, index, rng)
+        nodes.append(node)
     return np.stack(nodes, axis=1)
 
 
-def cosine_interval(distance: Vector, length: float, smallest: float, largest: float) -> tuple[Vector, Vector]:
+def cosine_interval(distance: Vector, length: float, min_distance: float, max_distance: float) -> tuple[Vector, Vector]:
     """Cosines of the angle between an edge and the direction to the goal that lead to a useful distance.
 
     Args:
         distance: Of the parents from the goal, shape (m,).
         length: Of the edge.
-        smallest: Distance from the goal that the new node must have at least.
-        largest: At most.
+        min_distance: Distance from the goal that the new node must have at least.
+        max_distance: At most.
 
     Returns:
         Lower and upper ends, shapes (m,), not clipped: the interval is empty where it lies beyond -1 or 1.
     """
-    square = distance**2 + length**2
-    twice = 2.0 * np.maximum(distance, NOWHERE) * length
-    return (square - largest**2) / twice, (square - smallest**2) / twice
+    squares = distance**2 + length**2
+    twice_the_product = 2.0 * np.maximum(distance, MIN_DISTANCE) * length
+    return (squares - max_distance**2) / twice_the_product, (squares - min_distance**2) / twice_the_product
 
 
 def _edge_directions(links: Links, goals: Matrix, parents: Matrix, index: int, rng: np.random.Generator) -> Matrix:
@@ -69,13 +69,13 @@ def _edge_directions(links: Links, goals: Matrix, parents: Matrix, index: int, r
     towards = goals - parents
     distance = np.linalg.norm(towards, axis=1)
     arbitrary = directions(len(parents), links.dimension, rng)
-    axis = np.where(distance[:, None] > NOWHERE, towards / np.maximum(distance, NOWHERE)[:, None], arbitrary)
+    axis = np.where(distance[:, None] > MIN_DISTANCE, towards / np.maximum(distance, MIN_DISTANCE)[:, None], arbitrary)
     if index == links.count:  # the law of cosines says the same, to the square root of the rounding
         return axis
 
     length = float(links.lengths[index - 1])
-    ends = cosine_interval(distance, length, float(links.folded[index]), float(links.remaining[index]))
-    low, high = (np.clip(end, -1.0, 1.0) for end in ends)
+    cosines = cosine_interval(distance, length, float(links.min_span[index]), float(links.max_span[index]))
+    low, high = (np.clip(end, -1.0, 1.0) for end in cosines)
     share = rng.uniform(size=len(parents))
 
     if links.dimension == 2:  # uniform in the angle, on either side

@@ -36,8 +36,8 @@ class Axes:
         fixed: Transform before each turn about z, and the one to the tip after all, shape (n + 1, 4, 4).
         first: Point of the first joint in its frame [m], shape (3,).
         points: The point after each joint in its turned frame [m], shape (n, 3).
-        remaining: Longest distance from that point to the aimed point [m], shape (n,).
-        folded: Shortest [m], shape (n,).
+        max_span: Longest distance from that point to the aimed point [m], shape (n,).
+        min_span: Shortest [m], shape (n,).
         reach: Longest and shortest distance from the first joint's point to the aimed point [m].
         aim: The aimed point in the frame of the tip [m], shape (3,).
         idle: Which joints leave a position where it is, as all after them do; none if the aim is a pose. Shape (n,).
@@ -51,8 +51,8 @@ class Axes:
     fixed: NDArray[np.float64]
     first: Vector
     points: Matrix
-    remaining: Vector
-    folded: Vector
+    max_span: Vector
+    min_span: Vector
     reach: tuple[float, float]
     aim: Vector
     idle: Mask
@@ -108,19 +108,19 @@ def axes_of(robot: Robot, oriented: bool) -> Axes:
         aim = np.asarray(np.linalg.inv(tip.fixed[-1]) @ np.append(starts[-1], 1.0))[:3]
 
     lengths = np.linalg.norm(points - starts, axis=1)
-    remaining = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
-    folded = smallest_spans(lengths, remaining)
+    max_span = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
+    min_span = smallest_spans(lengths, max_span)
     low, high = (end[joints] + tip.offset for end in robot.finite_range())
 
     parallel = np.abs(np.abs(tip.fixed[1:-1, 2, 2]) - 1.0).max(initial=0.0) < ROUNDING
     flat = np.abs((points - starts)[:, 2]).max() < ROUNDING
-    still = (np.hypot(points[:, 0], points[:, 1]) < ROUNDING) & (remaining[1:] < ROUNDING)
-    idle = still & (not oriented)
+    leaves_point = (np.hypot(points[:, 0], points[:, 1]) < ROUNDING) & (max_span[1:] < ROUNDING)
+    idle = leaves_point & (not oriented)
     exact = bool(parallel and flat)
 
     return Axes(
-        joints, tip.offset, low, high, tip.fixed, first, points, remaining[1:], folded[1:],
-        (float(remaining[0]), float(folded[0])), aim, idle, exact,
+        joints, tip.offset, low, high, tip.fixed, first, points, max_span[1:], min_span[1:],
+        (float(max_span[0]), float(min_span[0])), aim, idle, exact,
     )  # fmt: skip
 
 

@@ -43,7 +43,7 @@ def grow_by_rule_b(axes: Axes, goal: Vector, *, tolerance: float, passes: int, r
     for done in range(passes):
         for level in range(axes.count):
             known = done + 1 if level else 1
-            sample = goal + axes.remaining[level] * directions(1, 3, rng)[0]
+            sample = goal + axes.max_span[level] * directions(1, 3, rng)[0]
             parent, angle = _closest_circle(frames[level][:known], axes.points[level], sample)
             q[level + 1][done] = q[level][parent]
             q[level + 1][done, level] = angle

@@ -58,8 +58,8 @@ def grow_in_joint_space(
         done = fresh.stop
         solved = first_hit(misses[:done], limit)
     levels = (np.zeros((1, 2)), *(chains[:done, i] for i in range(1, links.count + 1)))
-    own = (np.zeros(done, dtype=np.int64), *(np.arange(done),) * (links.count - 1))
-    run = TreeSearch(links, target, levels, own, misses[:done], solved)
+    parents = (np.zeros(done, dtype=np.int64), *(np.arange(done),) * (links.count - 1))
+    run = TreeSearch(links, target, levels, parents, misses[:done], solved)
     return run.until(solved) if stop and solved else run
 
 

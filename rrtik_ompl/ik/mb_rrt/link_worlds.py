@@ -48,19 +48,19 @@ def _first_links(world: World, later: set[int]) -> World:
     """The world without the bodies that one of the ``later`` joints moves."""
     robot = world.robot
     scene = world.scene
-    kept: Any = pin.GeometryModel()
+    early_geometry: Any = pin.GeometryModel()
     for item in robot.collision.geometryObjects:
         if not _moves(robot, item.parentJoint, later):
-            kept.addGeometryObject(item)
+            early_geometry.addGeometryObject(item)
 
-    held = tuple(item for item in scene.attached if not _moves(robot, _joint(robot, item.link), later))
-    names = {*(each.name for each in scene.obstacles), *(each.name for each in held), *robot.link_names}
+    early_attached = tuple(item for item in scene.attached if not _moves(robot, _joint(robot, item.link), later))
+    names = {*(each.name for each in scene.obstacles), *(each.name for each in early_attached), *robot.link_names}
     allowed = tuple(pair for pair in scene.allowed_collisions if set(pair) <= names)
-    part = Scene(scene.obstacles, attached=held, allowed_collisions=allowed)
+    early_scene = Scene(scene.obstacles, attached=early_attached, allowed_collisions=allowed)
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DescriptionWarning)  # said where the whole world was made
-        return world.unheld.with_settings(robot=replace(robot, collision=kept), scene=part)
+        return world.unheld.with_settings(robot=replace(robot, collision=early_geometry), scene=early_scene)
 
 
 def _moves(robot: Robot, joint: int, later: set[int]) -> bool:

@@ -18,21 +18,21 @@ ROUNDING = 1e-12  # of the reach: a goal this far outside counts as reachable
 class Links:
     """Links from the origin on, joined so that each may point anywhere in the plane or in space.
 
-    After the joint of index i, i = 0..n, the rest of the chain spans every distance from ``folded[i]`` to
-    ``remaining[i]`` and no other, in the plane and in space: joint i of any solution lies in that ring or
+    After the joint of index i, i = 0..n, the links still to come span every distance from ``min_span[i]`` to
+    ``max_span[i]`` and no other, in the plane and in space: joint i of any solution lies in that ring or
     shell about the goal [3].
 
     Attributes:
         lengths: Base first, shape (n,); one unit of length for all numbers.
         dimension: 2 for the plane, 3 for space.
-        remaining: Total length of the links after index i, shape (n + 1,).
-        folded: The smallest distance that these links can span, shape (n + 1,).
+        max_span: Total length of the links after index i, shape (n + 1,).
+        min_span: The smallest distance that these links can span, shape (n + 1,).
     """
 
     lengths: Vector
     dimension: int
-    remaining: Vector
-    folded: Vector
+    max_span: Vector
+    min_span: Vector
 
     def __init__(self, lengths: ArrayLike, dimension: int = 2) -> None:
         """Make a chain.
@@ -45,11 +45,11 @@ class Links:
             raise InputError(f"lengths must be one or more numbers greater than 0, got {sizes.tolist()}")
         if dimension not in (2, 3):
             raise InputError(f"dimension must be 2 or 3, got {dimension!r}")
-        remaining = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
+        max_span = np.append(np.cumsum(sizes[::-1])[::-1], 0.0)
         object.__setattr__(self, "lengths", frozen(sizes))
         object.__setattr__(self, "dimension", dimension)
-        object.__setattr__(self, "remaining", frozen(remaining))
-        object.__setattr__(self, "folded", frozen(smallest_spans(sizes, remaining)))
+        object.__setattr__(self, "max_span", frozen(max_span))
+        object.__setattr__(self, "min_span", frozen(smallest_spans(sizes, max_span)))
 
     @property
     def count(self) -> int:
@@ -59,12 +59,12 @@ class Links:
     @property
     def reach(self) -> float:
         """Sum of the lengths."""
-        return float(self.remaining[0])
+        return float(self.max_span[0])
 
     def shortfall(self, goals: ArrayLike) -> Vector:
         """How far goals, shape (m, dimension), lie beyond the reach or inside the hole around the base; (m,)."""
         distance = np.linalg.norm(finite_array(goals, (None, self.dimension), "goals"), axis=1)
-        outside = np.maximum(distance - self.remaining[0], self.folded[0] - distance)
+        outside = np.maximum(distance - self.max_span[0], self.min_span[0] - distance)
         short: Vector = np.where(outside > ROUNDING * self.reach, outside, 0.0)
         return short
 
@@ -79,15 +79,15 @@ class Links:
         if short > 0.0:
             raise InputError(
                 f"goal: at distance {np.linalg.norm(point):.6g} from the base it is out of reach by {short:.4g}; "
-                f"the links reach from {self.folded[0]:.6g} to {self.reach:.6g}"
+                f"the links reach from {self.min_span[0]:.6g} to {self.reach:.6g}"
             )
         return point.copy()
 
 
-def smallest_spans(lengths: Vector, remaining: Vector) -> Vector:
+def smallest_spans(lengths: Vector, max_span: Vector) -> Vector:
     """max(0, 2 max d_j - sum d_j) over the links after each index, shape (n + 1,): the longest must be folded back."""
     longest = np.append(np.maximum.accumulate(lengths[::-1])[::-1], 0.0)
-    spans: Vector = np.maximum(0.0, 2.0 * longest - remaining)
+    spans: Vector = np.maximum(0.0, 2.0 * longest - max_span)
     return spans
 
 

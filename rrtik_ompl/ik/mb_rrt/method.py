@@ -34,7 +34,7 @@ def mb_rrt(request: IkRequest) -> IkResponse:
             rng=request.rng,
             deadline=request.deadline,
             world=request.world,
-            all=request.all,
+            collect_all=request.all,
             rounds=max(1, (ROUNDS_FOR_ALL if request.all else MAX_ROUNDS) // count),
         )
         rows = np.vstack([rows, found.q])

@@ -57,10 +57,10 @@ class TreeSearch:
         Args:
             margin: By how much at least, as a share of the reach; 0 counts strictly.
         """
-        slack = margin * self.links.reach
+        margin_distance = margin * self.links.reach
         beyond = (
-            np.linalg.norm(level - self.goal, axis=1) > radius + slack
-            for level, radius in zip(self.nodes[1:-1], self.links.remaining[1:-1], strict=True)
+            np.linalg.norm(level - self.goal, axis=1) > radius + margin_distance
+            for level, radius in zip(self.nodes[1:-1], self.links.max_span[1:-1], strict=True)
         )
         return int(sum(np.count_nonzero(mask) for mask in beyond))
 
@@ -71,10 +71,10 @@ class TreeSearch:
 
     def until(self, passes: int) -> TreeSearch:
         """The tree as it was after some of its passes."""
-        kept = tuple(rows[:passes] for rows in self.parents)
+        parents_until = tuple(rows[:passes] for rows in self.parents)
         solved = self.solved_in if self.solved_in <= passes else 0
         nodes = (self.nodes[0], *(level[:passes] for level in self.nodes[1:]))
-        return TreeSearch(self.links, self.goal, nodes, kept, self.misses[:passes], solved)
+        return TreeSearch(self.links, self.goal, nodes, parents_until, self.misses[:passes], solved)
 
     def edge_error(self) -> float:
         """The largest difference between an edge and its link."""

@@ -47,7 +47,7 @@ def search(
     rng: np.random.Generator,
     deadline: float,
     world: World | None = None,
-    all: bool = False,
+    collect_all: bool = False,
     width: int = WIDTH,
     rounds: int = MAX_ROUNDS,
 ) -> Found:
@@ -62,27 +62,27 @@ def search(
         deadline: Time of ``time.monotonic`` at which to stop.
         world: If given, and if the first rounds end in collision, every further edge of the tree is held clear of
             its obstacles, link by link.
-        all: Whether to go on for all ``rounds`` and collect every solution.
+        collect_all: Whether to go on for all ``rounds`` and collect every solution.
         width: Passes at a time.
         rounds: Limit.
     """
-    found = np.zeros((0, robot.dof))
+    solutions = np.zeros((0, robot.dof))
     if out_of_reach(robot, target):
-        return Found(found, 0)
+        return Found(solutions, 0)
 
     axes = axes_of(robot, target.oriented)
     tree = WorkspaceTree(axes, axes.nearest_in_reach(aimed_point(axes, target)), near, rng)
     for number in range(rounds):
         if number == POSTURE_ONLY_ROUNDS and world is not None and world.pairs:
             tree.check_links(LinkWorlds(world, axes).free)
-        ends = polished(robot, axes, target, tree.grow(width), all=all)
-        found = np.vstack([found, ends])
-        if not all and accept(ends).any():
+        ends = polished(robot, axes, target, tree.grow(width), wait_for_all=collect_all)
+        solutions = np.vstack([solutions, ends])
+        if not collect_all and accept(ends).any():
             break
         if time.monotonic() > deadline:
-            return Found(found, tree.passes, True)
+            return Found(solutions, tree.passes, True)
 
-    return Found(found, tree.passes)
+    return Found(solutions, tree.passes)
 
 
 def out_of_reach(robot: Robot, target: Target) -> bool:
@@ -101,7 +101,7 @@ def aimed_point(axes: Axes, target: Target) -> Vector:
     return point
 
 
-def polished(robot: Robot, axes: Axes, target: Target, ends: Matrix, *, all: bool = True) -> Matrix:
+def polished(robot: Robot, axes: Axes, target: Target, ends: Matrix, *, wait_for_all: bool = True) -> Matrix:
     """Those of the tree's ends that are at the goal or get there, shape (k, dof).
 
     Args:
@@ -109,7 +109,7 @@ def polished(robot: Robot, axes: Axes, target: Target, ends: Matrix, *, all: boo
         axes: Of the arm, for this kind of target.
         target: The goal.
         ends: Configurations, shape (m, dof).
-        all: Whether to wait for the slowest; if not, the first few that get there are enough.
+        wait_for_all: Whether to wait for the slowest; if not, the first few that get there are enough.
     """
     if len(ends) == 0:
         return ends
@@ -119,11 +119,11 @@ def polished(robot: Robot, axes: Axes, target: Target, ends: Matrix, *, all: boo
     if axes.exact:
         return ends[target.satisfied(robot, ends) & inside_limits(robot, ends)]
 
-    if not all:
+    if not wait_for_all:
         ends, _ = descend(robot, target, ends, iterations=FIRST_STEPS)
-        there = target.tightened(POLISHED).satisfied(robot, ends)
-        if there.any():
-            return ends[there]
+        at_goal = target.tightened(POLISHED).satisfied(robot, ends)
+        if at_goal.any():
+            return ends[at_goal]
 
     ends, _ = descend(robot, target, ends)
     return ends[target.satisfied(robot, ends)]

@@ -37,27 +37,30 @@ def draw_turns(
     """
     local = np.einsum("mji,mj->mi", frames[:, :3, :3], goal - frames[:, :3, 3])
     point = axes.points[level]
-    far = float(axes.remaining[level])
-    near = float(axes.folded[level])
+    max_distance = float(axes.max_span[level])
+    min_distance = float(axes.min_span[level])
 
     constant = np.einsum("mi,mi->m", local, local) + point @ point - 2.0 * local[:, 2] * point[2]
     amplitude = 2.0 * np.hypot(local[:, 0], local[:, 1]) * np.hypot(point[0], point[1])
     centre = np.arctan2(local[:, 1], local[:, 0]) - np.arctan2(point[1], point[0])
 
     # a point on the axis, or a goal on it: every turn leaves them as far apart
-    still = amplitude < FLAT
-    divisor = np.where(still, 1.0, amplitude)
-    least = (constant - far**2) / divisor
-    most = (constant - near**2) / divisor
-    slack = SLACK * (1.0 + np.abs(constant) / divisor)
+    turn_changes_nothing = amplitude < FLAT
+    divisor = np.where(turn_changes_nothing, 1.0, amplitude)
+    min_cosine = (constant - max_distance**2) / divisor
+    max_cosine = (constant - min_distance**2) / divisor
+    rounding = SLACK * (1.0 + np.abs(constant) / divisor)
 
-    useful = np.where(still, (least <= slack) & (most >= -slack), (least <= 1.0 + slack) & (most >= -1.0 - slack))
-    outer = np.where(still, np.pi, np.arccos(np.clip(least, -1.0, 1.0)))
-    inner = np.where(still, 0.0, np.arccos(np.clip(most, -1.0, 1.0)))
+    # without an amplitude these are no cosines: the squared distance is within its bounds where they enclose 0
+    any_turn_is_useful = (min_cosine <= rounding) & (max_cosine >= -rounding)
+    some_turn_is_useful = (min_cosine <= 1.0 + rounding) & (max_cosine >= -1.0 - rounding)
+    useful = np.where(turn_changes_nothing, any_turn_is_useful, some_turn_is_useful)
+    outer = np.where(turn_changes_nothing, np.pi, np.arccos(np.clip(min_cosine, -1.0, 1.0)))
+    inner = np.where(turn_changes_nothing, 0.0, np.arccos(np.clip(max_cosine, -1.0, 1.0)))
 
-    if far == 0.0 and bool(axes.exact):  # pointing at the goal, without the square root of the rounding
-        outer = np.where(still, outer, 0.0)
-        inner = np.where(still, inner, 0.0)
+    if max_distance == 0.0 and bool(axes.exact):  # pointing at the goal, without the square root of the rounding
+        outer = np.where(turn_changes_nothing, outer, 0.0)
+        inner = np.where(turn_changes_nothing, inner, 0.0)
 
     drawn, inside = _draw(centre, inner, outer, float(axes.lower[level]), float(axes.upper[level]), rng)
     return drawn, useful & inside
@@ -73,11 +76,11 @@ def _draw(
     widths = (outer - inner)[:, None, None]
     starts = np.clip(begins, lower, upper).reshape(len(centre), -1)
     ends = np.clip(begins + widths, lower, upper).reshape(len(centre), -1)
-    missed = np.maximum(np.maximum(lower - begins - widths, begins - upper), 0.0).reshape(len(centre), -1)
+    miss = np.maximum(np.maximum(lower - begins - widths, begins - upper), 0.0).reshape(len(centre), -1)
 
     # arcs inside the limits count by their lengths; where there are none, those that miss them least
-    inside = missed.min(axis=1) <= SLACK
-    weight = np.where(missed <= np.minimum(missed.min(axis=1), np.pi)[:, None] + SLACK, ends - starts + SLACK, 0.0)
+    inside = miss.min(axis=1) <= SLACK
+    weight = np.where(miss <= np.minimum(miss.min(axis=1), np.pi)[:, None] + SLACK, ends - starts + SLACK, 0.0)
 
     # one of them, then an angle on it
     total = np.cumsum(weight, axis=1)

@@ -47,7 +47,7 @@ def square_then_goal(links: Links, goal: Vector, index: int, count: int, rng: np
 
 def surface(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
     """On the circle, or sphere, around the goal whose radius is the length still to come."""
-    circle: Matrix = goal + links.remaining[index] * directions(count, links.dimension, rng)
+    circle: Matrix = goal + links.max_span[index] * directions(count, links.dimension, rng)
     return circle
 
 
@@ -55,7 +55,7 @@ def projected(links: Links, goal: Vector, index: int, count: int, rng: np.random
     """As `square`, then moved straight to or from the goal onto the circle of `surface` [3, section 4.3]."""
     away = square(links, goal, index, count, rng) - goal
     length = np.linalg.norm(away, axis=1, keepdims=True)
-    on_circle: Matrix = goal + links.remaining[index] * away / np.maximum(length, np.finfo(float).tiny)
+    on_circle: Matrix = goal + links.max_span[index] * away / np.maximum(length, np.finfo(float).tiny)
     return on_circle
 
 

@@ -34,7 +34,7 @@ def tree_marks(run: TreeSearch, *, unit: float = 1.0) -> list[Mark]:
         color = palette.SERIES[(index - 1) % len(palette.SERIES)]
         if index < run.links.count:
             name = f"where joint {index + 1} can be"
-            far = float(run.links.remaining[index]) * unit
+            far = float(run.links.max_span[index]) * unit
             marks.append(balls(name, color, goal, far, opacity=REGION_OPACITY))
 
         before, level = (_in_space(run.nodes[k]) * unit for k in (index - 1, index))

@@ -61,8 +61,8 @@ def _region(panel: Axes, run: TreeSearch, index: int) -> None:
     """The ring about the goal in which the joint of an index can be part of a solution."""
     from matplotlib.patches import Annulus, Circle
 
-    far = float(run.links.remaining[index])
-    near = float(run.links.folded[index])
+    far = float(run.links.max_span[index])
+    near = float(run.links.min_span[index])
     x = float(run.goal[0])
     y = float(run.goal[1])
 
@@ -87,7 +87,7 @@ def _links(panel: Axes, run: TreeSearch) -> None:
         )
 
         # Nodes of the last index are tips, which no region bounds.
-        far = np.linalg.norm(level - run.goal, axis=1) > run.links.remaining[index] * (1.0 + 1e-9)
+        far = np.linalg.norm(level - run.goal, axis=1) > run.links.max_span[index] * (1.0 + 1e-9)
         inside = level[~far] if index < run.links.count else level
         panel.plot(*inside.T, linestyle="none", marker="o", markersize=2.2, color=_color(index), zorder=3)
         if index < run.links.count:
@@ -103,8 +103,8 @@ def _chain(panel: Axes, run: TreeSearch) -> None:
 
 def _frame(panel: Axes, run: TreeSearch) -> None:
     reach = 1.06 * run.links.reach
-    low = np.minimum(-0.35 * reach, run.goal - run.links.remaining[1] * 1.04)
-    high = np.maximum(0.35 * reach, run.goal + run.links.remaining[1] * 1.04)
+    low = np.minimum(-0.35 * reach, run.goal - run.links.max_span[1] * 1.04)
+    high = np.maximum(0.35 * reach, run.goal + run.links.max_span[1] * 1.04)
     panel.set_xlim(float(low[0]), float(high[0]))
     panel.set_ylim(float(low[1]), float(high[1]))
     panel.set_aspect("equal")

@@ -23,7 +23,7 @@ seeds = st.integers(0, 2**32 - 1)
 def reachable_goal(links, seed, share):
     """A goal at a share of the way from the hole around the base to the full reach, in a random direction."""
     rng = np.random.default_rng(seed)
-    radius = links.folded[0] + share * (links.reach - links.folded[0])
+    radius = links.min_span[0] + share * (links.reach - links.min_span[0])
     return radius * directions(1, links.dimension, rng)[0]
 
 
@@ -37,7 +37,7 @@ def test_arcs_end_on_every_reachable_goal_in_one_pass_with_no_node_outside(sizes
     assert run.outside(margin=1e-9) == 0
     assert run.edge_error() < 1e-12 * links.reach
     nodes = run.nodes[1:]
-    for level, near in zip(nodes, links.folded[1:], strict=True):
+    for level, near in zip(nodes, links.min_span[1:], strict=True):
         assert (np.linalg.norm(level - run.goal, axis=1) >= near - 1e-9 * links.reach).all()
 
 
@@ -187,7 +187,7 @@ def test_the_joint_space_tree_takes_steps_and_counts_each_vertex_as_an_iteration
 @settings(deadline=None, max_examples=60)
 def test_goals_out_of_reach_are_refused_with_by_how_much(sizes, off, beyond):
     links = Links(sizes)
-    radius = links.reach + off if beyond else links.folded[0] - off
+    radius = links.reach + off if beyond else links.min_span[0] - off
     if radius < 0.0:
         return
     short = float(links.shortfall([[0.0, radius]])[0])

@@ -106,15 +106,15 @@ def test_the_points_of_the_axes_bound_what_the_rest_of_an_arm_can_reach(name):
             turned = frames @ turn
             points = turned[:, :3, :3] @ axes.points[level] + turned[:, :3, 3]
             distance = np.linalg.norm(points - aims, axis=1)
-            assert (distance <= axes.remaining[level] + 1e-9).all()
-            assert (distance >= axes.folded[level] - 1e-9).all()
+            assert (distance <= axes.max_span[level] + 1e-9).all()
+            assert (distance >= axes.min_span[level] - 1e-9).all()
             frames = turned @ axes.fixed[level + 1]
 
 
 def test_of_a_spherical_wrist_the_tree_aims_at_its_centre():
     axes = axes_of(rrtik.load_robot("puma560"), True)
-    np.testing.assert_allclose(axes.remaining[3:], 0.0, atol=1e-9)
-    assert axes.remaining[2] > 0.0
+    np.testing.assert_allclose(axes.max_span[3:], 0.0, atol=1e-9)
+    assert axes.max_span[2] > 0.0
 
 
 @pytest.mark.parametrize("name", ["planar10", "planar3", "panda", "puma560", "titan4", "ur5"])
