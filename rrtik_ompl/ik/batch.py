@@ -140,8 +140,8 @@ def _solved(
     # what is left one by one, each with the seed of its place: however many threads there are, answers are the same
     for k in np.flatnonzero(np.isnan(q[:, 0])).tolist():
         goal = PoseGoal(targets[k])
-        own = seed + part.start + k
-        result = solve_ik(robot, goal, method=asked, near=near, world=world, seconds=seconds, seed=own)
+        own_seed = seed + part.start + k
+        result = solve_ik(robot, goal, method=asked, near=near, world=world, seconds=seconds, seed=own_seed)
         reasons[k] = result.reason
         details[k] = result.detail
         if result.found:

@@ -127,18 +127,18 @@ class IkResult:
 
 def nearest_first(robot: Robot, rows: Matrix, near: Vector) -> NDArray[np.intp]:
     """Numbers of rows, shape (k, dof), those nearest to a posture first; joints count as their weights say."""
-    away = weighted_difference(robot, rows, near)
-    order: NDArray[np.intp] = np.vecdot(away, away).argsort(kind="stable")
+    difference = weighted_difference(robot, rows, near)
+    order: NDArray[np.intp] = np.vecdot(difference, difference).argsort(kind="stable")
     return order
 
 
 def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
     """Numbers of the rows, taken in that order, without those that repeat an earlier one to `SAME_POSTURE`."""
-    kept: list[int] = []
+    chosen: list[int] = []
     for k in order.tolist():
-        if not kept or np.abs(rows[k] - rows[kept]).max(axis=1).min() > SAME_POSTURE:
-            kept.append(k)
-    return np.array(kept, dtype=np.intp)
+        if not chosen or np.abs(rows[k] - rows[chosen]).max(axis=1).min() > SAME_POSTURE:
+            chosen.append(k)
+    return np.array(chosen, dtype=np.intp)
 
 
 def unwind(robot: Robot, rows: Matrix, start: Vector | None) -> None:
@@ -149,8 +149,11 @@ def unwind(robot: Robot, rows: Matrix, start: Vector | None) -> None:
         rows: Shape (k, dof).
         start: Before the first row, shape (dof,); None for nowhere.
     """
+    if not has_continuous(robot):
+        return
+
     last = start
-    for k in np.flatnonzero(~np.isnan(rows[:, 0])) if has_continuous(robot) else ():
+    for k in np.flatnonzero(~np.isnan(rows[:, 0])):
         if last is not None:
             rows[k] = np.where(robot.continuous, last + joint_difference(robot, rows[k], last), rows[k])
         last = rows[k]

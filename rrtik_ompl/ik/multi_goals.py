@@ -47,17 +47,17 @@ def at_all_tips(
 
     joined = starts.copy()
     for region in regions:
-        own = projected_onto(robot, HeldRegions((region,)), starts)
-        if len(own) == 0:
-            return own
-        own = own[np.argsort(np.linalg.norm(weighted_difference(robot, own, near), axis=1))]
-        rows = np.append(0, rng.integers(len(own), size=STARTS - 1))  # the nearest ones of all tips first
+        of_this_tip = projected_onto(robot, HeldRegions((region,)), starts)
+        if len(of_this_tip) == 0:
+            return of_this_tip
+        of_this_tip = of_this_tip[np.argsort(np.linalg.norm(weighted_difference(robot, of_this_tip, near), axis=1))]
+        rows = np.append(0, rng.integers(len(of_this_tip), size=STARTS - 1))  # the nearest ones of all tips first
         moved = _moving(robot, region)
-        joined[:, moved] = own[rows][:, moved]
+        joined[:, moved] = of_this_tip[rows][:, moved]
 
     found = projected_onto(robot, HeldRegions((*kept, *regions)), joined)
-    there: Matrix = found[goal.satisfied(robot, found)] if len(found) else found
-    return there
+    at_goal: Matrix = found[goal.satisfied(robot, found)] if len(found) else found
+    return at_goal
 
 
 def _moving(robot: Robot, region: HeldRegion) -> NDArray[np.intp]:
@@ -97,8 +97,8 @@ def solve_all_tips(
         free = found[accept(found)]
         if len(free):
             turned = joint_difference(robot, free, near)
-            kept = different_rows(turned, nearest_first(robot, free, near))
-            rows = np.where(robot.continuous, near + turned[kept], free[kept])
+            chosen = different_rows(turned, nearest_first(robot, free, near))
+            rows = np.where(robot.continuous, near + turned[chosen], free[chosen])
             return _result(rows, _residuals(robot, goal, rows), "", "", rounds, begin)
         if len(found):
             reason = "collision"

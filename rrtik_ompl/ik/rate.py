@@ -89,8 +89,8 @@ def _damped(J: Matrix, twist: Vector, bias: Vector, damping: float, near: float)
     square = np.where(s < near, (1.0 - (s / near) ** 2) * damping**2, 0.0)
     inverse = np.divide(s, s * s + square, out=np.zeros_like(s), where=s > LOST)
 
-    kept = np.zeros(len(Vt))
-    kept[: len(s)] = s * inverse  # share of each direction that the twist has taken
+    share_taken = np.zeros(len(Vt))
+    share_taken[: len(s)] = s * inverse  # share of each direction that the twist has taken
     V = Vt.T
-    qdot: Vector = V[:, : len(s)] @ (inverse * (U.T @ twist)[: len(s)]) + V @ ((1.0 - kept) * (Vt @ bias))
+    qdot: Vector = V[:, : len(s)] @ (inverse * (U.T @ twist)[: len(s)]) + V @ ((1.0 - share_taken) * (Vt @ bias))
     return qdot, float(s[-1])

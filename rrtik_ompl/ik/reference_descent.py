@@ -34,34 +34,38 @@ def walk_plainly(robot: Robot, aims: Matrix, Q: Matrix, steps: int, patience: in
     aims = np.broadcast_to(aims, (len(Q), aims.shape[1]))
     reached = np.zeros(len(Q), dtype=bool)
     going = np.arange(len(Q))
-    mark = np.full(len(Q), np.inf)
-    before = np.full(len(Q), np.inf)
-    share = np.full(len(Q), DAMPING_SHARE)
+    # of every row: squared residuals, infinite before there are any, and the share of them that goes into the damping
+    error_at_last_check = np.full(len(Q), np.inf)
+    error_before = np.full(len(Q), np.inf)
+    damping_share = np.full(len(Q), DAMPING_SHARE)
     weights = np.repeat([1.0 / reach_of(robot), PER_CHORD], 3)
 
     for step in range(steps + 1):
         error, felt, there = residuals(aims[going], poses(robot, Q[going]))
         reached[going] = there
         error = error * weights
-        square = (error * error).sum(axis=1)
+        squared_error = (error * error).sum(axis=1)
 
-        kept = ~there
+        # every few steps those are given up whose error has not fallen enough since the last check
+        goes_on = ~there
         if step > 0 and step % patience == 0:
-            kept &= square <= STALLED * mark[going]
-            mark[going] = square
-        going = going[kept]
-        error = error[kept]
-        felt = felt[kept]
-        square = square[kept]
+            goes_on &= squared_error <= STALLED * error_at_last_check[going]
+            error_at_last_check[going] = squared_error
+        going = going[goes_on]
+        error = error[goes_on]
+        felt = felt[goes_on]
+        squared_error = squared_error[goes_on]
         if len(going) == 0 or step == steps:
             break
 
-        share[going[square > before[going]]] *= SHARE_GROWTH
-        before[going] = square
+        damping_share[going[squared_error > error_before[going]]] *= SHARE_GROWTH
+        error_before[going] = squared_error
         J = _jacobians(robot, aims[going], felt, Q[going]) * weights[:, None]
         J[:, :3][(aims[going, BOX : BOX + 3] > 0.0) & (error[:, :3] == 0.0)] = 0.0  # free to move inside the box
         Q[going] = np.clip(
-            Q[going] + _changes(robot, J, error, DAMPING + share[going] * square, Q[going]), robot.lower, robot.upper
+            Q[going] + _changes(robot, J, error, DAMPING + damping_share[going] * squared_error, Q[going]),
+            robot.lower,
+            robot.upper,
         )
 
     return Q, reached, step
@@ -76,23 +80,23 @@ def residuals(aims: Matrix, tips: NDArray[np.float64]) -> tuple[Matrix, NDArray[
     """
     turned = aims[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
     free = aims[:, FREE_TURN].astype(int)
-    place = (turned @ (tips[:, :3, 3] - aims[:, 9:12])[..., None])[..., 0]
-    room = aims[:, BOX : BOX + 3]
+    position = (turned @ (tips[:, :3, 3] - aims[:, 9:12])[..., None])[..., 0]
+    half_box = aims[:, BOX : BOX + 3]
     R = turned @ tips[:, :3, :3]
 
     skew = -0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
     cosine = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
-    felt = np.tile(np.eye(3), (len(aims), 1, 1))
+    felt_turn = np.tile(np.eye(3), (len(aims), 1, 1))
 
     for axis in range(3):
         rows = free == axis
-        own = R[rows, :, axis]
-        skew[rows] = np.cross(own, np.eye(3)[axis])
-        cosine[rows] = own[:, axis]
-        felt[rows] -= own[:, :, None] * own[:, None]
+        tip_axis = R[rows, :, axis]
+        skew[rows] = np.cross(tip_axis, np.eye(3)[axis])
+        cosine[rows] = tip_axis[:, axis]
+        felt_turn[rows] -= tip_axis[:, :, None] * tip_axis[:, None]
     skew[free == ANY_TURN] = 0.0
     cosine[free == ANY_TURN] = 1.0
-    felt[free == ANY_TURN] = 0.0
+    felt_turn[free == ANY_TURN] = 0.0
 
     half = np.sqrt(np.maximum(0.5 * (1.0 + cosine), 0.0))
     # half a turn about an axis that rounding hides: any will do, the next step sees better
@@ -100,20 +104,20 @@ def residuals(aims: Matrix, tips: NDArray[np.float64]) -> tuple[Matrix, NDArray[
     skew[hidden] = np.eye(3)[np.where(free[hidden] == 0, 1, 0)]
     half[hidden] = 0.5
 
-    error = np.hstack([np.clip(place, -room, room) - place, skew / half[:, None]])
-    away = np.linalg.norm(error[:, :3], axis=1)
+    error = np.hstack([np.clip(position, -half_box, half_box) - position, skew / half[:, None]])
+    distance = np.linalg.norm(error[:, :3], axis=1)
     turn = np.linalg.norm(error[:, 3:], axis=1)
-    return error, felt, (away <= aims[:, POSITION_TOLERANCE]) & (turn <= aims[:, CHORD_TOLERANCE])
+    return error, felt_turn, (distance <= aims[:, POSITION_TOLERANCE]) & (turn <= aims[:, CHORD_TOLERANCE])
 
 
 def farness(robot: Robot, aims: Matrix, tips: NDArray[np.float64]) -> Matrix:
     """How far each of the tips, shape (n, 4, 4), is from each goal, squared and without units, shape (m, n)."""
-    away = tips[None, :, :3, 3] - aims[:, None, 9:12]
+    offset = tips[None, :, :3, 3] - aims[:, None, 9:12]
     free = aims[:, FREE_TURN].astype(int)
     same = np.einsum("nij,mij->mnj", tips[:, :3, :3], aims[:, :9].reshape(-1, 3, 3))
     counts = (free[:, None] == NO_TURN) | (free[:, None] == np.arange(3))
     turned = ((1.0 - same) * counts[:, None]).sum(axis=2)
-    squared: Matrix = (away * away).sum(axis=2) / reach_of(robot) ** 2 + PER_CHORD**2 * turned
+    squared: Matrix = (offset * offset).sum(axis=2) / reach_of(robot) ** 2 + PER_CHORD**2 * turned
     return squared
 
 

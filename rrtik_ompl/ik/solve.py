@@ -103,10 +103,10 @@ def solve_ik(
     drawn = (goal,) if isinstance(goal, Target) else tuple(targets(goal, max(DRAWS, len(goal.parts)), random.rng))
     name = chosen_method(robot, drawn, method)
     if method == "auto" and name == "numeric":
-        name = _walker(goal)
+        name = _walking_method(goal)
 
     request = IkRequest(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
-    return _solved(request, name, method == "auto", begin)
+    return _solve_by(request, name, method == "auto", begin)
 
 
 def free_of_collision(world: World | None, Q: Matrix) -> Mask:
@@ -155,39 +155,42 @@ def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> 
     return method
 
 
-def _walker(goal: TipGoal) -> IkMethod:
+def _walking_method(goal: TipGoal) -> IkMethod:
     """The method for goals with freedom that walks to all of them, not to targets drawn from them."""
     return "projection" if goal.has_regions else "numeric"
 
 
-def _solved(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> IkResult:
+def _solve_by(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> IkResult:
     """The answer of a method; if it has none and was chosen by "auto", of the one that walks to the goal."""
     robot = request.robot
     goal = request.goal
-    answer = METHODS[name].run(request)
+    response = METHODS[name].run(request)
 
-    nearest = None if request.all else _nearest(request, answer.q)
+    nearest = None if request.all else _nearest(request, response.q)
     if nearest is not None:
-        return IkResult(*nearest, "", "", answer.iterations, name, time.monotonic() - begin)
+        return IkResult(*nearest, "", "", response.iterations, name, time.monotonic() - begin)
 
-    q, residuals, free = _reaching(request, answer.q)
-    more = _draws(name, goal) or (name == "closed-form" and answer.singular and len(q) == 0)
-    if auto and not free.any() and more:
-        other = _solved(request, _walker(goal), False, begin)
-        if other.found or _draws(name, goal):  # else the closed form knows better why there is nothing
-            return other
+    q, residuals, free = _rows_at_goal(request, response.q)
+    took_draws = _takes_draws_alone(name, goal)
+    took_part_of_a_curve = name == "closed-form" and response.singular and len(q) == 0
+    if auto and not free.any() and (took_draws or took_part_of_a_curve):
+        walked = _solve_by(request, _walking_method(goal), False, begin)
+        if walked.found or took_draws:  # else the closed form knows better why there is nothing
+            return walked
 
     (rows,) = free.nonzero()
     order = rows[nearest_first(robot, q[rows], request.near)]
     turned = joint_difference(robot, q, request.near)
-    kept = different_rows(turned, order) if request.all else order[:1]
-    reason, detail = ("", "") if len(kept) else _why(request, answer, name, q)
+    chosen = different_rows(turned, order) if request.all else order[:1]
+    reason = detail = ""
+    if len(chosen) == 0:
+        reason, detail = _why(request, response, name, q)
     return IkResult(
-        solutions=frozen(np.where(robot.continuous, request.near + turned[kept], q[kept])),
-        residuals=frozen(residuals[kept]),
+        solutions=frozen(np.where(robot.continuous, request.near + turned[chosen], q[chosen])),
+        residuals=frozen(residuals[chosen]),
         reason=reason,
         detail=detail,
-        iterations=answer.iterations,
+        iterations=response.iterations,
         method=name,
         seconds=time.monotonic() - begin,
     )
@@ -199,15 +202,15 @@ def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
     It is checked first and alone, for mostly it will do: None if it is not at the goal or not accepted.
     """
     robot = request.robot
-    inside = q  # most often all are, and to clamp them takes twice as long as to see that
+    within_limits = q  # most often all are, and to clamp them takes twice as long as to see that
     if not ((q >= robot.lower) & (q <= robot.upper)).all():
-        inside = robot.clamp(q[inside_limits(robot, q)])
+        within_limits = robot.clamp(q[inside_limits(robot, q)])
 
-    if len(inside) > 1:
-        away = weighted_difference(robot, inside, request.near)
-        nearest = int(np.vecdot(away, away).argmin())
-        inside = inside[nearest : nearest + 1]
-    reaching, residuals = _at_goal(robot, request.goal, inside)
+    if len(within_limits) > 1:
+        difference = weighted_difference(robot, within_limits, request.near)
+        nearest = int(np.vecdot(difference, difference).argmin())
+        within_limits = within_limits[nearest : nearest + 1]
+    reaching, residuals = _at_goal(robot, request.goal, within_limits)
     if len(reaching) == 0 or not request.accept(reaching)[0]:
         return None
 
@@ -217,17 +220,20 @@ def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
     return frozen(reaching), frozen(residuals)
 
 
-def _reaching(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
-    """Rows of q inside the limits and at the goal, shape (k, dof), their residuals, and which are accepted.
+def _rows_at_goal(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
+    """Rows of q inside the limits and at the goal: the accepted ones or, if there is none, some of the others.
 
-    The accepted ones, of which the nearest are enough unless all are wanted; if there is none, some of the others.
+    Of the accepted ones the nearest are enough unless all are wanted.
+
+    Returns:
+        The rows, shape (k, dof); their residuals, shape (k, 2) [m, rad]; and whether they are accepted, shape (k,).
     """
     robot = request.robot
     goal = request.goal
     rows = robot.clamp(q[inside_limits(robot, q)])
     free = request.accept(rows)
     chosen = rows[free]
-    block = _block(goal)
+    block = _rows_at_a_time(goal)
     if not request.all and len(chosen) > block:
         chosen = chosen[nearest_first(robot, chosen, request.near)]
 
@@ -236,12 +242,12 @@ def _reaching(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
         found.append(_at_goal(robot, goal, chosen[k : k + block]))
         if len(found[-1][0]) and not request.all:
             break
-    at, residuals = (np.concatenate(each) for each in zip(*found, strict=True))
-    if len(at):
-        return at, residuals, np.ones(len(at), dtype=bool)
+    at_goal, residuals = (np.concatenate(each) for each in zip(*found, strict=True))
+    if len(at_goal):
+        return at_goal, residuals, np.ones(len(at_goal), dtype=bool)
 
-    at, residuals = _at_goal(robot, goal, rows[~free][:block])
-    return at, residuals, np.zeros(len(at), dtype=bool)
+    at_goal, residuals = _at_goal(robot, goal, rows[~free][:block])
+    return at_goal, residuals, np.zeros(len(at_goal), dtype=bool)
 
 
 def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
@@ -250,57 +256,58 @@ def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
         return q, np.zeros((0, 2))
     if len(q) == 1 and isinstance(goal, Target):
         position, angle = error_of_one(robot, goal, q[0])
-        near, turned = goal.tolerances
-        kept = int(position <= near and angle <= turned)
-        return q[:kept], np.array([[position, angle]])[:kept]
+        max_distance, max_angle = goal.tolerances
+        count = int(position <= max_distance and angle <= max_angle)
+        return q[:count], np.array([[position, angle]])[:count]
 
     residuals = np.array(goal.errors(robot, q)).T
-    at = (residuals <= goal.tolerances).all(axis=1) if isinstance(goal, Target) else goal.satisfied(robot, q)
-    return q[at], residuals[at]
+    is_at_goal = (residuals <= goal.tolerances).all(axis=1) if isinstance(goal, Target) else goal.satisfied(robot, q)
+    return q[is_at_goal], residuals[is_at_goal]
 
 
-def _block(goal: TipGoal) -> int:
+def _rows_at_a_time(goal: TipGoal) -> int:
     """How many rows are compared with a goal at once: thousands of rows with thousands of grasps take minutes."""
     return max(1, COMPARED // len(goal.parts))
 
 
-def _draws(name: str, goal: TipGoal) -> bool:
+def _takes_draws_alone(name: str, goal: TipGoal) -> bool:
     """Whether the targets that a method takes are not all there is of a goal."""
-    return name not in ("projection", _walker(goal)) and any(map(leaves_freedom, goal.parts))
+    return name not in ("projection", _walking_method(goal)) and any(map(leaves_freedom, goal.parts))
 
 
 def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[str, str]:
-    """Reason and detail of a failure of a method that found q, shape (k, dof), all in collision."""
+    """Reason and detail of a failure, see `IkResult`, of a method that found q, shape (k, dof), all in collision."""
     robot = request.robot
     goal = request.goal
     if len(q) and request.world is not None:
-        count = f"{len(q)} configurations" + (" or more" if len(q) >= _block(goal) else "")
+        count = f"{len(q)} configurations" + (" or more" if len(q) >= _rows_at_a_time(goal) else "")
         return "collision", f"{count} reach the goal, all in collision: {request.world.explain(q[0])}"
 
     fault = robot.limit_fault(answer.nearest)
     reached = bool(goal.satisfied(robot, answer.nearest[None])[0])
     if reached and not fault:
         return "time", f"the goal is in reach, but the method gave up after {answer.iterations} steps"
-    if _draws(name, goal):
+    if _takes_draws_alone(name, goal):
         return "time", f"none of {len(request.targets)} targets drawn from the goal is reached inside the limits"
     if reached and answer.singular:
         return "limits", f"the arm could reach this singular pose in many postures, all outside the limits: {fault}"
     if reached:
         return "limits", f"the arm could reach the goal, but {fault}"
 
-    away = f"the nearest posture is {_away(robot, goal, answer.nearest)}"
+    nearest_posture = f"the nearest posture is {_distance_in_words(robot, goal, answer.nearest)}"
     if answer.timed_out and not all(_out_of_reach(robot, target) for target in request.targets):
-        return "time", f"no solution in time; {away}"
-    return "unreachable", f"{away} from the goal"
+        return "time", f"no solution in time; {nearest_posture}"
+    return "unreachable", f"{nearest_posture} from the goal"
 
 
 def _out_of_reach(robot: Robot, target: Target) -> bool:
+    """Whether the lengths of an arm do not allow a target, for certain."""
     from rrtik_ompl.ik.mb_rrt.search import out_of_reach  # whoever finds a solution needs no tree
 
     return out_of_reach(robot, target)
 
 
-def _away(robot: Robot, goal: TipGoal, q: Vector) -> str:
+def _distance_in_words(robot: Robot, goal: TipGoal, q: Vector) -> str:
     """How far a posture is from a goal, in metres and, unless it is a position, degrees."""
     ((distance,), (angle,)) = goal.errors(robot, q[None])
     turned = f" and {round(np.degrees(angle), DIGITS):.4g} deg" if goal.oriented else ""

@@ -9,16 +9,16 @@ from rrtik_ompl.model.goal import GoalPart, PoseGoal, PositionGoal, Target, TipG
 from rrtik_ompl.model.task_region import TaskRegion, displacements
 
 
-def targets(goal: TipGoal, most: int, rng: np.random.Generator) -> list[Target]:
-    """Goals without freedom: the goal itself, or up to ``most`` of a region's parts, with draws where they are free."""
-    parts, coordinates = _drawn(goal, most, rng)
+def targets(goal: TipGoal, max_count: int, rng: np.random.Generator) -> list[Target]:
+    """Goals without freedom: the goal itself, or at most ``max_count``, drawn of its parts where they leave freedom."""
+    parts, coordinates = _drawn(goal, max_count, rng)
     places = iter(displacements(coordinates))
     return [part if isinstance(part, Target) else _target(part.region(), next(places)) for part in parts]
 
 
-def skip_targets(goal: TipGoal, most: int, rng: np.random.Generator) -> None:
+def skip_targets(goal: TipGoal, max_count: int, rng: np.random.Generator) -> None:
     """Draw the random numbers of :func:`targets`, and make nothing of them."""
-    _drawn(goal, most, rng)
+    _drawn(goal, max_count, rng)
 
 
 def leaves_freedom(part: GoalPart) -> bool:
@@ -26,12 +26,12 @@ def leaves_freedom(part: GoalPart) -> bool:
     return part.freedom is not None and bool(part.freedom.free.any())
 
 
-def _drawn(goal: TipGoal, most: int, rng: np.random.Generator) -> tuple[list[GoalPart], Matrix]:
+def _drawn(goal: TipGoal, max_count: int, rng: np.random.Generator) -> tuple[list[GoalPart], Matrix]:
     """The parts of which targets are made, and for each region among them a displacement, shape (regions, 6)."""
     parts = goal.parts
-    if len(parts) > most:
-        parts = tuple(parts[k] for k in rng.permutation(len(parts))[:most])
-    count = most if any(leaves_freedom(part) for part in parts) else len(parts)
+    if len(parts) > max_count:
+        parts = tuple(parts[k] for k in rng.permutation(len(parts))[:max_count])
+    count = max_count if any(leaves_freedom(part) for part in parts) else len(parts)
     drawn = [parts[k % len(parts)] for k in range(count)]
     bounds = np.array([part.freedom.bounds for part in drawn if part.freedom is not None]).reshape(-1, 6, 2)
     return drawn, rng.uniform(bounds[..., 0], bounds[..., 1])

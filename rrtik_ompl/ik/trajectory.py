@@ -134,14 +134,14 @@ def solve_ik_trajectory(
     check_world(world, robot)
     load_kernels(robot)
     begin = time.monotonic()
-    rows = _checked(poses)
+    rows = _checked_poses(poses)
     targets = tuple(_target(row, position_tolerance, orientation_tolerance) for row in rows)
 
     task = Task(
         robot=robot,
         poses=rows,
         targets=targets,
-        goals=_freed(targets, free_rotation_axis),
+        goals=_with_free_axis(targets, free_rotation_axis),
         near=None if near is None else robot.configuration(near, "near"),
         world=world,
         jump=positive(jump, "jump"),
@@ -150,7 +150,7 @@ def solve_ik_trajectory(
         deadline=begin + not_negative(seconds, "seconds"),
     )
 
-    name = _chosen(task, method)
+    name = _chosen_method(task, method)
     q, iterations = FOLLOWERS[name](task)
     unwind(robot, q, task.near)
     residuals = _keep_only_checked(task, q)
@@ -169,7 +169,7 @@ def solve_ik_trajectory(
     )
 
 
-def _checked(poses: ArrayLike) -> Matrix:
+def _checked_poses(poses: ArrayLike) -> Matrix:
     rows = finite_array(poses, (None, 4, 4) if dimensions(poses) == 3 else (None, 3), "poses")
     if len(rows) == 0:
         raise InputError("poses: a trajectory needs at least one point")
@@ -184,7 +184,7 @@ def _target(row: Matrix, position_tolerance: float, orientation_tolerance: float
     return PoseGoal(row, position_tolerance, orientation_tolerance)
 
 
-def _freed(targets: tuple[Target, ...], axis: FrameAxis | None) -> tuple[TipGoal, ...]:
+def _with_free_axis(targets: tuple[Target, ...], axis: FrameAxis | None) -> tuple[TipGoal, ...]:
     if axis is None:
         return targets
     if not targets[0].oriented:
@@ -198,7 +198,7 @@ def _options(options: GeneticOptions | GeneticPreset) -> GeneticOptions:
     return PRESETS[one_of(PRESETS, options, "preset of the genetic algorithm")]
 
 
-def _chosen(task: Task, method: TrajectoryIkMethod) -> TrajectoryIkMethod:
+def _chosen_method(task: Task, method: TrajectoryIkMethod) -> TrajectoryIkMethod:
     one_of(get_args(TrajectoryIkMethod), method, "inverse kinematics method for trajectories")
     misfits = {name: METHODS[name].misfit(task.robot, task.targets[0]) for name in FOLLOWERS}
     if not misfits["closed-form"] and form_of(task.robot).kind == "position" and task.poses.ndim == 3:
@@ -253,10 +253,10 @@ def _keep_only_checked(task: Task, q: Matrix) -> Matrix:
     for k in np.flatnonzero(~np.isnan(q[:, 0])):
         residuals[k] = np.ravel(task.goals[k].errors(task.robot, q[k : k + 1]))
 
-    good = (residuals <= task.targets[0].tolerances).all(axis=1) & inside_limits(task.robot, q)
-    good[good] = task.accept(q[good])
-    q[~good] = np.nan
-    residuals[~good] = np.nan
+    usable = (residuals <= task.targets[0].tolerances).all(axis=1) & inside_limits(task.robot, q)
+    usable[usable] = task.accept(q[usable])
+    q[~usable] = np.nan
+    residuals[~usable] = np.nan
     q[:] = task.robot.clamp(q)
     return residuals
 
@@ -287,17 +287,17 @@ def _why(task: Task, name: TrajectoryIkMethod, q: Matrix) -> tuple[tuple[str, ..
 
 def _jumps(robot: Robot, q: Matrix, jump: float) -> tuple[int, ...]:
     """Points after a jump, and points that follow a gap."""
-    here = ~np.isnan(q[1:, 0])
-    before = ~np.isnan(q[:-1, 0])
-    far = np.abs(joint_difference(robot, q[1:], q[:-1])).max(axis=1) > jump
-    after_gap = here & ~before & np.logical_or.accumulate(before)
-    return tuple(int(k) + 1 for k in np.flatnonzero((here & before & far) | after_gap))
+    is_solved = ~np.isnan(q[1:, 0])
+    was_solved = ~np.isnan(q[:-1, 0])
+    has_jumped = np.abs(joint_difference(robot, q[1:], q[:-1])).max(axis=1) > jump
+    after_gap = is_solved & ~was_solved & np.logical_or.accumulate(was_solved)
+    return tuple(int(k) + 1 for k in np.flatnonzero((is_solved & was_solved & has_jumped) | after_gap))
 
 
 def _blocked(world: World | None, q: Matrix) -> tuple[int, ...]:
     """Points to which the straight motion from the point before collides."""
-    whole = np.flatnonzero(~np.isnan(q[1:, 0]) & ~np.isnan(q[:-1, 0]))
-    if world is None or len(whole) == 0:
+    solved_pairs = np.flatnonzero(~np.isnan(q[1:, 0]) & ~np.isnan(q[:-1, 0]))
+    if world is None or len(solved_pairs) == 0:
         return ()
-    free = world.motion_valid_batch(q[whole], q[whole + 1])
-    return tuple(int(k) + 1 for k in whole[~free])
+    free = world.motion_valid_batch(q[solved_pairs], q[solved_pairs + 1])
+    return tuple(int(k) + 1 for k in solved_pairs[~free])

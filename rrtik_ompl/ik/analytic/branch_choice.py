@@ -64,14 +64,14 @@ def nearest(
     found = solutions(robot, goals, near=hints, check=False)
     cost = np.where(found.valid, _distance(robot, found.branches, hints[:, None], scale), np.inf)
     margin = np.min(np.minimum(found.branches - robot.lower, robot.upper - found.branches), axis=2)
-    least = cost.min(axis=1)
-    best = np.argmax(np.where(cost <= least[:, None] + TIE, margin, -np.inf), axis=1)
+    least_distance = cost.min(axis=1)
+    best = np.argmax(np.where(cost <= least_distance[:, None] + TIE, margin, -np.inf), axis=1)
 
     q = found.branches[np.arange(len(goals)), best].copy()
-    reached = np.isfinite(least)
+    reached = np.isfinite(least_distance)
     for k in np.flatnonzero(found.singular):  # few: singular poses are rare, and each has a curve to search
         member, distance = _nearest_member(robot, goals[k], hints[k], scale)
-        if distance < least[k]:
+        if distance < least_distance[k]:
             q[k] = member
             reached[k] = True
 
@@ -91,7 +91,7 @@ def _nearest_member(robot: Robot, goal: Matrix, near: Vector, scale: Vector) -> 
     """
     free = list(form_of(robot).free)
     member = near
-    least = np.inf
+    least_distance = np.inf
     centre = 0.0
     width = np.pi
 
@@ -104,12 +104,12 @@ def _nearest_member(robot: Robot, goal: Matrix, near: Vector, scale: Vector) -> 
         distance = np.where(found.valid, _distance(robot, found.branches, near, scale), np.inf)
         row, branch = np.unravel_index(int(np.argmin(distance)), distance.shape)
 
-        if distance[row, branch] < least:
+        if distance[row, branch] < least_distance:
             member = found.branches[row, branch]
-            least = float(distance[row, branch])
+            least_distance = float(distance[row, branch])
         centre = values[row]
         width = 4.0 * width / SWEEP
-    return member, least
+    return member, least_distance
 
 
 def follow(
@@ -204,8 +204,8 @@ def _in_every_turn(robot: Robot, q: Matrix, tags: NDArray[np.int64]) -> tuple[Ma
     for joint in np.flatnonzero(~robot.prismatic & ~robot.continuous & (span >= TAU)):
         rows = [q]
         owners = [tags]
-        most = int(span[joint] / TAU)
-        for turn in (*range(-most, 0), *range(1, most + 1)):
+        max_turns = int(span[joint] / TAU)
+        for turn in (*range(-max_turns, 0), *range(1, max_turns + 1)):
             other = q.copy()
             other[:, joint] += turn * TAU
             fits = inside_limits(robot, other)

@@ -155,15 +155,15 @@ def check_poses(poses: NDArray[np.float64], what: str) -> None:
         return
 
     columns = np.ascontiguousarray(poses[:, :3, :3].transpose(2, 1, 0))  # products of these beat small matrices
-    off = np.zeros(len(poses))
+    errors = np.zeros(len(poses))
     with np.errstate(over="ignore", invalid="ignore"):
         for j, k in combinations_with_replacement(range(3), 2):
-            np.maximum(off, np.abs((columns[j] * columns[k]).sum(axis=0) - (j == k)), out=off)
+            np.maximum(errors, np.abs((columns[j] * columns[k]).sum(axis=0) - (j == k)), out=errors)
 
-    worst = int(np.argmax(off))
-    if not off[worst] <= NOT_RIGID:
+    worst = int(np.argmax(errors))
+    if not errors[worst] <= NOT_RIGID:
         raise InputError(
-            f"{what}: entry {worst} is no rotation: its columns are {off[worst]:.3g} away from orthonormal "
+            f"{what}: entry {worst} is no rotation: its columns are {errors[worst]:.3g} away from orthonormal "
             f"(at most {NOT_RIGID:g}); make it orthonormal"
         )
 

@@ -69,8 +69,10 @@ def _placed(robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64]) -> N
 def mountings(robot: Robot, form: AnalyticSolver) -> tuple[Matrix | None, Matrix | None]:
     """T_base_world and T_tip_frame, None where they are the identity."""
     frames = robot.model.frames
-    base, tip, own = (frames[robot.model.getFrameId(name)] for name in (robot.link_names[0], robot.tip, form.frame))
-    placements = (base.placement.inverse().homogeneous, (tip.placement.inverse() * own.placement).homogeneous)
+    base, tip, solver_frame = (
+        frames[robot.model.getFrameId(name)] for name in (robot.link_names[0], robot.tip, form.frame)
+    )
+    placements = (base.placement.inverse().homogeneous, (tip.placement.inverse() * solver_frame.placement).homogeneous)
     before, after = (None if np.array_equal(each, np.eye(4)) else each for each in placements)
     return before, after
 
@@ -83,7 +85,7 @@ def _turn_inside(robot: Robot, q: NDArray[np.float64], near: Matrix | None) -> N
         q: Shape (dof, b, m), changed in place.
         near: Shape (m, dof) or None.
     """
-    inside = np.ones(q.shape[1:], dtype=bool)
+    fits = np.ones(q.shape[1:], dtype=bool)
     for joint in np.flatnonzero(~robot.prismatic):
         low = robot.lower[joint]
         high = robot.upper[joint]
@@ -91,8 +93,8 @@ def _turn_inside(robot: Robot, q: NDArray[np.float64], near: Matrix | None) -> N
         if low < -np.pi or high > np.pi:
             centre = 0.0 if near is None else near[:, joint]
             values[:] = _full_turns(values, low - LIMIT_TOLERANCE, high + LIMIT_TOLERANCE, centre)
-        inside &= (values >= low - LIMIT_TOLERANCE) & (values <= high + LIMIT_TOLERANCE)
-    return inside
+        fits &= (values >= low - LIMIT_TOLERANCE) & (values <= high + LIMIT_TOLERANCE)
+    return fits
 
 
 def _full_turns(
@@ -101,8 +103,8 @@ def _full_turns(
     """Equal angles: the one nearest to ``near``, or else the nearest to that inside low .. high if there is one."""
     nearest = near + wrapped(values - near)
     nearest = nearest - TAU * np.ceil(np.maximum(nearest - high, 0.0) / TAU)
-    inside: NDArray[np.float64] = nearest + TAU * np.ceil(np.maximum(low - nearest, 0.0) / TAU)
-    return inside
+    turned: NDArray[np.float64] = nearest + TAU * np.ceil(np.maximum(low - nearest, 0.0) / TAU)
+    return turned
 
 
 def tip_residuals(
@@ -120,13 +122,13 @@ def tip_residuals(
         Distance [m] and angle [rad], shape (2, b, m).
     """
     tips = _tips(robot, q)
-    off = tips - poses[:, :3].transpose(2, 1, 0)[:, :, None]
-    off *= off
+    squared_differences = tips - poses[:, :3].transpose(2, 1, 0)[:, :, None]
+    squared_differences *= squared_differences
 
     residuals = np.zeros((2, *tips.shape[2:]))
-    residuals[0] = np.sqrt(off[3].sum(axis=0))
+    residuals[0] = np.sqrt(squared_differences[3].sum(axis=0))
     if oriented:  # |R1 - R2| = 2 sqrt(2) sin(angle / 2), accurate for small angles
-        chord = np.sqrt(off[:3].sum(axis=(0, 1)) / 8.0)
+        chord = np.sqrt(squared_differences[:3].sum(axis=(0, 1)) / 8.0)
         residuals[1] = 2.0 * np.arcsin(np.minimum(chord, 1.0))
 
     return residuals

@@ -78,9 +78,9 @@ def _one_start(robot: Robot, goal: Target, q: Vector) -> tuple[Vector, int]:
             error = here.actInv(goal.point)
             J = J[:3]
         else:
-            away = here.actInv(goal.pose)
-            error = pin.log6(away).vector
-            J = pin.Jlog6(away.inverse()) @ J
+            error_pose = here.actInv(goal.pose)
+            error = pin.log6(error_pose).vector
+            J = pin.Jlog6(error_pose.inverse()) @ J
 
         if np.linalg.norm(error) < CLOSE:
             break

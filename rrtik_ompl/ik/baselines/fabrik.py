@@ -74,10 +74,10 @@ def _pulled(points: NDArray[np.float64], goal: Target) -> NDArray[np.float64]:
     pulled = points.copy()
     pulled[:, -1] = goal.point
     for k in range(points.shape[1] - 2, 0, -1):
-        away = points[:, k] - pulled[:, k + 1]
-        distance = np.linalg.norm(away, axis=1, keepdims=True)
+        direction = points[:, k] - pulled[:, k + 1]
+        distance = np.linalg.norm(direction, axis=1, keepdims=True)
         length = np.linalg.norm(points[:, k + 1] - points[:, k], axis=1, keepdims=True)
-        pulled[:, k] = pulled[:, k + 1] + away * (length / np.where(distance > 0.0, distance, 1.0))
+        pulled[:, k] = pulled[:, k + 1] + direction * (length / np.where(distance > 0.0, distance, 1.0))
     return pulled
 
 

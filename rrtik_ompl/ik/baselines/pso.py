@@ -53,39 +53,48 @@ def swarm(
     """
     rng = np.random.default_rng(np.frombuffer(np.ascontiguousarray(starts).tobytes(), dtype=np.uint32))
     swarms = max(1, len(starts) // PARTICLES)
-    place = robot.clamp(starts[: len(starts) // swarms * swarms]).reshape(swarms, -1, robot.dof)
+    places = robot.clamp(starts[: len(starts) // swarms * swarms]).reshape(swarms, -1, robot.dof)
 
-    before = place
-    own = place
-    least = np.full(place.shape[:2], np.inf)
+    places_before = places
+    best_places = places
+    best_costs = np.full(places.shape[:2], np.inf)
     each = np.arange(swarms)
 
     for iteration in range(iterations):
-        cost = _cost(robot, goal, place.reshape(-1, robot.dof)).reshape(least.shape)
-        better = cost < least
-        own = np.where(better[..., None], place, own)
-        least = np.minimum(cost, least)
-        leader = own[each, np.argmin(least, axis=1)]
+        cost = _cost(robot, goal, places.reshape(-1, robot.dof)).reshape(best_costs.shape)
+        better = cost < best_costs
+        best_places = np.where(better[..., None], places, best_places)
+        best_costs = np.minimum(cost, best_costs)
+        leader = best_places[each, np.argmin(best_costs, axis=1)]
 
         if goal.satisfied(robot, leader).any():
             return leader, iteration
 
-        moved = robot.clamp(move(rng, place, before, own, leader[:, None]))
-        before = place
-        place = moved
+        moved = robot.clamp(move(rng, places, places_before, best_places, leader[:, None]))
+        places_before = places
+        places = moved
 
     return leader, iterations
 
 
-def _with_velocity(rng: np.random.Generator, place: Swarms, before: Swarms, own: Swarms, leader: Swarms) -> Swarms:
-    to_own, to_leader = rng.uniform(0.0, ATTRACTION, (2, *place.shape))
-    moved: Swarms = place + CONSTRICTION * (place - before) + to_own * (own - place) + to_leader * (leader - place)
+def _with_velocity(
+    rng: np.random.Generator, places: Swarms, places_before: Swarms, best_places: Swarms, leader: Swarms
+) -> Swarms:
+    to_best, to_leader = rng.uniform(0.0, ATTRACTION, (2, *places.shape))
+    moved: Swarms = (
+        places
+        + CONSTRICTION * (places - places_before)
+        + to_best * (best_places - places)
+        + to_leader * (leader - places)
+    )
     return moved
 
 
-def _drawn(rng: np.random.Generator, place: Swarms, before: Swarms, own: Swarms, leader: Swarms) -> Swarms:
-    del before
-    drawn: Swarms = 0.5 * (own + leader) + np.abs(own - leader) * rng.standard_normal(place.shape)
+def _drawn(
+    rng: np.random.Generator, places: Swarms, places_before: Swarms, best_places: Swarms, leader: Swarms
+) -> Swarms:
+    del places_before
+    drawn: Swarms = 0.5 * (best_places + leader) + np.abs(best_places - leader) * rng.standard_normal(places.shape)
     return drawn
 
 

@@ -107,7 +107,7 @@ class GaRun:
         self.farthest: list[Vector] = []
         self.costs_farthest: list[int] = []
         self.nearest = robot.clamp(np.zeros(robot.dof))
-        self.least = np.inf
+        self.best_cost_of_farthest = np.inf
 
         self.begin()
 
@@ -125,9 +125,9 @@ class GaRun:
     def draw(self) -> None:
         """Draw a random population, and count anew for how long it stands still."""
         self.genes = random_genes(self.rng, self.options.population, self.robot.dof)
-        self.exact = np.zeros((0, self.robot.dof))  # refined individuals, not rounded to 16 bits: the first rows
+        self.refined_rows = np.zeros((0, self.robot.dof))  # refined individuals, not rounded to 16 bits: the first rows
         self.best = np.inf
-        self.standing = 0
+        self.generations_without_gain = 0
 
     @property
     def last(self) -> Vector | None:
@@ -137,7 +137,7 @@ class GaRun:
     def step(self) -> None:
         """One generation: score the population, then move on to the next point or breed."""
         Q = self.window.decode(self.genes)
-        Q[: len(self.exact)] = self.exact
+        Q[: len(self.refined_rows)] = self.refined_rows
         scored = score(self.robot, self.targets[len(self.points)], Q, self.last, self.options, self.will_do)
 
         self.generation += 1
@@ -148,7 +148,7 @@ class GaRun:
             self.advance(Q[int(np.argmin(np.where(scored.reached, scored.cost, np.inf)))])
         elif self.options.start_over is not None and self.since_point >= self.options.start_over:
             self.begin()
-        elif self.has_stalled(float(scored.cost.min())):
+        elif self.count_stall(float(scored.cost.min())):
             self.fresh += 1
             self.draw()
         else:
@@ -167,9 +167,9 @@ class GaRun:
         """Keep the best distance for the record, and the posture that came nearest to the farthest point so far."""
         best = int(np.argmin(scored.cost))
         self.distances.append(float(scored.distance[best]))
-        if len(self.points) >= len(self.farthest) and scored.cost[best] < self.least:
+        if len(self.points) >= len(self.farthest) and scored.cost[best] < self.best_cost_of_farthest:
             self.nearest = Q[best].copy()
-            self.least = float(scored.cost[best])
+            self.best_cost_of_farthest = float(scored.cost[best])
 
     def advance(self, q: Vector) -> None:
         """A point is gained: place the window for the next one; the bit strings stay as they are."""
@@ -177,36 +177,40 @@ class GaRun:
         self.points.append(q.copy())
         self.since_point = 0
         self.best = np.inf
-        self.standing = 0
-        self.exact = self.exact[:0]
+        self.generations_without_gain = 0
+        self.refined_rows = self.refined_rows[:0]
 
         if len(self.points) > len(self.farthest):
             self.farthest = self.points.copy()
             self.costs_farthest = self.costs.copy()
-            self.least = np.inf
+            self.best_cost_of_farthest = np.inf
 
         if self.options.window is not None:
             step = q - self.points[-2] if len(self.points) > 1 else 0.0
-            most = np.inf if self.options.largest_step is None else self.options.largest_step
-            centre = q + np.clip(self.gain * step, -most, most)
+            max_step = np.inf if self.options.largest_step is None else self.options.largest_step
+            centre = q + np.clip(self.gain * step, -max_step, max_step)
             self.window = around(self.robot, centre, self.options.window, gray=self.options.gray)
 
-    def has_stalled(self, cost: float) -> bool:
-        """Whether the best cost has not improved for as long as the options allow."""
+    def count_stall(self, cost: float) -> bool:
+        """Take note of the best cost of a generation.
+
+        Returns:
+            Whether it has not improved for as long as the options allow.
+        """
         if cost < self.best - (1.0 - IMPROVEMENT) * abs(self.best) or not np.isfinite(self.best):
             self.best = cost
-            self.standing = 0
+            self.generations_without_gain = 0
         else:
-            self.standing += 1
-        return self.options.stall is not None and self.standing >= self.options.stall
+            self.generations_without_gain += 1
+        return self.options.stall is not None and self.generations_without_gain >= self.options.stall
 
     def breed(self, Q: Matrix, scored: Score) -> None:
         """The next generation; the best individuals, if some are to be refined, take a damped Newton step into it."""
         self.genes = children(self.rng, self.genes, scored.cost, self.options)
         if self.options.refined:
             best = np.argsort(scored.cost, kind="stable")[: self.options.refined]
-            self.exact, _ = descend(self.robot, self.targets[len(self.points)], Q[best], iterations=1)
-            self.genes[: len(best)] = self.window.encode(self.exact)
+            self.refined_rows, _ = descend(self.robot, self.targets[len(self.points)], Q[best], iterations=1)
+            self.genes[: len(best)] = self.window.encode(self.refined_rows)
 
     def result(self, timed_out: bool) -> GeneticRun:
         """The attempt that came farthest."""

@@ -70,10 +70,10 @@ def descend(metric: TipMetric, Q: Matrix, lower: Vector, upper: Vector, *, itera
 def _stepped(q: Matrix, J: NDArray[np.float64], e: Matrix, lower: Vector, upper: Vector) -> Matrix:
     """One step of each row inside the bounds; joints that would leave them are held."""
     dq = bounded_step(J, e)
-    held = ((q <= lower) & (dq < 0.0)) | ((q >= upper) & (dq > 0.0))
-    again = held.any(axis=1)
+    pinned = ((q <= lower) & (dq < 0.0)) | ((q >= upper) & (dq > 0.0))
+    again = pinned.any(axis=1)
     if again.any():
-        dq[again] = bounded_step(J[again] * ~held[again][:, None], e[again])
+        dq[again] = bounded_step(J[again] * ~pinned[again][:, None], e[again])
     stepped: Matrix = np.clip(q + dq, lower, upper)
     return stepped
 

@@ -122,8 +122,8 @@ class ConfigurationMetric:
     def distance(self, Q: Matrix) -> Vector:
         """See :class:`Metric`."""
         self.evaluations += len(Q)
-        away: Vector = np.linalg.norm(Q[:, None] - self.goals, axis=2).min(axis=1)
-        return away
+        distances: Vector = np.linalg.norm(Q[:, None] - self.goals, axis=2).min(axis=1)
+        return distances
 
 
 def reach(robot: Robot) -> float:
@@ -133,5 +133,5 @@ def reach(robot: Robot) -> float:
 
 def _radius(target: Target, metres_per_radian: float) -> float:
     """Distance within which a target counts as reached [m]."""
-    near, turned = target.tolerances
-    return min(near, metres_per_radian * turned) if target.oriented else near
+    max_distance, max_angle = target.tolerances
+    return min(max_distance, metres_per_radian * max_angle) if target.oriented else max_distance

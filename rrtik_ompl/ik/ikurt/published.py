@@ -99,9 +99,9 @@ class PublishedSearch:
                 continue
 
             missed = 0
-            away = self._distance(q_new)
-            if away < self.tree.distance[near]:
-                near = self._add(q_new, near, away)
+            distance = self._distance(q_new)
+            if distance < self.tree.distance[near]:
+                near = self._add(q_new, near, distance)
                 q_near = q_new
 
             best = float(self.tree.distance[near])
@@ -125,8 +125,8 @@ class PublishedSearch:
         return float(self._metric.distance(q[None])[0])
 
     def _random(self) -> Vector:
-        room = self._steps.beyond * (self._upper - self._lower)
-        return self._rng.uniform(self._lower - room, self._upper + room)
+        margin = self._steps.beyond * (self._upper - self._lower)
+        return self._rng.uniform(self._lower - margin, self._upper + margin)
 
     def _add(self, q: Vector, parent: int, distance: float) -> int:
         return int(self.tree.add(q[None], np.array([parent]), np.array([distance]))[0])
@@ -134,7 +134,7 @@ class PublishedSearch:
 
 def _extend(a: Vector, b: Vector, step: float) -> Vector:
     """From a towards b by at most ``step`` [rad]."""
-    away = b - a
-    length = float(np.linalg.norm(away))
-    moved: Vector = b if length <= step else a + away * (step / length)
+    towards = b - a
+    length = float(np.linalg.norm(towards))
+    moved: Vector = b if length <= step else a + towards * (step / length)
     return moved

@@ -116,7 +116,7 @@ class BatchedSearch:
         self._dropped = 0
         self.blocked = starts[:0]
         self._nearest: Vector = starts[self._distances.argmin()]
-        self._least = float(self._distances.min())
+        self._least_distance = float(self._distances.min())
 
     @property
     def nearest(self) -> Vector:
@@ -131,7 +131,7 @@ class BatchedSearch:
 
     def run(self) -> Matrix | None:
         """The path to the goal, shape (k, n), or None if the time was up first."""
-        if self._least <= self._metric.radius:
+        if self._least_distance <= self._metric.radius:
             return self.tree.branch(int(self._distances.argmin()))
 
         explored = 1
@@ -165,18 +165,18 @@ class BatchedSearch:
             lower = self._downhill(vertex, step)
             step = max(step * (SHRUNK if lower is None else GROWN), shortest)
             vertex = vertex if lower is None else lower
-            away = self.tree.distance[vertex]
-            if away <= self._metric.radius:
+            distance = self.tree.distance[vertex]
+            if distance <= self._metric.radius:
                 path = self._finish(np.array([vertex]))
                 return self.tree.branch(vertex) if path is None else path
-            if away < NEARER * tried_at:
+            if distance < NEARER * tried_at:
                 path = self._finish(np.array([vertex]))
-                tried_at = away
+                tried_at = distance
 
             if number % PATIENCE == 0:
-                if away > (FALL if self._options.jacobian else SLOW_FALL) * before:
+                if distance > (FALL if self._options.jacobian else SLOW_FALL) * before:
                     break
-                before = away
+                before = distance
         self.tree.penalise(first, vertex)
         return path
 
@@ -224,9 +224,9 @@ class BatchedSearch:
         near = tree.nearest(samples)
         roots = tree.q[near]
         ends = roots.copy()
-        away = samples - roots
-        length = np.linalg.norm(away, axis=1)
-        step = away * np.minimum(1.0, self._options.stride / np.maximum(length, 1e-12))[:, None]
+        towards = samples - roots
+        length = np.linalg.norm(towards, axis=1)
+        step = towards * np.minimum(1.0, self._options.stride / np.maximum(length, 1e-12))[:, None]
         going = np.flatnonzero(length > 0.0)
         moved = np.zeros(SAMPLES, dtype=bool)
 
@@ -293,9 +293,9 @@ class BatchedSearch:
     def _see(self, Q: Matrix, distances: Vector) -> None:
         """Remember the nearest to the goal of some configurations."""
         k = distances.argmin()
-        if distances[k] < self._least:
+        if distances[k] < self._least_distance:
             self._nearest = Q[k].copy()
-            self._least = float(distances[k])
+            self._least_distance = float(distances[k])
 
     def _restart(self) -> None:
         self._see(self.tree.q, self.tree.distance)

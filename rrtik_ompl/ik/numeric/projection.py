@@ -44,34 +44,34 @@ def project(robot: Robot, region: TaskRegion, starts: Matrix, *, places: Matrix 
         Where each start has led to, in the region or not, shape (m, dof).
     """
     Q = robot.clamp(starts)
-    left = np.arange(len(starts))
+    going = np.arange(len(starts))  # rows that are not there yet, nor given up
     places = np.full((len(Q), 3), np.nan) if places is None else places
     scale = np.repeat([1.0 / reach_of(robot), PER_RADIAN], 3)[:, None]
-    mark = np.full(len(Q), np.inf)
+    error_at_last_check = np.full(len(Q), np.inf)  # squared
 
     for step in range(ITERATIONS):
-        tips = poses(robot, Q[left])
+        tips = poses(robot, Q[going])
         aims = region.nearest(tips)
-        slides = np.isnan(places[left, 0])
-        aims[:, :3] = np.where(slides[:, None], aims[:, :3], places[left])
+        slides = np.isnan(places[going, 0])
+        aims[:, :3] = np.where(slides[:, None], aims[:, :3], places[going])
         ends = region.poses(aims)
         twist = twist_between(tips, ends[:, :3, :3], ends[:, :3, 3])
-        square = ((twist * scale[:, 0]) ** 2).sum(axis=1)
+        squared_error = ((twist * scale[:, 0]) ** 2).sum(axis=1)
 
-        kept = ~_arrived(region, twist)
+        goes_on = ~_arrived(region, twist)
         if step % PATIENCE == 0:
-            kept &= square <= STALLED * mark[left]
-            mark[left] = square
-        left = left[kept]
-        aims = aims[kept]
-        twist = twist[kept]
-        square = square[kept]
-        if len(left) == 0:
+            goes_on &= squared_error <= STALLED * error_at_last_check[going]
+            error_at_last_check[going] = squared_error
+        going = going[goes_on]
+        aims = aims[goes_on]
+        twist = twist[goes_on]
+        squared_error = squared_error[goes_on]
+        if len(going) == 0:
             break
 
-        held = _held(region, aims, scale, slides[kept])
-        J = held @ (jacobians(robot, Q[left]) * scale)
-        Q[left] = robot.clamp(Q[left] + _step(J, held @ (twist[:, :, None] * scale), square))
+        held_directions = _projectors_onto_held(region, aims, scale, slides[goes_on])
+        J = held_directions @ (jacobians(robot, Q[going]) * scale)
+        Q[going] = robot.clamp(Q[going] + _step(J, held_directions @ (twist[:, :, None] * scale), squared_error))
 
     return Q
 
@@ -94,7 +94,7 @@ def projection(request: IkRequest) -> IkResponse:
     regions = [part.region() for part in request.goal.parts]
     found = np.zeros((0, robot.dof))
     nearest = request.near
-    least = np.inf
+    least_distance = np.inf
     timed_out = False
 
     for number in range(max(MAX_ROUNDS, len(regions))):
@@ -103,9 +103,9 @@ def projection(request: IkRequest) -> IkResponse:
         starts[0] = request.near
         rows = projected(robot, region, starts, rng)
         distance = region.distance(robot, rows)
-        if distance.min() < least:
+        if distance.min() < least_distance:
             nearest = rows[distance.argmin()]
-            least = distance.min()
+            least_distance = distance.min()
 
         found = np.vstack([found, rows[region.satisfied(robot, rows)]])
         if request.accept(found).any() and not request.all:
@@ -125,30 +125,30 @@ def _arrived(region: TaskRegion, twist: Matrix) -> Mask:
     return arrived
 
 
-def _held(region: TaskRegion, aims: Matrix, scale: Matrix, slides: Mask) -> NDArray[np.float64]:
+def _projectors_onto_held(region: TaskRegion, aims: Matrix, scale: Matrix, slides: Mask) -> NDArray[np.float64]:
     """Projectors of scaled twists of the tip onto what the region holds at aims, shape (m, 6): (m, 6, 6).
 
     Free are the twists of coordinates that lie inside their range; of positions only in rows that ``slides`` marks.
     """
     low, high = region.bounds.T
-    inside = ((low < aims) & (aims < high)) | (high - low >= TAU) & region.free
-    inside[:, :3] &= slides[:, None]
+    is_free = ((low < aims) & (aims < high)) | (high - low >= TAU) & region.free
+    is_free[:, :3] &= slides[:, None]
 
     R = region.T_world_w.rotation
     tips = region.poses(aims)[:, :3, 3]
-    about = tips - (region.T_world_w.translation + aims[:, :3] @ R.T)
+    levers = tips - (region.T_world_w.translation + aims[:, :3] @ R.T)
     # axes of pitch and roll, turned by the angles that are applied after them
     pitched = rpy_matrices(aims[:, 3:] * [0, 0, 1])[:, :, 1]
     rolled = rpy_matrices(aims[:, 3:] * [0, 1, 1])[:, :, 0]
     axes = np.stack([rolled, pitched, np.tile([0.0, 0.0, 1.0], (len(aims), 1))], axis=2)
 
-    freed = np.zeros((len(aims), 6, 6))
-    freed[:, :3, :3] = R
-    freed[:, 3:, 3:] = R @ axes
-    freed[:, :3, 3:] = np.cross(freed[:, 3:, 3:], about[:, :, None], axis=1)
-    freed = freed * scale * inside[:, None, :]
+    free_twists = np.zeros((len(aims), 6, 6))
+    free_twists[:, :3, :3] = R
+    free_twists[:, 3:, 3:] = R @ axes
+    free_twists[:, :3, 3:] = np.cross(free_twists[:, 3:, 3:], levers[:, :, None], axis=1)
+    free_twists = free_twists * scale * is_free[:, None, :]
 
-    held: NDArray[np.float64] = np.eye(6) - freed @ np.linalg.pinv(freed)
+    held: NDArray[np.float64] = np.eye(6) - free_twists @ np.linalg.pinv(free_twists)
     return held
 
 

@@ -51,18 +51,18 @@ class Tracker:
         last = near
         steps = 0
         while point < len(q) and time.monotonic() <= self.deadline:
-            begun, taken = self.fresh(self.targets[point], last)
+            first_solutions, taken = self.fresh(self.targets[point], last)
             steps += taken
-            if len(begun) == 0:
+            if len(first_solutions) == 0:
                 point += 1
                 continue
 
-            ways, taken = self.carry(begun, point)
+            tracks, taken = self.carry(first_solutions, point)
             steps += taken
-            travel = np.abs(joint_difference(self.robot, ways[1:], ways[:-1])).sum(axis=(0, 2))
+            travel = np.abs(joint_difference(self.robot, tracks[1:], tracks[:-1])).sum(axis=(0, 2))
             if last is not None:
-                travel += np.abs(joint_difference(self.robot, ways[0], last)).sum(axis=1)
-            best = ways[:, int(np.argmin(travel))]
+                travel += np.abs(joint_difference(self.robot, tracks[0], last)).sum(axis=1)
+            best = tracks[:, int(np.argmin(travel))]
 
             q[point : point + len(best)] = best
             point += len(best)
@@ -82,29 +82,29 @@ class Tracker:
             if len(Q) or time.monotonic() > self.deadline:
                 break
 
-        away = np.zeros(len(Q)) if last is None else np.linalg.norm(joint_difference(self.robot, Q, last), axis=1)
-        kept = different_rows(Q, np.argsort(away, kind="stable"))[:CARRIED]
-        return Q[kept], steps
+        distance = np.zeros(len(Q)) if last is None else np.linalg.norm(joint_difference(self.robot, Q, last), axis=1)
+        different = different_rows(Q, np.argsort(distance, kind="stable"))[:CARRIED]
+        return Q[different], steps
 
     def carry(self, begun: Matrix, point: int) -> tuple[NDArray[np.float64], int]:
         """Follow the trajectory from solutions of a point until none can go on; shape (points, survivors, dof)."""
-        ways = begun[None]
+        tracks = begun[None]
         steps = 0
         for target in self.targets[point + 1 :]:
             if time.monotonic() > self.deadline:
                 break
-            now = ways[-1]
-            ahead = 2.0 * now - ways[-2] if len(ways) > 1 else now
-            Q, taken = descend(self.robot, target, ahead)
+            current = tracks[-1]
+            guess = 2.0 * current - tracks[-2] if len(tracks) > 1 else current
+            Q, taken = descend(self.robot, target, guess)
             steps += taken
-            moved = np.abs(joint_difference(self.robot, Q, now)).max(axis=1)
-            alive = target.satisfied(self.robot, Q) & (moved <= self.jump)
-            alive[alive] = self.accept(Q[alive])
-            if not alive.any():
+            moved = np.abs(joint_difference(self.robot, Q, current)).max(axis=1)
+            goes_on = target.satisfied(self.robot, Q) & (moved <= self.jump)
+            goes_on[goes_on] = self.accept(Q[goes_on])
+            if not goes_on.any():
                 break
 
-            ways = np.concatenate([ways[:, alive], Q[None, alive]])
-        return ways, steps
+            tracks = np.concatenate([tracks[:, goes_on], Q[None, goes_on]])
+        return tracks, steps
 
     def good(self, target: TipGoal, Q: Matrix) -> Matrix:
         """The rows that are at the target and will do."""

@@ -77,10 +77,10 @@ def reach_map(
     counted = 0
 
     for points, pointing, quality in _samples(robot, world, counter, "xyz".index(axis), count, rng):
-        places = np.floor((points - corner) / size).astype(int)
-        inside = ((places >= 0) & (places < shape)).all(axis=1)
-        cells = np.ravel_multi_index(tuple(places[inside].T), shape)
-        counter.add(cells, pointing[inside], quality[inside])
+        cells_of_points = np.floor((points - corner) / size).astype(int)
+        in_grid = ((cells_of_points >= 0) & (cells_of_points < shape)).all(axis=1)
+        cells = np.ravel_multi_index(tuple(cells_of_points[in_grid].T), shape)
+        counter.add(cells, pointing[in_grid], quality[in_grid])
         counted += len(cells)
 
     return ReachMap(robot.name, measure, frozen(corner), size, frozen(counter.values.reshape(shape)), counted, base)
