@@ -158,9 +158,9 @@ def _in_ompl(
     name = getattr(factory, "__name__", str(factory))
     traits = traits_of(factory)
     seconds = max(budget.left, 0.0)
-    most = np.inf if budget.iterations is None else budget.iterations * MOTIONS_PER_ITERATION
+    max_motions = np.inf if budget.iterations is None else budget.iterations * MOTIONS_PER_ITERATION
 
-    validity = ValidityCallback(problem.world, most_motions=most)
+    validity = ValidityCallback(problem.world, most_motions=max_motions)
     si = space_information(problem, goals, validity)
     definition = problem_definition(problem, goals, si)
     with _named(name):
@@ -180,12 +180,13 @@ def _in_ompl(
 
     _raise_failure(planner, name, status, validity.error)
     rows = exact_path(definition, si)
-    if rows is None and validity.late and status in INVALID:  # only because all answers were no by then
+    ends_refused_for_lack_of_time = rows is None and validity.late and status in INVALID  # all answers were no by then
+    if ends_refused_for_lack_of_time:
         status = ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
 
-    begin = time.perf_counter()
+    counting_began = time.perf_counter()
     graph = _graph(planner, si) if factory in OMPL_TRAITS and traits.has_graph else {}
-    return Attempt(rows, str(status), {**validity.counts(), **graph}, counting=time.perf_counter() - begin)
+    return Attempt(rows, str(status), {**validity.counts(), **graph}, counting=time.perf_counter() - counting_began)
 
 
 @contextmanager
@@ -200,17 +201,21 @@ def _named(name: str) -> Iterator[None]:
     except (RrtikError, MemoryError):  # a campaign has a status of its own for the latter
         raise
     except (Exception, SystemExit) as error:
-        at = traceback.extract_tb(error.__traceback__)[-1]
+        innermost_frame = traceback.extract_tb(error.__traceback__)[-1]
         error.__traceback__ = None  # its frames would keep OMPL's objects alive
-        said = str(error) if type(error) is RuntimeError else f"{type(error).__name__}: {error}".removesuffix(": ")
-        place = "" if at.filename == __file__ else f" ({Path(at.filename).name}, line {at.lineno})"
-        raise PlannerError(f"planner {name} broke: {said}{place}") from None
+        message = str(error) if type(error) is RuntimeError else f"{type(error).__name__}: {error}".removesuffix(": ")
+        place = ""
+        if innermost_frame.filename != __file__:
+            place = f" ({Path(innermost_frame.filename).name}, line {innermost_frame.lineno})"
+        raise PlannerError(f"planner {name} broke: {message}{place}") from None
 
 
 def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:
     """The straight motion from the start to the nearest goal if it is free, shape (2, n): no path is shorter."""
     nearest = goals[np.linalg.norm(goals - problem.start, axis=1).argmin()]
-    return np.stack([problem.start, nearest]) if problem.world.motion_valid(problem.start, nearest) else None
+    if not problem.world.motion_valid(problem.start, nearest):
+        return None
+    return np.stack([problem.start, nearest])
 
 
 @contextmanager

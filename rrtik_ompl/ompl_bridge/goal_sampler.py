@@ -65,9 +65,9 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         super().__init__(si)
         self._problem = problem
         self._io = io
-        self._most = most
-        self._given = 0
-        self._seen = 0
+        self._max_configurations = most
+        self._num_given = 0  # to planners
+        self._num_seen = 0  # rows of the search that have been asked for their validity
         self._rows: Matrix = frozen(np.zeros((0, robot.dof)))
 
         self._search = GoalSearch(problem, np.random.default_rng(whole_number(seed, "seed")))
@@ -76,16 +76,16 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     @property
     def rows(self) -> Matrix:
         """The configurations found so far that the space information takes, shape (k, dof)."""
-        new = self._search.rows[self._seen :]
-        self._seen += len(new)
+        new = self._search.rows[self._num_seen :]
+        self._num_seen += len(new)
         if len(new):
-            self._rows = frozen(np.vstack([self._rows, new[self._usable(new)]])[: self._most])
+            self._rows = frozen(np.vstack([self._rows, new[self._usable(new)]])[: self._max_configurations])
         return self._rows
 
     @property
     def exhausted(self) -> bool:
         """Whether there are no others than :attr:`rows`."""
-        return self._search.exhausted or len(self.rows) >= self._most
+        return self._search.exhausted or len(self.rows) >= self._max_configurations
 
     @property
     def reason(self) -> str:
@@ -95,11 +95,15 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         return "the configurations found are out of the bounds of the state space, or invalid to its checker"
 
     def more(self) -> bool:
-        """Look for further configurations, for one round; whether there are any."""
-        known = len(self.rows)
+        """Look for further configurations, for one round.
+
+        Returns:
+            Whether there are any.
+        """
+        num_known = len(self.rows)
         if not self.exhausted:
             self._search.more()
-        return len(self.rows) > known
+        return len(self.rows) > num_known
 
     def states(self, most: int = 1) -> ob.GoalStates:
         """The first configurations as ``ompl.base.GoalStates``, which OMPL samples without the interpreter.
@@ -116,15 +120,15 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
 
     def sampleGoal(self, state: ob.State) -> None:
         """Write the next configuration into a state, the first again after the last; called by OMPL."""
-        if self._given >= len(self.rows):
+        if self._num_given >= len(self.rows):
             self.more()
         if len(self.rows):
-            self._io.write(state, self.rows[self._given % len(self.rows)])
-            self._given += 1
+            self._io.write(state, self.rows[self._num_given % len(self.rows)])
+            self._num_given += 1
 
     def maxSampleCount(self) -> int:
         """How many configurations there may be; called by OMPL."""
-        return len(self.rows) if self.exhausted or len(self.rows) == 0 else self._most
+        return len(self.rows) if self.exhausted or len(self.rows) == 0 else self._max_configurations
 
     def couldSample(self) -> bool:
         """Whether there is any: nothing is computed beside OMPL, so that it need not wait for one; called by OMPL."""

@@ -100,8 +100,8 @@ class _Clearance(_Objective):
 
     def cost(self, a: Vector, b: Vector) -> float:
         middles = a + (np.arange(STEPS)[:, None] + 0.5) / STEPS * (b - a)
-        room = [max(self._world.clearance(q), NEAREST) for q in middles]
-        return float(np.linalg.norm(b - a) * np.mean(1.0 + self._weight / np.array(room)))
+        clearances = [max(self._world.clearance(q), NEAREST) for q in middles]
+        return float(np.linalg.norm(b - a) * np.mean(1.0 + self._weight / np.array(clearances)))
 
 
 class _Moves(_Objective):

@@ -51,8 +51,9 @@ def planner_of_file(name: str) -> PlannerFactory:
     module = _module(path.resolve())
     found: Any = getattr(module, wanted, None)
     if found is None:
-        own = [key for key, value in vars(module).items() if _is_planner(value) and inspect.getmodule(value) is module]
-        raise UnknownNameError(f"planner in {file}", wanted, own)
+        planners = {key: value for key, value in vars(module).items() if _is_planner(value)}
+        planners_of_module = [key for key, value in planners.items() if inspect.getmodule(value) is module]
+        raise UnknownNameError(f"planner in {file}", wanted, planners_of_module)
     if not _is_planner(found):
         raise InputError(f"planner '{name}': {wanted} is not a class derived from ompl.base.Planner")
     return found  # type: ignore[no-any-return]

@@ -48,7 +48,7 @@ def starts_and_goals(
 
 
 def _refuse_other_spaces(definition: ob.ProblemDefinition, dof: int) -> None:
-    """States of another space would be read and written beyond their memory."""
+    """Refuse a goal or an objective of another space: its states would be read and written beyond their memory."""
     for what, part in (("goal", definition.getGoal()), ("objective", definition.getOptimizationObjective())):
         count = dof if part is None else part.getSpaceInformation().getStateDimension()
         if count != dof:
@@ -56,6 +56,7 @@ def _refuse_other_spaces(definition: ob.ProblemDefinition, dof: int) -> None:
 
 
 def _starts(inputs: ob.PlannerInputStates, io: StateIO) -> list[Vector]:
+    """All valid starts, each once, shapes (n,)."""
     rows = []
     while inputs.haveMoreStartStates():
         state = inputs.nextStart()  # borrowed; None if invalid
@@ -100,7 +101,9 @@ def _goals(inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, stop: Stop
 
 def _different(rows: list[Vector]) -> list[Vector]:
     """The rows in their order, each once."""
-    return rows if len(rows) < 2 else list({row.tobytes(): row for row in rows}.values())
+    if len(rows) < 2:
+        return rows
+    return list({row.tobytes(): row for row in rows}.values())
 
 
 def usable(starts: Matrix, goals: Matrix | None, free: Mask) -> tuple[Matrix, Matrix]:
@@ -114,15 +117,15 @@ def usable(starts: Matrix, goals: Matrix | None, free: Mask) -> tuple[Matrix, Ma
     Raises:
         IllPosed: If there is none.
     """
-    kept = starts[free[: len(starts)]]
-    if len(kept) == 0:
+    free_starts = starts[free[: len(starts)]]
+    if len(free_starts) == 0:
         raise IllPosed(ob.PlannerStatus.INVALID_START, f"no valid start: {NONE_USABLE}")
     if goals is None:
-        return kept, starts[:0]
-    aims = goals[free[len(starts) :]]
-    if len(aims) == 0:
+        return free_starts, starts[:0]
+    free_goals = goals[free[len(starts) :]]
+    if len(free_goals) == 0:
         raise IllPosed(ob.PlannerStatus.INVALID_GOAL, f"no valid goal: {NONE_USABLE}")
-    return kept, aims
+    return free_starts, free_goals
 
 
 def condition_of(ptc: ob.PlannerTerminationCondition | Callable[[], object] | float) -> Stop:

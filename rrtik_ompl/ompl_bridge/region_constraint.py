@@ -32,21 +32,21 @@ class RegionConstraint(ob.Constraint):  # type: ignore[misc]  # OMPL has no type
     """
 
     def __init__(self, problem: Problem) -> None:
-        held = problem.world.constraints
-        if held is None:
+        constraints = problem.world.constraints
+        if constraints is None:
             raise InputError("problem: it has no path constraints")
 
-        super().__init__(problem.robot.dof, equation_count(held), 1.0)
+        super().__init__(problem.robot.dof, equation_count(constraints), 1.0)
         self._robot = problem.robot
-        self._held = held
+        self._constraints = constraints
 
     def function(self, x: Vector, out: Vector) -> None:
         """Write the values of the equations at x, shape (dof,)."""
-        out[:] = equations(self._robot, self._held, np.array(x))[0]
+        out[:] = equations(self._robot, self._constraints, np.array(x))[0]
 
     def jacobian(self, x: Vector, out: Matrix) -> None:
         """Write their derivatives, shape (k, dof)."""
-        out[:] = equations(self._robot, self._held, np.array(x))[1]
+        out[:] = equations(self._robot, self._constraints, np.array(x))[1]
 
 
 class ProjectedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
@@ -57,36 +57,40 @@ class ProjectedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no
 
     def __init__(self, si: ob.SpaceInformation, problem: Problem, constraint: RegionConstraint) -> None:
         super().__init__(si)
-        self._held = problem.world
-        self._free = problem.world.unheld
+        self._world = problem.world
+        self._world_without_constraints = problem.world.unheld
         self._constraint = constraint
         self._states = StateIO(si)
 
     def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
         """Whether the motion between two states keeps to the constraint, is free, and arrives; called by OMPL."""
-        at = self._states.read(first)
+        here = self._states.read(first)
         end = self._states.read(second)
-        left = whole = float(np.linalg.norm(end - at))
-        gone = 0.0
+        distance = float(np.linalg.norm(end - here))
+        distance_left = distance
+        travelled = 0.0
 
-        while left > STEP:
-            new = at + STEP / left * (end - at)
+        while distance_left > STEP:
+            new = here + STEP / distance_left * (end - here)
             if not self._constraint.project(new):
                 return False
 
-            step = float(np.linalg.norm(new - at))
-            nearer = float(np.linalg.norm(end - new))
-            gone += step
-            if max(step / STEP, gone / whole) > DETOUR or nearer >= left or not self._checked(at, new):
+            step = float(np.linalg.norm(new - here))
+            travelled += step
+            new_distance_left = float(np.linalg.norm(end - new))
+            is_detour = max(step / STEP, travelled / distance) > DETOUR
+            comes_no_nearer = new_distance_left >= distance_left
+            if is_detour or comes_no_nearer or not self._step_valid(here, new):
                 return False
 
-            at = new
-            left = nearer
+            here = new
+            distance_left = new_distance_left
 
-        return self._checked(at, end)
+        return self._step_valid(here, end)
 
-    def _checked(self, a: Vector, b: Vector) -> bool:
-        return bool(self._held.valid(b) and self._free.motion_valid(a, b))
+    def _step_valid(self, a: Vector, b: Vector) -> bool:
+        """Whether a step, shapes (n,), is free, and its end keeps to the constraint too."""
+        return bool(self._world.valid(b) and self._world_without_constraints.motion_valid(a, b))
 
 
 def projected_space(problem: Problem, lower: Vector, upper: Vector) -> ob.ConstrainedSpaceInformation:

@@ -108,7 +108,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.graph_wanted = False
         self._graph: PlannerGraph | None = None
         self._world = world
-        self._judge: World | None = None  # whose second check a path has to stand
+        self._second_check_world: World | None = None  # whose second check a path has to pass, during `solve`
         self._states: StateIO | None = None
         self._bounds: tuple[Vector, Vector] | None = None
 
@@ -185,7 +185,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             ``ompl.base.PlannerStatus``.
         """
         self.graph_wanted = True
-        status, _ = self._searched(lambda: self._in_ompl(condition_of(ptc)))
+        status, _ = self._run_search(lambda: self._in_ompl(condition_of(ptc)))
         return ob.PlannerStatus(status)
 
     def solve_rows(
@@ -205,9 +205,12 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         """
         self._bounds = bounds
         self.graph_wanted = False
-        status, found = self._searched(lambda: self._between(starts, goals, stop, known_free=checked))
-        exact = found is not None and found.difference <= 0.0
-        return ob.PlannerStatus(status), found.path if found is not None and exact else None
+        status, found = self._run_search(
+            lambda: self._search_between_free_ends(starts, goals, stop, known_free=checked)
+        )
+        if found is None or found.difference > 0.0:
+            return ob.PlannerStatus(status), None
+        return ob.PlannerStatus(status), found.path
 
     def clear(self) -> None:
         """Forget the last attempt; called by OMPL."""
@@ -223,7 +226,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
         `plan()` makes that check itself, of the last path.
         """
-        return bool(checker.motion_valid_batch(rows[:-1], rows[1:]).all()) and not _refusal(self._judge, rows)
+        motions_are_free = bool(checker.motion_valid_batch(rows[:-1], rows[1:]).all())
+        return motions_are_free and not _refusal_of_second_check(self._second_check_world, rows)
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds, shapes (n,), read-only, as they were when ``solve`` was last called.
@@ -239,12 +243,17 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
     @property
     def _io(self) -> StateIO:
+        """Copies states, made when it is first used."""
         if self._states is None:
             self._states = StateIO(self.getSpaceInformation())  # holds the space, which knows nothing of planners
         return self._states
 
-    def _searched(self, search: Callable[[], SearchResult]) -> tuple[ob.PlannerStatus, SearchResult | None]:
-        """The status of a search and what it brought back, if it did not break off."""
+    def _run_search(self, search: Callable[[], SearchResult]) -> tuple[ob.PlannerStatus, SearchResult | None]:
+        """Do a search, and take note of why it could not be done or broke off.
+
+        Returns:
+            OMPL's status, and what the search brought back; None if it could not be done or broke off.
+        """
         self._forget()
         try:
             found = search()
@@ -261,6 +270,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return status_of(found), found
 
     def _forget(self) -> None:
+        """Set back all that is said of the last ``solve``."""
         self.statistics = {}
         self.error = None
         self.failure = None
@@ -281,48 +291,51 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
         inputs = self.getPlannerInputStates()
         aimless = not self.needs_goals()
-        begun = time.perf_counter()
+        began = time.perf_counter()
         ends = starts_and_goals(inputs, pdef, self._io, ptc, aimless=aimless)
 
-        line = Unrolled(*ends, self._io.turning) if self._io.turns else None
-        if line is not None:
-            ends = (line.starts, line.goals)
-            self._bounds = line.bounds(*self._bounds)
+        unrolled = Unrolled(*ends, self._io.turning) if self._io.turns else None
+        if unrolled is not None:
+            ends = (unrolled.starts, unrolled.goals)
+            self._bounds = unrolled.bounds(*self._bounds)
 
-        found = self._judged_search(*ends, ptc, line)
+        found = self._search_until_accepted(*ends, ptc, unrolled)
         if found.path is None and isinstance(pdef.getGoal(), GoalSampler):
             pdef.getGoal().more()  # for the next attempt
-        found = self._kept(found, ends[1], time.perf_counter() - begun)
+        found = self._remember(found, ends[1], time.perf_counter() - began)
 
-        if found.difference > 0.0 and _refusal(self._world, found.path, line):
+        is_approximate = found.difference > 0.0
+        if is_approximate and _refusal_of_second_check(self._world, found.path, unrolled):
             found = replace(found, path=None)
         if found.path is not None:
-            path = self._io.path(si, found.path if line is None else line.path(found.path))
-            pdef.addSolutionPath(path, found.difference > 0.0, float(found.difference), self.getName())
+            path = self._io.path(si, found.path if unrolled is None else unrolled.path(found.path))
+            pdef.addSolutionPath(path, is_approximate, float(found.difference), self.getName())
 
         return found
 
-    def _judged_search(self, starts: Matrix, goals: Matrix, stop: Stop, line: Unrolled | None) -> SearchResult:
+    def _search_until_accepted(
+        self, starts: Matrix, goals: Matrix, stop: Stop, unrolled: Unrolled | None
+    ) -> SearchResult:
         """A search, begun anew as long as the second check of a given world refuses its path.
 
         From the second one on, and for planners that improve, motions are checked as densely as by the second check.
         """
         world = self._world
         if not isinstance(world, World):  # the space information has the last word
-            return self._between(starts, goals, stop)
+            return self._search_between_free_ends(starts, goals, stop)
 
         dense = world.with_resolution(verification_resolution(world))
-        self._judge = world
+        self._second_check_world = world
         try:
             for number in range(SEARCHES):
                 self._world = dense if self.anytime or number > 0 else world
-                found = self._between(starts, goals, stop)
-                refusal = _refusal(world, found.path, line)
+                found = self._search_between_free_ends(starts, goals, stop)
+                refusal = _refusal_of_second_check(world, found.path, unrolled)
                 if not refusal or stop():
                     break
         finally:
             self._world = world
-            self._judge = None
+            self._second_check_world = None
 
         if not refusal:
             return found
@@ -330,23 +343,29 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.reason = f"no path stood: {refusal}"
         return replace(found, path=None, difference=0.0, reason=self.reason)
 
-    def _kept(self, found: SearchResult, goals: Matrix, seconds: float) -> SearchResult:
-        """What was found, or the nearest approach to it; graph and progress are kept."""
+    def _remember(self, found: SearchResult, goals: Matrix, seconds: float) -> SearchResult:
+        """Take note of the graph and the progress of a search.
+
+        Returns:
+            What was found; without a path, the nearest approach to a goal that the graph has, if any.
+        """
         if found.path is None:
             self._graph = found.graph
-            near = None if found.graph is None or len(goals) == 0 else nearest_approach(found.graph, goals)
-            return found if near is None else replace(found, path=near[0], difference=near[1])
+            approach = None if found.graph is None or len(goals) == 0 else nearest_approach(found.graph, goals)
+            return found if approach is None else replace(found, path=approach[0], difference=approach[1])
 
         self._graph = found.graph or graph_of_path(found.path)
         if found.difference <= 0.0:
             self.progress = found.progress or ((seconds, route_length(found.path)),)
         return found
 
-    def _between(self, starts: Matrix, goals: Matrix, stop: Stop, *, known_free: bool = False) -> SearchResult:
+    def _search_between_free_ends(
+        self, starts: Matrix, goals: Matrix, stop: Stop, *, known_free: bool = False
+    ) -> SearchResult:
         """Search between those starts and goals, shapes (s, n) and (g, n), that are free."""
         checker = SpaceChecker(self.getSpaceInformation()) if self._world is None else WorldChecker(self._world)
-        given = known_free and len(goals) > 0 and self.needs_goals()
-        ends = (starts, goals) if given else self._free_ends(starts, goals, checker)
+        ends_are_free = known_free and len(goals) > 0 and self.needs_goals()
+        ends = (starts, goals) if ends_are_free else self._free_ends(starts, goals, checker)
 
         found = self.search(*ends, checker, stop)
         checked = {"checked_states": checker.checked_states, "checked_motions": checker.checked_motions}
@@ -362,10 +381,13 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return usable(starts, goals, free)
 
 
-def _refusal(world: object, rows: Matrix | None, line: Unrolled | None = None) -> str:
+def _refusal_of_second_check(world: object, rows: Matrix | None, unrolled: Unrolled | None = None) -> str:
     """Why a world's second check refuses a path, shape (k, n), in a line; "" if it does not, or there is no path."""
     if rows is None or not isinstance(world, World):
         return ""
-    rows = rows if line is None else line.divided(rows)
-    found = route_violations(world, rows if len(rows) > 1 else rows.repeat(2, axis=0), verification_resolution(world))
+    if unrolled is not None:
+        rows = unrolled.divided(rows)
+    if len(rows) == 1:
+        rows = rows.repeat(2, axis=0)  # a motion of no length
+    found = route_violations(world, rows, verification_resolution(world))
     return found[0].reason if found else ""

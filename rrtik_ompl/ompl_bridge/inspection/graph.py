@@ -120,20 +120,20 @@ def graph_of_path(path: Matrix) -> PlannerGraph:
     return graph_of(path, np.stack([steps, steps + 1], axis=1), [0], [len(path) - 1])
 
 
-def without(rows: Matrix, parents: NDArray[np.integer], kept: NDArray[np.bool_]) -> Tree:
+def without(rows: Matrix, parents: NDArray[np.integer], is_kept: NDArray[np.bool_]) -> Tree:
     """A tree without the vertices that are not kept and those below them."""
-    sound = kept.copy()
-    above = np.where(parents < 0, 0, parents)
+    remains = is_kept.copy()
+    parent_or_0 = np.where(parents < 0, 0, parents)
 
     # A round drops the children of those that the one before it dropped.
     while True:
-        left = sound & ((parents < 0) | sound[above])
-        if (left == sound).all():
+        still_remains = remains & ((parents < 0) | remains[parent_or_0])
+        if (still_remains == remains).all():
             break
-        sound = left
+        remains = still_remains
 
-    numbers = np.cumsum(sound) - 1
-    return rows[sound], np.where(parents < 0, -1, numbers[above])[sound]
+    numbers = np.cumsum(remains) - 1
+    return rows[remains], np.where(parents < 0, -1, numbers[parent_or_0])[remains]
 
 
 def nearest_approach(graph: PlannerGraph, goals: Matrix) -> tuple[Matrix, float] | None:
@@ -146,39 +146,39 @@ def nearest_approach(graph: PlannerGraph, goals: Matrix) -> tuple[Matrix, float]
     Returns:
         The way, shape (k, n), and the distance [unit of the space]; None if nothing is nearer than a start.
     """
-    came = _reached(graph)
-    if not came:
+    predecessors = _predecessors(graph)
+    if not predecessors:
         return None
 
-    numbers = np.fromiter(came, dtype=np.int64)
+    numbers = np.fromiter(predecessors, dtype=np.int64)
     gaps = np.linalg.norm(graph.vertices[numbers][:, None] - goals[None], axis=2).min(axis=1)
     vertex = int(numbers[gaps.argmin()])
-    away = float(gaps.min())
-    if came[vertex] < 0 or away == 0.0:
+    distance = float(gaps.min())
+    if predecessors[vertex] < 0 or distance == 0.0:
         return None
 
-    way = [vertex]
-    while came[way[-1]] >= 0:
-        way.append(came[way[-1]])
-    return graph.vertices[way[::-1]].copy(), away
+    vertices = [vertex]
+    while predecessors[vertices[-1]] >= 0:
+        vertices.append(predecessors[vertices[-1]])
+    return graph.vertices[vertices[::-1]].copy(), distance
 
 
-def _reached(graph: PlannerGraph) -> dict[int, int]:
+def _predecessors(graph: PlannerGraph) -> dict[int, int]:
     """The vertices to which edges lead from a start, each with the one before it, -1 for a start."""
     leaving: dict[int, list[int]] = {}
     for first, second in graph.edges.tolist():
         leaving.setdefault(first, []).append(second)
 
-    came = dict.fromkeys(graph.starts.tolist(), -1)
-    waiting = deque(came)
+    predecessors = dict.fromkeys(graph.starts.tolist(), -1)
+    waiting = deque(predecessors)
 
     while waiting:
         vertex = waiting.popleft()
         for head in leaving.get(vertex, ()):
-            if head not in came:
-                came[head] = vertex
+            if head not in predecessors:
+                predecessors[head] = vertex
                 waiting.append(head)
-    return came
+    return predecessors
 
 
 def _graph_ml(graph: PlannerGraph) -> Iterator[str]:
