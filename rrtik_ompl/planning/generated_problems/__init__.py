@@ -58,9 +58,9 @@ def generated_problem(robot: Robot, family: str, seed: int, *, motion_resolution
     whole_number(seed, "seed")
 
     rng = np.random.default_rng([list(FAMILIES).index(family), int(seed)])
-    alone = World(robot)
+    empty_world = World(robot)
     reach = _reach(robot)
-    goals = _goals(alone, reach, rng)
+    goals = _goals(empty_world, reach, rng)
 
     for number in range(DRAWS):
         goal, place = next(goals)
@@ -96,25 +96,25 @@ def _postures(robot: Robot, count: int, rng: np.random.Generator) -> Matrix:
     return np.asarray(rng.uniform(lower, upper, (count, robot.dof)))
 
 
-def _goals(alone: World, reach: float, rng: np.random.Generator) -> Iterator[tuple[Vector, Any]]:
+def _goals(empty_world: World, reach: float, rng: np.random.Generator) -> Iterator[tuple[Vector, Any]]:
     """Postures in which the forearm points outwards, and the place of the tip; see the families. Without end."""
-    robot = alone.robot
+    robot = empty_world.robot
     base = _base(robot)
     while True:
         rows = _postures(robot, POSTURES, rng)
-        rows = rows[alone.valid_batch(rows)]
+        rows = rows[empty_world.valid_batch(rows)]
 
         frames = robot.joint_frames(rows)
         tips = robot.fk_batch(rows)[:, :3, 3]
         elbow = frames[:, (len(robot.chain.parent) + 1) // 2, :3, 3]
-        away = tips - base
+        outwards = tips - base
 
-        for row, tip, joint, way, axis in zip(rows, tips, elbow, away, frames[:, 1, :3, 2], strict=True):
+        for row, tip, joint, outward, axis in zip(rows, tips, elbow, outwards, frames[:, 1, :3, 2], strict=True):
             forearm = tip - joint
-            distance = float(np.linalg.norm(way))
+            distance = float(np.linalg.norm(outward))
             length = np.linalg.norm(forearm)
-            near_enough = MIN_DISTANCE * reach < distance < MAX_DISTANCE * reach and way[2] > MIN_HEIGHT * reach
-            if near_enough and length > 1e-3 * reach and forearm @ way > OUTWARD * distance * length:
+            is_in_range = MIN_DISTANCE * reach < distance < MAX_DISTANCE * reach and outward[2] > MIN_HEIGHT * reach
+            if is_in_range and length > 1e-3 * reach and forearm @ outward > OUTWARD * distance * length:
                 yield row, pin.SE3(_axes(forearm, axis), tip)
 
 
@@ -146,9 +146,15 @@ def _solvable(problem: Problem) -> bool:
     """Whether one of the planners that prove it finds a path."""
     return any(
         plan(
-            problem, name, seconds=PATIENCE, seed=0, restarts=0, parameters={"max_iterations": most}, proof="off"
+            problem,
+            name,
+            seconds=PATIENCE,
+            seed=0,
+            restarts=0,
+            parameters={"max_iterations": max_iterations},
+            proof="off",
         ).found
-        for name, most in _proofs()
+        for name, max_iterations in _proofs()
     )
 
 

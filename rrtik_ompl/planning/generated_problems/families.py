@@ -18,7 +18,7 @@ from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 Solids: TypeAlias = list[tuple[Shape, Any]]  # shapes and their poses in the frame of the place, in shares of the reach
-Builder: TypeAlias = Callable[[np.random.Generator, float], Solids]  # of a random stream and the room: 1 or more
+Builder: TypeAlias = Callable[[np.random.Generator, float], Solids]  # of a random stream and the spacing: 1 or more
 
 THICKNESS = 0.03  # of boards and plates
 BARS = 0.02  # half the thickness of a frame's bars
@@ -32,15 +32,15 @@ def _board(low: tuple[float, float, float], high: tuple[float, float, float]) ->
     return Box(corners[1] - corners[0]), pin.SE3(np.eye(3), corners.mean(axis=0))
 
 
-def panel(rng: np.random.Generator, room: float) -> Solids:
+def panel(rng: np.random.Generator, spacing: float) -> Solids:
     """A board behind the tip with a shelf below it, a wall on one side, and knobs; after the subsea panel."""
     gap = rng.uniform(0.04, 0.08)
     width = rng.uniform(0.3, 0.5)
     up = rng.uniform(0.2, 0.4)
     side = rng.choice([-1.0, 1.0])
-    floor = -room * rng.uniform(0.1, 0.18)
+    floor = -spacing * rng.uniform(0.1, 0.18)
     depth = rng.uniform(0.2, 0.35)
-    wall = sorted(side * (room * rng.uniform(0.1, 0.18) + np.array([0.0, THICKNESS])))
+    wall = sorted(side * (spacing * rng.uniform(0.1, 0.18) + np.array([0.0, THICKNESS])))
 
     solids = [
         _board((gap, -width, floor), (gap + THICKNESS, width, up)),
@@ -57,23 +57,23 @@ def panel(rng: np.random.Generator, room: float) -> Solids:
     return solids
 
 
-def pipes(rng: np.random.Generator, room: float) -> Solids:
+def pipes(rng: np.random.Generator, spacing: float) -> Solids:
     """Upright and level pipes around the way of the forearm."""
     solids: Solids = []
     for number in range(rng.integers(6, 11)):
         x = rng.uniform(-0.4, 0.15)
-        away = rng.choice([-1.0, 1.0]) * rng.uniform(room * FREE_AROUND, 0.4 + room * FREE_AROUND)
+        aside = rng.choice([-1.0, 1.0]) * rng.uniform(spacing * FREE_AROUND, 0.4 + spacing * FREE_AROUND)
         along = float(rng.uniform(-0.3, 0.3))
         upright = number % 2 == 0
         rotation = np.eye(3) if upright else pin.utils.rotate("x", np.pi / 2)
-        centre = np.array([x, away, along] if upright else [x, along, away])
+        centre = np.array([x, aside, along] if upright else [x, along, aside])
         solids.append((Capsule(rng.uniform(0.012, 0.03), rng.uniform(0.5, 1.2)), pin.SE3(rotation, centre)))
     return solids
 
 
-def frame(rng: np.random.Generator, room: float) -> Solids:
+def frame(rng: np.random.Generator, spacing: float) -> Solids:
     """Two windows of bars one behind the other, joined by four rails; the forearm reaches through the first."""
-    half = room * rng.uniform(0.12, 0.2, 2)
+    half = spacing * rng.uniform(0.12, 0.2, 2)
     front = -rng.uniform(0.08, 0.2)
     back = rng.uniform(0.1, 0.2)
     y, z = half + BARS
@@ -94,9 +94,9 @@ def _beam(centre: tuple[float, float, float], half: tuple[float, float, float]) 
     return Box(2.0 * np.array(half)), pin.SE3(np.eye(3), np.array(centre))
 
 
-def _slot(rng: np.random.Generator, room: float, roll: float) -> Solids:
+def _slot(rng: np.random.Generator, spacing: float, roll: float) -> Solids:
     """Two plates with the forearm between them, turned about its way."""
-    gap = room * rng.uniform(0.065, 0.09)
+    gap = spacing * rng.uniform(0.065, 0.09)
     front = -rng.uniform(0.15, 0.3)
     back = rng.uniform(0.05, 0.1)
     half = rng.uniform(0.2, 0.35)
@@ -109,17 +109,17 @@ def _slot(rng: np.random.Generator, room: float, roll: float) -> Solids:
     return [(shape, turned * pose) for shape, pose in plates]
 
 
-def slot_along(rng: np.random.Generator, room: float) -> Solids:
+def slot_along(rng: np.random.Generator, spacing: float) -> Solids:
     """A narrow slot that the axis of the first joint lies along: the other joints move in it one at a time."""
-    return _slot(rng, room, 0.0)
+    return _slot(rng, spacing, 0.0)
 
 
-def slot_across(rng: np.random.Generator, room: float) -> Solids:
+def slot_across(rng: np.random.Generator, spacing: float) -> Solids:
     """A narrow slot askew to the joints' axes: to stay in it, several joints must move in turns."""
-    return _slot(rng, room, rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.1))
+    return _slot(rng, spacing, rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.1))
 
 
-def clutter(rng: np.random.Generator, room: float) -> Solids:
+def clutter(rng: np.random.Generator, spacing: float) -> Solids:
     """Boxes, cylinders and balls of many sizes, some near the tip and some far."""
     solids: Solids = []
     for _ in range(CLUTTER):
@@ -127,8 +127,8 @@ def clutter(rng: np.random.Generator, room: float) -> Solids:
         size = rng.uniform(0.03, 0.12, 3)
         shape: Shape = (Box(size), Cylinder(0.5 * size[0], 2.0 * size[1]), Sphere(0.6 * size[0]))[kind]
 
-        way = rng.normal(size=3)
-        centre = way / np.linalg.norm(way) * rng.uniform(room * 0.1, 0.9)
+        direction = rng.normal(size=3)
+        centre = direction / np.linalg.norm(direction) * rng.uniform(spacing * 0.1, 0.9)
         solids.append((shape, pin.SE3(pin.exp3(rng.normal(size=3)), centre)))
     return solids
 
@@ -146,7 +146,7 @@ FAMILIES: Mapping[str, Builder] = MappingProxyType(
 
 
 def obstacles(
-    family: str, rng: np.random.Generator, place: pin.SE3, reach: float, room: float = 1.0
+    family: str, rng: np.random.Generator, place: pin.SE3, reach: float, spacing: float = 1.0
 ) -> tuple[Obstacle, ...]:
     """Obstacles of a family around a place.
 
@@ -155,10 +155,10 @@ def obstacles(
         rng: Of all sizes.
         place: ``pinocchio.SE3``; see the head of this module.
         reach: Of the arm [m].
-        room: Beside the forearm, as a factor of the usual.
+        spacing: Beside the forearm, as a factor of the usual.
     """
     found = []
-    for number, (shape, pose) in enumerate(FAMILIES[family](rng, room), start=1):
+    for number, (shape, pose) in enumerate(FAMILIES[family](rng, spacing), start=1):
         there = place * pin.SE3(pose.rotation, reach * pose.translation)
         found.append(Obstacle(f"{family}{number}", _scaled(shape, reach), there))
     return tuple(found)

@@ -143,8 +143,8 @@ class Roadmap:
         return f"Roadmap({self.world.robot.name}, {self.graph.size} vertices, {len(self.graph.states)} edges)"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        kept = (self.world, self.graph.rows, self.graph.edges, self.graph.states)
-        return partial(_restored, seed=self.seed, near=self.near), kept
+        parts = (self.world, self.graph.rows, self.graph.edges, self.graph.states)
+        return partial(_restored, seed=self.seed, near=self.near), parts
 
     @property
     def vertices(self) -> Matrix:
@@ -246,7 +246,7 @@ class Roadmap:
         numbers = {"format": FORMAT, "seed": self.seed, "near": self.near, "resolution": world.motion_resolution}
         names = {"robot": world.robot.name, "digest": world_digest(world.robot, world.bodies, world.pairs)}
         graph = {"rows": self.graph.rows, "edges": self.graph.edges, "states": self.graph.states.astype(np.int8)}
-        everything: dict[str, Any] = {**numbers, "kept": _kept(world), **names, **graph}
+        everything: dict[str, Any] = {**numbers, "kept": _clearances_of(world), **names, **graph}
         np.savez_compressed(data, **everything)
         write_bytes(path, data.getvalue())
 
@@ -283,8 +283,10 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
         states = data.whole("states")
         if not 1 <= near <= 100 or not _fit(edges, states, len(rows)):
             raise InputError("its edges make no sense")
-        kept = finite_array(data["kept"], (2,), "kept").tolist() if "kept" in data else [0.0, NOT_PROVING]
-        same_checks = positive(data["resolution"], "resolution") == world.motion_resolution and kept == _kept(world)
+        clearances = finite_array(data["kept"], (2,), "kept").tolist() if "kept" in data else [0.0, NOT_PROVING]
+        same_checks = positive(
+            data["resolution"], "resolution"
+        ) == world.motion_resolution and clearances == _clearances_of(world)
     except InputError as error:
         raise InputError(f"{path}: is no roadmap of robot '{world.robot.name}': {error}") from error
 
@@ -306,7 +308,7 @@ def _fit(edges: NDArray[np.int64], states: NDArray[np.int64], count: int) -> boo
     return bool(0 <= edges.min() <= edges.max() < count and 0 <= states.min() <= states.max() <= BLOCKED)
 
 
-def _kept(world: World) -> list[float]:
+def _clearances_of(world: World) -> list[float]:
     """What free motions of a world keep: its clearance, and that of its proofs [m]."""
     proving = world.settings.proving
     return [world.settings.clearance + world.settings.inflation, NOT_PROVING if proving is None else proving]

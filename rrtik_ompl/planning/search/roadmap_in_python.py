@@ -101,7 +101,7 @@ class PythonGraph:
         for edge in range(len(self._edges)):
             if stop():
                 return
-            self._blocked(edge)
+            self._is_blocked(edge)
 
     def doubt(self) -> None:
         """Forget what is known of the edges, since an obstacle has moved."""
@@ -109,23 +109,23 @@ class PythonGraph:
 
     def route(self, starts: Matrix, goals: Matrix, stop: Stop) -> Matrix | None:
         """The shortest path on the roadmap from a start to a goal, shape (k, n); None if there is none in time."""
-        mapped = self.size
-        edges = len(self._edges)
+        num_vertices = self.size
+        num_edges = len(self._edges)
         for k, row in enumerate(np.concatenate([starts, goals])):
-            self._add_near(row, mapped)
+            self._add_near(row, num_vertices)
             if k >= len(starts):  # a goal, to which each start may go straight
                 for start in range(len(starts)):
-                    self._join(mapped + start, mapped + k)
-        found = self._search(range(mapped, mapped + len(starts)), goals, stop)
+                    self._join(num_vertices + start, num_vertices + k)
+        found = self._search(range(num_vertices, num_vertices + len(starts)), goals, stop)
         path = None if found is None else self._rows[found].copy()
 
         # starts and goals are no part of the roadmap: all that was added for them is taken away, the last first
-        while len(self._edges) > edges:
+        while len(self._edges) > num_edges:
             for vertex in self._edges.pop():
                 self._leaving[vertex].pop()
             self._states.pop()
-        self._rows = self._rows[:mapped]
-        self._leaving = self._leaving[:mapped]
+        self._rows = self._rows[:num_vertices]
+        self._leaving = self._leaving[:num_vertices]
         return path
 
     def statistics(self) -> dict[str, int | float]:
@@ -135,30 +135,30 @@ class PythonGraph:
 
     def _search(self, starts: range, goals: Matrix, stop: Stop) -> list[int] | None:
         """Vertices of the shortest path from a start to the last vertices, which are the goals."""
-        ahead = np.linalg.norm(self._rows[:, None] - goals, axis=2).min(axis=1)
-        heap: list[tuple[float, float, int, int]] = [(float(ahead[start]), 0.0, start, ROOT) for start in starts]
+        least_to_go = np.linalg.norm(self._rows[:, None] - goals, axis=2).min(axis=1)
+        heap: list[tuple[float, float, int, int]] = [(float(least_to_go[start]), 0.0, start, ROOT) for start in starts]
         heapq.heapify(heap)
-        came: dict[int, int] = {}
+        edge_into: dict[int, int] = {}
         while heap and not stop():
             _, cost, vertex, edge = heapq.heappop(heap)
-            if vertex in came or (edge != ROOT and self._blocked(edge)):
+            if vertex in edge_into or (edge != ROOT and self._is_blocked(edge)):
                 continue
 
-            came[vertex] = edge
+            edge_into[vertex] = edge
             if vertex >= self.size - len(goals):
-                return self._traced(vertex, came)
+                return self._path_to(vertex, edge_into)
 
             for leaving in self._leaving[vertex]:
                 head = self._other(leaving, vertex)
-                if head not in came:
+                if head not in edge_into:
                     reached = cost + float(np.linalg.norm(self._rows[head] - self._rows[vertex]))
-                    heapq.heappush(heap, (reached + float(ahead[head]), reached, head, leaving))
+                    heapq.heappush(heap, (reached + float(least_to_go[head]), reached, head, leaving))
         return None
 
-    def _traced(self, vertex: int, came: dict[int, int]) -> list[int]:
+    def _path_to(self, vertex: int, edge_into: dict[int, int]) -> list[int]:
         found = [vertex]
-        while came[vertex] != ROOT:
-            vertex = self._other(came[vertex], vertex)
+        while edge_into[vertex] != ROOT:
+            vertex = self._other(edge_into[vertex], vertex)
             found.append(vertex)
         return found[::-1]
 
@@ -166,7 +166,7 @@ class PythonGraph:
         first, second = self._edges[edge]
         return second if vertex == first else first
 
-    def _blocked(self, edge: int) -> bool:
+    def _is_blocked(self, edge: int) -> bool:
         if self._states[edge] == UNKNOWN:
             self.motions += 1
             first, second = self._edges[edge]

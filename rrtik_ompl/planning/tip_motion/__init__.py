@@ -246,14 +246,14 @@ def _moved(
         raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
     number = whole_number(seed, "seed")
     require(world, World, "world", "use World(robot, scene)")
-    room = None if clearance is None else max(not_negative(clearance, "clearance"), world.settings.kept)
+    kept_clearance = None if clearance is None else max(not_negative(clearance, "clearance"), world.settings.kept)
 
     begin, starts = _begin(world, q, number)
-    way = Way(tuple(rails(begin)), tolerance, room, number)
+    way = Way(tuple(rails(begin)), tolerance, kept_clearance, number)
     if way.leads_nowhere(world.robot):
         raise InputError("the tip is at the goal already: there is no line to follow")
-    made = farthest(world, way, starts)
-    return StraightResult(path_of(world, made), made.fraction, made.reason)
+    best = farthest(world, way, starts)
+    return StraightResult(path_of(world, best), best.fraction, best.reason)
 
 
 def _begin(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> tuple[pin.SE3, Matrix]:

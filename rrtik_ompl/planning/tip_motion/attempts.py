@@ -47,8 +47,8 @@ class Way:
     clearance: float | None
     seed: int = 0
 
-    def kept(self, world: World) -> float:
-        """What it keeps from obstacles in a world [m]."""
+    def clearance_in(self, world: World) -> float:
+        """The clearance to be kept from obstacles in a world [m]."""
         return world.settings.kept if self.clearance is None else self.clearance
 
     def leads_nowhere(self, robot: Robot) -> bool:
@@ -84,10 +84,10 @@ def farthest(world: World, way: Way, starts: Matrix) -> Attempt:
     best: Attempt | None = None
     for q in starts:
         for leaning in leanings(world, way, q):
-            made = attempt(world, way, q, leaning)
-            if best is None or (made.fraction, -made.length) > (best.fraction, -best.length):
-                best = made
-            if made.fraction == 1.0:
+            found = attempt(world, way, q, leaning)
+            if best is None or (found.fraction, -found.length) > (best.fraction, -best.length):
+                best = found
+            if found.fraction == 1.0:
                 break
         if best is not None and best.fraction == 1.0 and redundant(world.robot):
             break
@@ -121,21 +121,21 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
     reason = ""
     parts = [robot.clamp(q)[None]]
     places = [np.zeros(1)]
-    measures = way.measures(robot)
-    whole = measures.sum()
+    lengths = way.measures(robot)
+    total = lengths.sum()
     for number, rail in enumerate(way.rails):
         followed = follow(robot, rail, parts[-1][-1], way.tolerance, leaning)
         parts.append(followed.rows[1:])
-        places.append((measures[:number].sum() + measures[number] * followed.shares[1:]) / whole)
+        places.append((lengths[:number].sum() + lengths[number] * followed.shares[1:]) / total)
         if not followed.complete:
             reason = why_stopped(robot, rail, followed)
             break
 
     rows = np.concatenate(parts)
     shares = np.concatenate(places)
-    proof = world.prover.route(rows, clearance=way.kept(world)) if len(rows) > 1 else None
+    proof = world.prover.route(rows, clearance=way.clearance_in(world)) if len(rows) > 1 else None
     if proof is not None and not proof.proven:
-        return _cut(world, way, rows, shares, proof)
+        return _proven_part(world, way, rows, shares, proof)
 
     fraction = float(shares[-1])
     if not reason and fraction >= 1.0 - SMALLEST_STEP:
@@ -143,37 +143,37 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
     return Attempt(rows, proof, fraction, reason)
 
 
-def _cut(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> Attempt:
+def _proven_part(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> Attempt:
     """The part before the first place that is not proven, which is found by halving the motion."""
     gap = proof.unproven[0]
     a = rows[gap.motion]
     b = rows[gap.motion + 1]
-    room = way.kept(world)
+    clearance = way.clearance_in(world)
 
-    good = 0.0
-    bad = 1.0
+    proven_share = 0.0
+    unproven_share = 1.0
     for _ in range(HALVINGS):
-        middle = 0.5 * (good + bad)
+        middle = 0.5 * (proven_share + unproven_share)
         part = np.stack([a, a + middle * (b - a)])
-        if world.prover.route(part, clearance=room, slack=LEFT).proven:
-            good = middle
+        if world.prover.route(part, clearance=clearance, slack=LEFT).proven:
+            proven_share = middle
         else:
-            bad = middle
+            unproven_share = middle
 
-    end = a + good * (b - a)
+    end = a + proven_share * (b - a)
     reason = why_blocked(world, end, b, (gap.first, gap.second))
-    kept = rows[: gap.motion + 1]
+    proven_rows = rows[: gap.motion + 1]
     fraction = float(shares[gap.motion])
-    if good > 0.0:
-        kept = np.vstack([kept, end])
-        fraction += good * float(shares[gap.motion + 1] - shares[gap.motion])
-    known = world.prover.route(kept, clearance=room) if len(kept) > 1 else None
-    return Attempt(kept, known, fraction, reason)
+    if proven_share > 0.0:
+        proven_rows = np.vstack([proven_rows, end])
+        fraction += proven_share * float(shares[gap.motion + 1] - shares[gap.motion])
+    proven = world.prover.route(proven_rows, clearance=clearance) if len(proven_rows) > 1 else None
+    return Attempt(proven_rows, proven, fraction, reason)
 
 
-def path_of(world: World, made: Attempt) -> JointPath | None:
+def path_of(world: World, found: Attempt) -> JointPath | None:
     """The path of an attempt with its proof; None if it did not begin to move."""
-    if made.fraction <= 0.0:
+    if found.fraction <= 0.0:
         return None
-    path = JointPath.of(world.robot, made.rows)
-    return path if made.proof is None else path.with_proof(made.proof)
+    path = JointPath.of(world.robot, found.rows)
+    return path if found.proof is None else path.with_proof(found.proof)

@@ -122,8 +122,8 @@ def arc_rail(T_begin: pin.SE3, T_end: pin.SE3, through: ArrayLike) -> Rail:
     begin = a - centre
     end = c - centre
     angle = np.arctan2(unit @ np.cross(begin, end), begin @ end) % TAU
-    axis, own = _turn_between(T_begin, T_end)
-    return Rail(T_begin.homogeneous, np.zeros(3), axis, own, centre, unit, float(angle))
+    axis, turn = _turn_between(T_begin, T_end)
+    return Rail(T_begin.homogeneous, np.zeros(3), axis, turn, centre, unit, float(angle))
 
 
 def screw_rail(T_begin: pin.SE3, T_end: pin.SE3, turns: int = 0) -> Rail:
@@ -146,8 +146,8 @@ def screw_rail(T_begin: pin.SE3, T_end: pin.SE3, turns: int = 0) -> Rail:
     # the point of the line that is nearest to the origin, for the line does not move
     shift = T_end.translation - _turns(axis, np.array([angle]))[0] @ T_begin.translation
     along = float(axis @ shift) * axis
-    rest = shift - along
-    centre = 0.5 * (rest + np.cross(axis, rest) / np.tan(0.5 * angle))
+    across = shift - along
+    centre = 0.5 * (across + np.cross(axis, across) / np.tan(0.5 * angle))
     angle += TAU * whole_turns
     return Rail(T_begin.homogeneous, along, axis, angle, centre, axis, angle)
 

@@ -28,15 +28,16 @@ def why_stopped(robot: Robot, rail: Rail, followed: Followed) -> str:
     jacobian = plain * scale[:, None]
     twist = rail.twist(float(followed.shares[-1])) * scale
 
-    held = np.zeros(robot.dof, dtype=bool)  # one at its limit leaves its part to others, which may get to theirs
-    while (pushed := _pushed(robot, q, jacobian, twist, held)).any():
-        held |= pushed
-    if held.any():
-        return _limits(robot, q, held)
+    at_limit = np.zeros(robot.dof, dtype=bool)  # one at its limit leaves its part to others, which may get to theirs
+    while (driven_beyond := _driven_beyond_limit(robot, q, jacobian, twist, at_limit)).any():
+        at_limit |= driven_beyond
+
+    if at_limit.any():
+        return _limits_in_words(robot, q, at_limit)
 
     values = np.linalg.svd(plain, compute_uv=False)
-    missed = twist - jacobian @ (np.linalg.pinv(jacobian, CUT_OFF) @ twist)
-    if np.linalg.norm(missed) > LOST * np.linalg.norm(twist) and len(values) < 6:
+    lost_twist = twist - jacobian @ (np.linalg.pinv(jacobian, CUT_OFF) @ twist)
+    if np.linalg.norm(lost_twist) > LOST * np.linalg.norm(twist) and len(values) < 6:
         return f"{robot.dof} joint{'s' * (robot.dof > 1)} cannot move the tip like this"
     return f"singular posture, or the end of the reach: the smallest singular value is {values[-1]:.3g}"
 
@@ -53,19 +54,19 @@ def why_blocked(world: World, a: Vector, b: Vector, pair: tuple[str, str]) -> st
     return f"'{first}' and '{second}' come too near to be proven apart"
 
 
-def _pushed(robot: Robot, q: Vector, jacobian: Vector, twist: Vector, held: Mask) -> Mask:
+def _driven_beyond_limit(robot: Robot, q: Vector, jacobian: Vector, twist: Vector, left_out: Mask) -> Mask:
     """Which joints at a limit a motion of the tip would drive beyond it, those held left out. Shape (dof,)."""
     change = np.zeros(robot.dof)
-    change[~held] = np.linalg.pinv(jacobian[:, ~held], CUT_OFF) @ twist
+    change[~left_out] = np.linalg.pinv(jacobian[:, ~left_out], CUT_OFF) @ twist
     low = q <= robot.lower + AT_LIMIT
     high = q >= robot.upper - AT_LIMIT
     pushed: Mask = (low & (change < 0.0)) | (high & (change > 0.0))
-    return pushed & ~held
+    return pushed & ~left_out
 
 
-def _limits(robot: Robot, q: Vector, held: Mask) -> str:
+def _limits_in_words(robot: Robot, q: Vector, at_limit: Mask) -> str:
     shown = []
-    for joint in np.flatnonzero(held):
+    for joint in np.flatnonzero(at_limit):
         factor, unit = shown_unit(robot.prismatic[joint])
         shown.append(f"'{robot.joint_names[joint]}' ({factor * q[joint]:.4g} {unit})")
     return f"limit of joint{'s' * (len(shown) > 1)} {', '.join(shown)}"

@@ -30,23 +30,29 @@ def follow_plainly(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, le
     shares = [0.0]
     step = FIRST_STEP
     while shares[-1] < 1.0 - SMALLEST_STEP and len(rows) < MOST_ROWS and step >= SMALLEST_STEP:
-        left = 1.0 - shares[-1]
-        tried = left if step >= left - SMALLEST_STEP else step
-        trial = _correct(robot, rail, shares[-1] + tried, _guess(robot, rows, shares, tried, leaning), tolerance)
-        far = np.inf if trial is None else _strayed(robot, rail, rows[-1], trial, (shares[-1], tried), tolerance)
+        share_left = 1.0 - shares[-1]
+        tried_step = share_left if step >= share_left - SMALLEST_STEP else step
+        trial = _correct(
+            robot, rail, shares[-1] + tried_step, _guess(robot, rows, shares, tried_step, leaning), tolerance
+        )
+        deviation = (
+            np.inf
+            if trial is None
+            else _deviation_bound(robot, rail, rows[-1], trial, (shares[-1], tried_step), tolerance)
+        )
 
-        if trial is not None and far <= 1.0 - ROOM:
+        if trial is not None and deviation <= 1.0 - ROOM:
             rows.append(trial)
-            shares.append(shares[-1] + tried)
-        change = 0.9 / np.sqrt(far) if far > 0.0 else LARGEST_GROWTH
-        step = tried * min(max(change, SMALLEST_SHRINKING), LARGEST_GROWTH)
+            shares.append(shares[-1] + tried_step)
+        change = 0.9 / np.sqrt(deviation) if deviation > 0.0 else LARGEST_GROWTH
+        step = tried_step * min(max(change, SMALLEST_SHRINKING), LARGEST_GROWTH)
     return Followed(np.array(rows), np.array(shares))
 
 
 def _guess(robot: Robot, rows: list[Vector], shares: list[float], step: float, leaning: Leaning) -> Vector:
     """The configuration with which a step begins."""
-    far = step / (1.0 - shares[-1]) if leaning.homing else step
-    guess = rows[-1] + far * leaning.pull * (leaning.reference - rows[-1])
+    share = step / (1.0 - shares[-1]) if leaning.homing else step
+    guess = rows[-1] + share * leaning.pull * (leaning.reference - rows[-1])
     if len(rows) > 1 and not redundant(robot):
         guess = guess + step / (shares[-1] - shares[-2]) * (rows[-1] - rows[-2])
     return robot.clamp(guess)
@@ -59,9 +65,9 @@ def _correct(robot: Robot, rail: Rail, share: float, q: Vector, tolerance: Toler
     for k in range(NEWTON_STEPS + 1):
         tip, jacobian = (x[0] for x in robot.fk_jacobian_batch(q))
         error = _residual(aim, tip)
-        away = np.linalg.norm(error[:3])
+        distance = np.linalg.norm(error[:3])
         chord = np.linalg.norm(error[3:])
-        if away <= ARRIVED * tolerance.deviation and chord <= ARRIVED * tolerance.chord:
+        if distance <= ARRIVED * tolerance.deviation and chord <= ARRIVED * tolerance.chord:
             return q
         if k < NEWTON_STEPS:
             q = robot.clamp(q + _newton_step(robot, q, jacobian * scale[:, None], error * scale))
@@ -79,13 +85,13 @@ def _residual(aim: Matrix, tip: Matrix) -> Vector:
 def _newton_step(robot: Robot, q: Vector, jacobian: Matrix, error: Vector) -> Vector:
     """The shortest step that removes a residual, without joints at a limit that would go on beyond it."""
     pull = jacobian.T @ error
-    held = ((q <= robot.lower) & (pull < 0.0)) | ((q >= robot.upper) & (pull > 0.0))
-    free = np.where(held, 0.0, jacobian)
+    pinned = ((q <= robot.lower) & (pull < 0.0)) | ((q >= robot.upper) & (pull > 0.0))
+    free = np.where(pinned, 0.0, jacobian)
     change: Vector = free.T @ np.linalg.solve(free @ free.T + DAMPING * np.eye(6), error)
     return change * (LARGEST_STEP / max(float(np.abs(change).max()), LARGEST_STEP))
 
 
-def _strayed(
+def _deviation_bound(
     robot: Robot, rail: Rail, q: Vector, trial: Vector, at: tuple[float, float], tolerance: Tolerance
 ) -> float:
     """How far the tip leaves the rail on a motion at most, 1 is what it may; ``at``: share and step."""
