@@ -138,6 +138,7 @@ def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> 
     """
 
     def misfit(name: IkMethod) -> str:
+        """Why a method does not fit the targets; "" if it does."""
         for target in drawn:
             fault = METHODS[name].misfit(robot, target)
             if fault:

@@ -170,6 +170,7 @@ def solve_ik_trajectory(
 
 
 def _checked_poses(poses: ArrayLike) -> Matrix:
+    """The poses as an array, shape (k, 4, 4), or the points, shape (k, 3)."""
     rows = finite_array(poses, (None, 4, 4) if dimensions(poses) == 3 else (None, 3), "poses")
     if len(rows) == 0:
         raise InputError("poses: a trajectory needs at least one point")
@@ -179,12 +180,14 @@ def _checked_poses(poses: ArrayLike) -> Matrix:
 
 
 def _target(row: Matrix, position_tolerance: float, orientation_tolerance: float) -> Target:
+    """The goal of one pose, shape (4, 4), or point, shape (3,)."""
     if row.ndim == 1:
         return PositionGoal(row, position_tolerance)
     return PoseGoal(row, position_tolerance, orientation_tolerance)
 
 
 def _with_free_axis(targets: tuple[Target, ...], axis: FrameAxis | None) -> tuple[TipGoal, ...]:
+    """The targets, or goals that leave the turn about an axis of the tip free."""
     if axis is None:
         return targets
     if not targets[0].oriented:
@@ -193,12 +196,19 @@ def _with_free_axis(targets: tuple[Target, ...], axis: FrameAxis | None) -> tupl
 
 
 def _options(options: GeneticOptions | GeneticPreset) -> GeneticOptions:
+    """The options themselves, or those of a preset."""
     if isinstance(options, GeneticOptions):
         return options
     return PRESETS[one_of(PRESETS, options, "preset of the genetic algorithm")]
 
 
 def _chosen_method(task: Task, method: TrajectoryIkMethod) -> TrajectoryIkMethod:
+    """The name of the method for a trajectory: the first that fits if it is "auto".
+
+    Raises:
+        UnknownNameError: If there is no such method.
+        InputError: If it does not fit.
+    """
     one_of(get_args(TrajectoryIkMethod), method, "inverse kinematics method for trajectories")
     misfits = {name: METHODS[name].misfit(task.robot, task.targets[0]) for name in FOLLOWERS}
     if not misfits["closed-form"] and form_of(task.robot).kind == "position" and task.poses.ndim == 3:
@@ -228,6 +238,7 @@ def _closed_form(task: Task) -> tuple[Matrix, int]:
 
 
 def _genetic(task: Task) -> tuple[Matrix, int]:
+    """Configurations of the points, shape (k, dof), NaN from where the run stopped, and its generations."""
     quick = None if task.world is None else task.world.valid_batch  # the second opinion comes at the end
     options = replace(task.options, largest_step=task.options.largest_step or task.jump)
     run = follow_targets(

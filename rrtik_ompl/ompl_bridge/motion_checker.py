@@ -93,6 +93,7 @@ class SpaceChecker:
         return all(self._short_motion_valid(*ends) for ends in pairwise(pieces(a, b, self._io.turning)))
 
     def _short_motion_valid(self, a: Vector, b: Vector) -> bool:
+        """Whether a motion is free on which no angle of SO(2) goes beyond half a turn."""
         self._io.write(self._a, a)
         self._io.write(self._b, b)
         return bool(self._si.checkMotion(self._a, self._b))

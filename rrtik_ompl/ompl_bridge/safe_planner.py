@@ -208,9 +208,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         status, found = self._run_search(
             lambda: self._search_between_free_ends(starts, goals, stop, known_free=checked)
         )
-        if found is None or found.difference > 0.0:
+        if found is None:
             return ob.PlannerStatus(status), None
-        return ob.PlannerStatus(status), found.path
+        is_exact = found.difference <= 0.0
+        return ob.PlannerStatus(status), found.path if is_exact else None
 
     def clear(self) -> None:
         """Forget the last attempt; called by OMPL."""

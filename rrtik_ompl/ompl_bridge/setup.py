@@ -64,6 +64,7 @@ class ValidityCallback:
         return {"checked_states": self.states, "checked_motions": self.motions, "free_motions": self.free_motions}
 
     def _checked(self, check: Callable[..., bool], *arguments: Vector) -> bool:
+        """The answer of a check; False after an error or the deadline, and where the check itself fails."""
         if self.error is not None or self.late:
             return False
 
@@ -199,6 +200,7 @@ def circular_space(lower: Vector, upper: Vector, turning: Mask) -> ob.SpaceInfor
 
 
 def _real_space(lower: Vector, upper: Vector) -> ob.RealVectorStateSpace:
+    """A RealVectorStateSpace with bounds, shapes (n,)."""
     space = ob.RealVectorStateSpace(len(lower))
     bounds = ob.RealVectorBounds(len(lower))
     for k in range(len(lower)):

@@ -215,6 +215,7 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
 
 
 def _information(world: World, lower: Vector, upper: Vector, so2: bool) -> ob.SpaceInformation:
+    """A SpaceInformation within bounds, shapes (n,), whose states and motions a world judges."""
     endless = world.robot.continuous
     si = circular_space(lower, upper, endless) if so2 and endless.any() else bounded_space(lower, upper)
     si.setMotionValidator(CheckedMotions(si, partial(motion_taken, world)))

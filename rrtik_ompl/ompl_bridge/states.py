@@ -25,6 +25,7 @@ def space_bounds(si: ob.SpaceInformation) -> tuple[Vector, Vector]:
 
 
 def _checked_bounds(low: list[float], high: list[float]) -> tuple[Vector, Vector]:
+    """The bounds as arrays, shapes (n,); refuses missing ones."""
     lower = frozen(low)
     upper = frozen(high)
     bad = np.flatnonzero(~(np.isfinite(lower) & np.isfinite(upper) & (lower < upper)))
@@ -105,6 +106,7 @@ class StateIO:
         return np.array([self.read(path.getState(k)) for k in range(path.getStateCount())])
 
     def _capsule_works(self, si: ob.SpaceInformation) -> bool:
+        """Whether states are written and read through the capsule as they are number by number."""
         state = si.allocState()
         probe = np.arange(1.0, self.dof + 1.0)
         if self._space.getSerializationLength() != self._buffer.nbytes:

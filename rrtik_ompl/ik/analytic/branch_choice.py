@@ -80,6 +80,7 @@ def nearest(
 
 
 def _distance(robot: Robot, q: NDArray[np.float64], near: NDArray[np.float64], scale: Vector) -> NDArray[np.float64]:
+    """Weighted joint distance of configurations from postures, shapes (..., dof); shape (...)."""
     distance: NDArray[np.float64] = np.linalg.norm(joint_difference(robot, q, near) * scale, axis=-1)
     return distance
 

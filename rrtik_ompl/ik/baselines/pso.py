@@ -80,6 +80,7 @@ def swarm(
 def _with_velocity(
     rng: np.random.Generator, places: Swarms, places_before: Swarms, best_places: Swarms, leader: Swarms
 ) -> Swarms:
+    """Where particles move that have a velocity and are drawn to their own best place and to the leader's."""
     to_best, to_leader = rng.uniform(0.0, ATTRACTION, (2, *places.shape))
     moved: Swarms = (
         places
@@ -93,11 +94,13 @@ def _with_velocity(
 def _drawn(
     rng: np.random.Generator, places: Swarms, places_before: Swarms, best_places: Swarms, leader: Swarms
 ) -> Swarms:
+    """Where particles move that are drawn anew, about the middle of their own best place and the leader's."""
     del places_before
     drawn: Swarms = 0.5 * (best_places + leader) + np.abs(best_places - leader) * rng.standard_normal(places.shape)
     return drawn
 
 
 def _cost(robot: Robot, goal: Target, Q: Matrix) -> NDArray[np.float64]:
+    """Distance from the goal [m], the angle weighted, of configurations, shape (m, dof); shape (m,)."""
     distance, angle = goal.errors(robot, Q)
     return distance + ORIENTATION_WEIGHT * angle

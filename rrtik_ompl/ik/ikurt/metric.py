@@ -102,6 +102,7 @@ class TipMetric:
         return np.array(nearest.tip_errors(tip))[:, 0]
 
     def _each(self, tips: NDArray[np.float64]) -> Matrix:
+        """Distance of each tip, shape (m, 4, 4), from each target in units of the metric, shape (targets, m)."""
         pairs = (target.tip_errors(tips) for target in self.targets)
         return self.unit * np.array([np.hypot(away, self.metres_per_radian * angle) for away, angle in pairs])
 

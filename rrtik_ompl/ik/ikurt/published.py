@@ -112,19 +112,23 @@ class PublishedSearch:
         return near, False
 
     def _towards_any(self, q: Vector, delta: float) -> Vector:
+        """A step from a configuration in a random direction, or towards a random sample, as the options say."""
         if not self._steps.even:
             return self._inside(_extend(q, self._random(), delta))
         direction = self._rng.normal(size=len(q))
         return self._inside(q + direction * (delta / np.linalg.norm(direction)))
 
     def _inside(self, q: Vector) -> Vector:
+        """A configuration clipped to the limits, where a step may leave them."""
         # as published, samples lie inside the limits, and with them all steps towards samples
-        return q if self._steps.beyond == 0.0 and not self._steps.even else np.clip(q, self._lower, self._upper)
+        cannot_leave = self._steps.beyond == 0.0 and not self._steps.even
+        return q if cannot_leave else np.clip(q, self._lower, self._upper)
 
     def _distance(self, q: Vector) -> float:
         return float(self._metric.distance(q[None])[0])
 
     def _random(self) -> Vector:
+        """A uniform sample, shape (n,), in the limits widened by the share ``beyond`` of their range."""
         margin = self._steps.beyond * (self._upper - self._lower)
         return self._rng.uniform(self._lower - margin, self._upper + margin)
 

@@ -67,6 +67,7 @@ def _closest_circle(frames: NDArray[np.float64], point: Vector, sample: Vector) 
 
 
 def _about_z(angle: float) -> NDArray[np.float64]:
+    """The turn about z by an angle [rad], shape (4, 4)."""
     turn = np.eye(4)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return turn

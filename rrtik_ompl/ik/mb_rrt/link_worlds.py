@@ -64,6 +64,7 @@ def _first_links(world: World, later: set[int]) -> World:
 
 
 def _moves(robot: Robot, joint: int, later: set[int]) -> bool:
+    """Whether a joint is one of the ``later`` ones, by Pinocchio's numbers, or hangs on one of them."""
     while joint > 0:
         if joint in later:
             return True

@@ -89,6 +89,7 @@ def check_once(motions_free: MotionsFree) -> MotionsFree:
     answers: dict[bytes, bool] = {}
 
     def free(A: Matrix, B: Matrix) -> Mask:
+        """Which motions are free, each asked of the given test once."""
         swap = np.array([a > b for a, b in zip(A.tolist(), B.tolist(), strict=True)], dtype=bool)[:, None]
         first = np.where(swap, B, A)
         second = np.where(swap, A, B)
@@ -162,6 +163,7 @@ def _moves_to_waypoint(route: Matrix, pivot: int, test: int, motions_free: Motio
 
 
 def _order(axes: Sequence[int] | None, dof: int) -> list[int]:
+    """The order of the joints: the last one first if none is given."""
     order = list(range(dof))[::-1] if axes is None else [int(axis) for axis in axes]
     if sorted(order) != list(range(dof)):
         raise InputError(f"axes: expected each of 0 to {dof - 1} once, got {order}")
@@ -169,6 +171,7 @@ def _order(axes: Sequence[int] | None, dof: int) -> list[int]:
 
 
 def _route(waypoints: ArrayLike) -> Matrix:
+    """A checked copy of a route, shape (k, n), moves of the same joint in a row joined."""
     route = finite_array(waypoints, (None, None), "waypoints")
     if len(route) == 0:
         raise InputError("waypoints: a route needs at least one configuration")

@@ -64,6 +64,7 @@ def remembered(world: World, joints: Sequence[int], stop: Stop) -> Callable[[Vec
     bounds: dict[tuple[bytes, bytes], int] = {}
 
     def bound(start: Vector, goal: Vector) -> int:
+        """The bound between a start and a goal, shapes (n,)."""
         ends = (start.tobytes(), goal.tobytes())
         if ends not in bounds:
             found = sharper_bound(world, joints, start, goal, stop)

@@ -98,6 +98,7 @@ class MoveRules:
         return len(route) if waiting.all() else int(waiting.argmin())
 
     def _route(self, given: Matrix) -> Matrix:
+        """A checked route, shape (k, n), of at least one row."""
         route = finite_array(given, (None, len(self.joint_costs)), "route")
         if len(route) == 0:
             raise InputError("route: needs at least one row")
@@ -137,6 +138,7 @@ def smallest_moves(size: PerJoint, dof: int) -> Vector:
 
 
 def _per_joint(value: PerJoint, dof: int, what: str) -> Vector:
+    """One number for each joint, shape (dof,), of one for all or one for each."""
     shape = () if isinstance(value, int | float) else (dof,)
     return np.broadcast_to(finite_array(value, shape, what), dof).astype(np.float64)
 

@@ -145,6 +145,7 @@ def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_free: M
 
 
 def _corner(a: Vector, b: Vector, joints: NDArray[np.int64], corner: int) -> Vector:
+    """The corner of the box between a and b, shape (n,): joints whose bits are set have the values of b."""
     q = a.copy()
     for place, joint in enumerate(joints):
         if corner >> place & 1:
@@ -200,6 +201,11 @@ def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
 
 
 def _halves(piece: _Piece, world: World, finest: float) -> list[_Piece]:
+    """The two halves of a piece.
+
+    Raises:
+        InputError: If they would be too small.
+    """
     if world.weights @ np.abs(piece.b - piece.a) <= finest:
         raise InputError(
             f"path to convert: motion {piece.edge + 1} passes too close to something to be walked one joint at a time "

@@ -54,6 +54,7 @@ def spoken_moves(path: JointPath) -> list[str]:
 
 
 def _sentence(move: Move) -> str:
+    """A move as a sentence, see `spoken_moves`."""
     end = move.end
     if move.unit == "m":
         words = ("out", "in")

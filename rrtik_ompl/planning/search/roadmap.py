@@ -330,5 +330,6 @@ def _box(robot: Robot) -> tuple[Vector, Vector]:
 
 
 def _nearest(rows: Matrix, row: Vector) -> Vector:
+    """The row nearest to another one."""
     nearest: Vector = rows[np.linalg.norm(rows - row, axis=1).argmin()]
     return nearest

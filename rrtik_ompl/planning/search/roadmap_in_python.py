@@ -156,6 +156,7 @@ class PythonGraph:
         return None
 
     def _path_to(self, vertex: int, edge_into: dict[int, int]) -> list[int]:
+        """Vertices from a start to a vertex, by the edges over which they were reached."""
         found = [vertex]
         while edge_into[vertex] != ROOT:
             vertex = self._other(edge_into[vertex], vertex)
@@ -163,10 +164,12 @@ class PythonGraph:
         return found[::-1]
 
     def _other(self, edge: int, vertex: int) -> int:
+        """The other end of an edge."""
         first, second = self._edges[edge]
         return second if vertex == first else first
 
     def _is_blocked(self, edge: int) -> bool:
+        """Whether an edge is blocked; the motion of one of which nothing is known is checked, and the answer kept."""
         if self._states[edge] == UNKNOWN:
             self.motions += 1
             first, second = self._edges[edge]
@@ -174,6 +177,7 @@ class PythonGraph:
         return self._states[edge] == BLOCKED
 
     def _add(self, row: Vector) -> int:
+        """Add a vertex without edges; returns its number."""
         self._rows = np.vstack([self._rows, row])
         self._leaving.append([])
         return self.size - 1
@@ -186,6 +190,7 @@ class PythonGraph:
             self._join(vertex, other)
 
     def _join(self, first: int, second: int) -> None:
+        """Add an edge of which nothing is known."""
         for vertex in (first, second):
             self._leaving[vertex].append(len(self._edges))
         self._edges.append((first, second))

@@ -83,6 +83,7 @@ class _Corners:
         return without_repeats(np.array(rows))
 
     def _free(self, a: Vector, b: Vector) -> bool:
+        """Whether a motion is free either way; each is checked once."""
         edge = frozenset((a.tobytes(), b.tobytes()))
         if edge not in self._answers:
             self._answers[edge] = self.task.free(a, b)
@@ -122,6 +123,7 @@ class _Corners:
         return rows
 
     def _pulled(self, a: Vector, bend: Vector, b: Vector, nearly_done: bool) -> Vector:
+        """The bend between a and b, pulled to a corner of what it goes round, or as it is."""
         seen = self._last_seen(a, bend, b, nearly_done)
         if not self._part_free(seen, b):
             return bend

@@ -34,6 +34,7 @@ def shortcut(route: Matrix, task: Task, *, tries: int = TRIES) -> Matrix:
 
 
 def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) -> Matrix:
+    """A route after random cuts, in kernels where the world has some; ``share`` and ``pull`` see the kernel."""
     limit = NO_LIMIT if task.bounded else tries
     if task.kernel_world is None or len(route) < 3:
         return _plain(route, task, limit, share)

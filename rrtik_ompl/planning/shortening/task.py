@@ -125,6 +125,7 @@ class Task:
         return not fresh or bool(self._checked(new[fresh], new[np.add(fresh, 1)]).all())
 
     def _checked(self, A: Matrix, B: Matrix) -> Mask:
+        """Which motions are free, whatever time it is; the free ones are remembered."""
         free: Mask = self.motions.motion_valid_batch(A, B)
         self._known.update((A[k].tobytes(), B[k].tobytes()) for k in np.flatnonzero(free))
         return free

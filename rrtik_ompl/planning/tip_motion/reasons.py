@@ -65,6 +65,7 @@ def _driven_beyond_limit(robot: Robot, q: Vector, jacobian: Vector, twist: Vecto
 
 
 def _limits_in_words(robot: Robot, q: Vector, at_limit: Mask) -> str:
+    """Which joints are at a limit, and where they are, in words."""
     shown = []
     for joint in np.flatnonzero(at_limit):
         factor, unit = shown_unit(robot.prismatic[joint])
