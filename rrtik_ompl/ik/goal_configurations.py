@@ -204,7 +204,7 @@ class GoalSearch:
             return ""
         if len(self._all_at_goal):
             why = self._problem.world.explain(self._all_at_goal[0])
-            return f"{len(self._found)} configurations reach the goal, all in collision: for instance {why}"
+            return f"{len(self._all_at_goal)} configurations reach the goal, all in collision: for instance {why}"
         if not isinstance(goal, TipGoal):
             tips = " and ".join(f"'{frame}'" for frame in goal.frames)
             return f"no configuration with {tips} at their goals was found in {self._rounds} rounds; are they in reach?"

@@ -80,7 +80,22 @@ def follow_targets(
 
 
 class GaRun:
-    """The state of a run: a population, its window, the points gained so far, and what the restarts watch."""
+    """The state of a run: a population, its window, the points gained so far, and what the restarts watch.
+
+    Attributes:
+        generation: How many there were.
+        attempts: How often the run began before the first point.
+        num_redrawn: How often a population that had stalled was drawn anew.
+        distances: Best distance of every generation [m].
+        farthest: The points of the attempt that came farthest, each shape (dof,).
+        nearest: The posture that came nearest to the point after these, shape (dof,).
+        best_cost_of_farthest: Its cost; infinite before there is one.
+        points: Of this attempt, each shape (dof,).
+        window: Which angles the bit strings stand for.
+        genes: The population, shape (population, dof).
+        refined_rows: Individuals that were refined and are not rounded to 16 bits; the first ones, shape (k, dof).
+        best: Best cost since the population was drawn or a point was gained; infinite before there is one.
+    """
 
     def __init__(
         self,
@@ -101,11 +116,11 @@ class GaRun:
         self.gain = options.gain if options.gain is not None else float(robot.dof <= dimensions)
 
         self.generation = 0
-        self.fresh = 0
+        self.num_redrawn = 0
         self.attempts = 0
         self.distances: list[float] = []
         self.farthest: list[Vector] = []
-        self.costs_farthest: list[int] = []
+        self.generations_by_point_of_farthest: list[int] = []
         self.nearest = robot.clamp(np.zeros(robot.dof))
         self.best_cost_of_farthest = np.inf
 
@@ -114,18 +129,18 @@ class GaRun:
     def begin(self) -> None:
         """Begin before the first point, with a random population in the whole range."""
         self.points: list[Vector] = []
-        self.costs: list[int] = []
+        self.generations_by_point: list[int] = []
         self.window = whole_range(self.robot, gray=self.options.gray)
         self.attempts += 1
         self.draw()
         if self.near is not None:
             self.genes[:1] = self.window.encode(self.near[None])
-        self.since_point = 0
+        self.generations_since_point = 0
 
     def draw(self) -> None:
         """Draw a random population, and count anew for how long it stands still."""
         self.genes = random_genes(self.rng, self.options.population, self.robot.dof)
-        self.refined_rows = np.zeros((0, self.robot.dof))  # refined individuals, not rounded to 16 bits: the first rows
+        self.refined_rows = np.zeros((0, self.robot.dof))
         self.best = np.inf
         self.generations_without_gain = 0
 
@@ -141,15 +156,15 @@ class GaRun:
         scored = score(self.robot, self.targets[len(self.points)], Q, self.last, self.options, self.will_do)
 
         self.generation += 1
-        self.since_point += 1
+        self.generations_since_point += 1
         self.remember(Q, scored)
 
         if scored.reached.any():
             self.advance(Q[int(np.argmin(np.where(scored.reached, scored.cost, np.inf)))])
-        elif self.options.start_over is not None and self.since_point >= self.options.start_over:
+        elif self.options.start_over is not None and self.generations_since_point >= self.options.start_over:
             self.begin()
         elif self.count_stall(float(scored.cost.min())):
-            self.fresh += 1
+            self.num_redrawn += 1
             self.draw()
         else:
             self.breed(Q, scored)
@@ -173,16 +188,16 @@ class GaRun:
 
     def advance(self, q: Vector) -> None:
         """A point is gained: place the window for the next one; the bit strings stay as they are."""
-        self.costs.append(self.since_point)
+        self.generations_by_point.append(self.generations_since_point)
         self.points.append(q.copy())
-        self.since_point = 0
+        self.generations_since_point = 0
         self.best = np.inf
         self.generations_without_gain = 0
         self.refined_rows = self.refined_rows[:0]
 
         if len(self.points) > len(self.farthest):
             self.farthest = self.points.copy()
-            self.costs_farthest = self.costs.copy()
+            self.generations_by_point_of_farthest = self.generations_by_point.copy()
             self.best_cost_of_farthest = np.inf
 
         if self.options.window is not None:
@@ -217,10 +232,10 @@ class GaRun:
         return GeneticRun(
             q=frozen(np.array(self.farthest).reshape(-1, self.robot.dof)),
             generations=self.generation,
-            cost_of_point=frozen(self.costs_farthest),
+            cost_of_point=frozen(self.generations_by_point_of_farthest),
             distances=frozen(self.distances),
             nearest=frozen(self.nearest),
-            fresh=self.fresh,
+            fresh=self.num_redrawn,
             attempts=self.attempts,
             timed_out=timed_out,
         )

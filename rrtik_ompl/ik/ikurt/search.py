@@ -104,19 +104,22 @@ class BatchedSearch:
         self._rng = rng
         self._starts = starts
 
-        self._distances = metric.distance(starts)
+        self._distances = metric.distance(starts)  # of the starts from the goal, shape (k,)
         self.goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
         self.tree = IkurtTree(starts, self._distances)
         self.back = IkurtTree(self.goals, np.zeros(len(self.goals)))
 
+        # the vertices of the last batch of exploration, and the numbers of batches and of vertices of dropped trees
         self._newest = starts[:0]
         self._batches = 0
+        self._dropped = 0
         self.connects = 0
         self.restarts = 0
-        self._dropped = 0
-        self.blocked = starts[:0]
+
+        # the configuration nearest to the goal that was seen, and its distance
         self._nearest: Vector = starts[self._distances.argmin()]
         self._least_distance = float(self._distances.min())
+        self.blocked = starts[:0]
 
     @property
     def nearest(self) -> Vector:
@@ -134,19 +137,20 @@ class BatchedSearch:
         if self._least_distance <= self._metric.radius:
             return self.tree.branch(int(self._distances.argmin()))
 
-        explored = 1
+        batches = 1  # of exploration before the next CONNECT
         path = self._finish(np.arange(self.tree.size))
         while path is None and not self._validity.stop():
-            for _ in range(explored):
+            for _ in range(batches):
                 path = self._explore()
                 if path is not None or self._validity.stop():
                     return path
 
             path = self._connect(self.tree.best())
-            explored = min(2 * explored, MAX_EXPLORATIONS if self.back.size else MAX_EXPLORATIONS_WITH_CONNECT)
+            max_batches = MAX_EXPLORATIONS if self.back.size else MAX_EXPLORATIONS_WITH_CONNECT
+            batches = min(2 * batches, max_batches)
             if self.tree.size > self._options.most_vertices:
                 self._restart()
-                explored = 1
+                batches = 1
         return path
 
     def _connect(self, first: int) -> Matrix | None:
@@ -156,27 +160,33 @@ class BatchedSearch:
         step = self._options.step
         shortest = SHORTEST * step
         path = self._finish(np.array([vertex]))
-        tried_at = before = self.tree.distance[vertex]
+        distance_at_descent = self.tree.distance[vertex]
+        distance_at_check = distance_at_descent
 
         for number in count(1):
             if path is not None or self._validity.stop():
                 return path
 
             lower = self._downhill(vertex, step)
-            step = max(step * (SHRUNK if lower is None else GROWN), shortest)
-            vertex = vertex if lower is None else lower
+            if lower is None:
+                step = max(step * SHRUNK, shortest)
+            else:
+                step = max(step * GROWN, shortest)
+                vertex = lower
+
             distance = self.tree.distance[vertex]
             if distance <= self._metric.radius:
                 path = self._finish(np.array([vertex]))
                 return self.tree.branch(vertex) if path is None else path
-            if distance < NEARER * tried_at:
+            if distance < NEARER * distance_at_descent:
                 path = self._finish(np.array([vertex]))
-                tried_at = distance
+                distance_at_descent = distance
 
             if number % PATIENCE == 0:
-                if distance > (FALL if self._options.jacobian else SLOW_FALL) * before:
+                wanted_fall = FALL if self._options.jacobian else SLOW_FALL
+                if distance > wanted_fall * distance_at_check:
                     break
-                before = distance
+                distance_at_check = distance
         self.tree.penalise(first, vertex)
         return path
 
@@ -280,7 +290,11 @@ class BatchedSearch:
         return np.vstack([self.tree.branch(int(vertices[k])), goals[k]])
 
     def _remember(self, q: Matrix) -> Matrix | None:
-        """Free goal configurations become roots of the tree at the goal; the path if one of them is seen at once."""
+        """Make the free ones of goal configurations, shape (k, n), roots of the tree at the goal.
+
+        Returns:
+            The path from the start if one of them can be reached straight from the other tree, shape (m, n), or None.
+        """
         free = self._validity.free(q)
         self.blocked = np.vstack([self.blocked, q[~free]])[:1]
         if len(self.goals) >= MAX_GOALS or not free.any():
@@ -298,6 +312,7 @@ class BatchedSearch:
             self._least_distance = float(distances[k])
 
     def _restart(self) -> None:
+        """Drop both trees and begin anew; goal configurations that are known stay."""
         self._see(self.tree.q, self.tree.distance)
         self._dropped += self.tree.size + self.back.size
         self.restarts += 1

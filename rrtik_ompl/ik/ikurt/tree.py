@@ -77,6 +77,7 @@ class IkurtTree:
         return np.array(self._q[numbers[::-1]])
 
     def _grow(self) -> None:
+        """Make room for twice as many vertices."""
         self._q = np.concatenate([self._q, np.empty_like(self._q)])
         self._parent = np.concatenate([self._parent, np.empty_like(self._parent)])
         self._distance = np.concatenate([self._distance, np.empty_like(self._distance)])

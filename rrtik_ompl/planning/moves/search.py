@@ -314,7 +314,8 @@ class MoveSearch:
         if not self._movable:
             return []
         count = int(self._rng.integers(1, min(max_count, len(self._movable)) + 1))
-        return self._rng.choice(self._movable, size=count, replace=False).tolist()
+        chosen: list[int] = self._rng.choice(self._movable, size=count, replace=False).tolist()
+        return chosen
 
     def _free_joints(self) -> Iterator[list[int]]:
         """Which joints are free, without end: all pairs in random order, all sets of three, each alone, and again.
