@@ -54,6 +54,7 @@ class TipColumns:
         return np.stack([np.stack([np.broadcast_to(entry, q.shape[1:]) for entry in column]) for column in pose])
 
     def _values(self, q: Numbers) -> list[Numbers]:
+        """The values of the chain's joints for q, shape (dof, ...), each shape (...)."""
         if np.array_equal(self.gain, np.eye(len(q))) and not self.offset.any():
             return list(q)
         return list(np.tensordot(self.gain, q, 1) + self.offset.reshape(-1, *(1,) * (q.ndim - 1)))
@@ -95,12 +96,20 @@ def _moved(pose: list[list[Entry]], fixed: Numbers) -> list[list[Entry]]:
 
 
 def _sum(terms: list[tuple[Entry, float]]) -> Entry:
+    """The sum of values times factors; factors of 0 and 1 or -1 take no multiplication."""
     total: Entry = 0.0
     for value, factor in terms:
         if factor == 0.0:
             continue
-        term = value if factor == 1.0 else -value if factor == -1.0 else factor * value
-        total = term if isinstance(total, float) and total == 0.0 else total + term
+        if factor == 1.0:
+            term = value
+        elif factor == -1.0:
+            term = -value
+        else:
+            term = factor * value
+
+        is_first = isinstance(total, float) and total == 0.0
+        total = term if is_first else total + term
     return total
 
 
@@ -114,5 +123,6 @@ def _z_along(axis: Numbers) -> Numbers:
 
 
 def _exact(matrix: Numbers) -> Numbers:
+    """The matrix with entries that are whole numbers but for rounding made so."""
     rounded = np.round(matrix)
     return np.where(np.abs(matrix - rounded) < ROUNDING, rounded, matrix)

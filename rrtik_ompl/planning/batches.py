@@ -64,17 +64,17 @@ def plans_together(
     plans: list[Plan | None] = [None] * len(queries)
     if not (queries and serves(world, planner.factory)):
         return plans
-    ends = np.array([[each.start, each.goal.q] for each in queries])
+    ends = np.array([[query.start, query.goal.q] for query in queries])
     any_problem = known_problem(world, *ends[0])
     load_kernels_for(any_problem, planner.factory)
 
-    begin = time.perf_counter()
-    free = _usable(world, ends)
-    rooms = dict(zip(np.flatnonzero(free).tolist(), rooms_between(world, ends[free], None), strict=True))
+    began = time.perf_counter()
+    usable = _usable(world, ends)
+    rooms = dict(zip(np.flatnonzero(usable).tolist(), rooms_between(world, ends[usable], None), strict=True))
     searcher = _Searcher(any_problem, planner, request)
     found = searcher.paths({k: queries[k] for k, room in rooms.items() if room is not None})
-    proofs = _proofs(world, {k: (each.path.waypoints, rooms[k]) for k, each in found.items()})
-    taken = (time.perf_counter() - begin) / len(queries)
+    proofs = _proofs(world, {k: (found_path.path.waypoints, rooms[k]) for k, found_path in found.items()})
+    seconds_per_query = (time.perf_counter() - began) / len(queries)
 
     for k, proof in proofs.items():
         query = found[k].query
@@ -82,25 +82,30 @@ def plans_together(
         counts = {"attempts": 1, "rejected": 0, **found[k].counts}
         counts["rejected"] = 0  # paths, whatever a planner counts by that name
         problem = known_problem(world, path.start, query.goal)
-        plans[k] = Plan(True, path, "", taken, planner.name, query.seed, MappingProxyType(counts), problem=problem)
+        plans[k] = Plan(
+            True, path, "", seconds_per_query, planner.name, query.seed, MappingProxyType(counts), problem=problem
+        )
     return plans
 
 
 def serves(world: World, factory: PlannerFactory) -> bool:
     """Whether queries may be planned together: by a planner of ours in an exact world whose kernels suffice."""
     robot = world.robot
-    plain = type(world) is World and world.accuracy == "exact" and world.fast is not None
-    bounded = bool(np.isfinite([robot.lower, robot.upper]).all()) and not robot.continuous.any()
-    return plain and bounded and not robot.joint_weights and traits_of(factory).reseeded and is_safe(factory)
+    kernels_suffice = type(world) is World and world.accuracy == "exact" and world.fast is not None
+    joints_are_bounded = bool(np.isfinite([robot.lower, robot.upper]).all()) and not robot.continuous.any()
+    planner_is_reseeded = traits_of(factory).reseeded and is_safe(factory)
+    return kernels_suffice and joints_are_bounded and not robot.joint_weights and planner_is_reseeded
 
 
 def _usable(world: World, ends: Matrix) -> Mask:
     """Which starts and goals, shape (m, 2, dof), are two configurations inside the limits that kernels prove free."""
     rows = ends.reshape(-1, world.robot.dof)
-    inside: Mask = np.logical_and.reduce((rows >= world.robot.lower) & (rows <= world.robot.upper), axis=1)
-    free: Mask = world.with_accuracy("conservative").valid_batch(np.where(inside[:, None], rows, 0.0)) & inside
-    ready: Mask = free[::2] & free[1::2] & np.logical_or.reduce(ends[:, 0] != ends[:, 1], axis=1)
-    return ready
+    inside_limits: Mask = np.logical_and.reduce((rows >= world.robot.lower) & (rows <= world.robot.upper), axis=1)
+    is_free: Mask = (
+        world.with_accuracy("conservative").valid_batch(np.where(inside_limits[:, None], rows, 0.0)) & inside_limits
+    )
+    usable: Mask = is_free[::2] & is_free[1::2] & np.logical_or.reduce(ends[:, 0] != ends[:, 1], axis=1)
+    return usable
 
 
 @runtime_checkable
@@ -139,12 +144,12 @@ class _Searcher:
 
         made = dict[int, _Found]()
         for (k, query), seed, result in zip(queries.items(), seeds, quick, strict=True):
-            found = self._found(query, result or self._alone(query, seed))
+            found = self._checked_path(query, result or self._search_one(query, seed))
             if found is not None:
                 made[k] = found
         return made
 
-    def _alone(self, query: Query, seed: int) -> SearchResult:
+    def _search_one(self, query: Query, seed: int) -> SearchResult:
         """What a search for one query finds."""
         reseed(self._planner, seed)
         ends = query.start[None], query.goal.q[None]
@@ -152,7 +157,7 @@ class _Searcher:
         _, rows = self._planner.solve_rows(*ends, self._bounds, budget.over, checked=True)
         return SearchResult(rows, self._planner.statistics)
 
-    def _found(self, query: Query, result: SearchResult) -> _Found | None:
+    def _checked_path(self, query: Query, result: SearchResult) -> _Found | None:
         """What was found, if it is a path from the start to the goal."""
         if result.path is None:
             return None
@@ -164,17 +169,19 @@ class _Searcher:
 
 def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Room | None]]) -> dict[int, Proof]:
     """Proofs of those routes that are proven to keep what their ends do, by their numbers."""
-    made: dict[int, Proof] = {}
-    for kept in sorted({room.kept for _, room in routes.values() if room is not None}):
-        own = {k: rows for k, (rows, room) in routes.items() if room is not None and room.kept == kept}
+    proofs: dict[int, Proof] = {}
+    for clearance in sorted({room.kept for _, room in routes.values() if room is not None}):
+        routes_of_clearance = {
+            k: rows for k, (rows, room) in routes.items() if room is not None and room.kept == clearance
+        }
         proven = world.motions_proven(
-            np.concatenate([rows[:-1] for rows in own.values()]),
-            np.concatenate([rows[1:] for rows in own.values()]),
-            clearance=kept,
+            np.concatenate([rows[:-1] for rows in routes_of_clearance.values()]),
+            np.concatenate([rows[1:] for rows in routes_of_clearance.values()]),
+            clearance=clearance,
         )
 
-        ends = np.cumsum([len(rows) - 1 for rows in own.values()])
-        for (k, rows), each in zip(own.items(), np.split(proven, ends[:-1]), strict=True):
-            if each.all():
-                made[k] = Proof(len(rows) - 1, kept, (), world.prover.margin, maker=world.prover)
-    return made
+        ends = np.cumsum([len(rows) - 1 for rows in routes_of_clearance.values()])
+        for (k, rows), is_proven in zip(routes_of_clearance.items(), np.split(proven, ends[:-1]), strict=True):
+            if is_proven.all():
+                proofs[k] = Proof(len(rows) - 1, clearance, (), world.prover.margin, maker=world.prover)
+    return proofs

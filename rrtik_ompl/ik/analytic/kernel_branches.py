@@ -163,10 +163,10 @@ class _Call:
     def answers(self) -> list[NDArray[Any]]:
         """As `reference_branches` gives them; those of the odd targets are to be filled in."""
         table = self._table
-        own = slice(self._count)
-        q = table.q.reshape(DOF, *self._shape)[:, :, own]
-        residuals = table.residuals.reshape(2 * self._checked, *self._shape)[:, :, own]
-        real, fits = (flags.view(np.bool_).reshape(self._shape)[:, own] for flags in (table.real, table.fits))
+        asked = slice(self._count)
+        q = table.q.reshape(DOF, *self._shape)[:, :, asked]
+        residuals = table.residuals.reshape(2 * self._checked, *self._shape)[:, :, asked]
+        real, fits = (flags.view(np.bool_).reshape(self._shape)[:, asked] for flags in (table.real, table.fits))
         return [q, real, real & fits, np.zeros(self._count, dtype=np.uint8), residuals]
 
 

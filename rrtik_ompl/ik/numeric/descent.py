@@ -42,8 +42,8 @@ def walk(
         return walk_plainly(robot, aims, starts, steps, patience)
 
     call = KernelCall(limb, aims, np.clip(starts, robot.lower, robot.upper), steps, patience)
-    most = kernels.walk(limb.address, call.address)
-    return call.q, call.reached, most
+    most_steps = kernels.walk(limb.address, call.address)
+    return call.q, call.reached, most_steps
 
 
 def descend(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = STEPS) -> tuple[Matrix, int]:
@@ -110,30 +110,37 @@ class Search:
         self._aims = aims
         self._near = np.empty((len(aims), robot.dof))
         self._near[:] = robot.clamp(np.asarray(near))
-        self._next = np.zeros(len(aims), dtype=np.int64)
+        self._num_starts = np.zeros(len(aims), dtype=np.int64)  # that each goal has tried
         self.q: Matrix = self._near.copy()
         self.steps = 0
 
     def advance(self, rows: NDArray[np.int64]) -> Mask:
-        """Find the next solution of some goals by their numbers, shape (k,); which of them have one, shape (k,).
+        """Find the next solution of some goals.
 
-        A goal without one has come to the end of its starts, 513 of them.
+        Args:
+            rows: Numbers of the goals, shape (k,).
+
+        Returns:
+            Which of them have one, shape (k,). A goal without one has come to the end of its starts, 513 of them.
         """
         if len(rows) <= AT_A_TIME:
             return self._advance(rows)
         return np.concatenate([self._advance(rows[k : k + AT_A_TIME]) for k in range(0, len(rows), AT_A_TIME)])
 
     def _advance(self, rows: NDArray[np.int64]) -> Mask:
+        """As :meth:`advance`, in one call of the kernels."""
         kernels = library(KERNELS)
         limb = seeded_limb_of(self._robot)
         if kernels is None or limb is None:
             return self._advance_plainly(rows)
 
-        call = KernelCall(limb, self._aims[rows], self.q[rows], STEPS, PATIENCE, self._near[rows], self._next[rows])
+        call = KernelCall(
+            limb, self._aims[rows], self.q[rows], STEPS, PATIENCE, self._near[rows], self._num_starts[rows]
+        )
         kernels.solve(limb.address, call.address)
         self.steps += call.steps
         self.q[rows] = call.q
-        self._next[rows] = call.next
+        self._num_starts[rows] = call.next
         return call.reached
 
     def _advance_plainly(self, rows: NDArray[np.int64]) -> Mask:
@@ -143,18 +150,17 @@ class Search:
         order = np.argsort(farness(self._robot, self._aims[rows], seeds.tips), axis=1, kind="stable")
 
         while True:
-            open_rows = np.flatnonzero(~reached & (self._next[rows] <= SEEDS))
+            open_rows = np.flatnonzero(~reached & (self._num_starts[rows] <= SEEDS))
             if len(open_rows) == 0:
                 return reached
 
             going = rows[open_rows]
-            number = self._next[going]
-            starts = np.where(
-                (number == 0)[:, None], self._near[going], seeds.q[order[open_rows, np.maximum(number, 1) - 1]]
-            )
+            start_number = self._num_starts[going]
+            nearest_seeds = seeds.q[order[open_rows, np.maximum(start_number, 1) - 1]]
+            starts = np.where((start_number == 0)[:, None], self._near[going], nearest_seeds)
 
-            q, there, taken = walk_plainly(self._robot, self._aims[going], starts, STEPS, PATIENCE)
+            q, at_goal, taken = walk_plainly(self._robot, self._aims[going], starts, STEPS, PATIENCE)
             self.q[going] = q
-            reached[open_rows] = there
-            self._next[going] += 1
+            reached[open_rows] = at_goal
+            self._num_starts[going] += 1
             self.steps += taken

@@ -106,6 +106,8 @@ def _many(request: IkRequest) -> IkResponse:
 
 
 def _answered(request: IkRequest, found: Matrix, steps: int, timed_out: bool) -> IkResponse:
+    """The response with what was found, shape (k, dof), or else with the posture that comes nearest."""
     if len(found):
         return IkResponse(found, request.near, steps, timed_out)
-    return IkResponse(found, nearest_posture(request, searched=not request.all and not timed_out), steps, timed_out)
+    searched = not request.all and not timed_out
+    return IkResponse(found, nearest_posture(request, searched=searched), steps, timed_out)

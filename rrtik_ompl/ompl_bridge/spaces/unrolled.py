@@ -57,14 +57,16 @@ class Unrolled:
         base = starts[0]
         self._turning = turning
         self._base = base
-        self._given: dict[bytes, Vector] = {}
+        self._end_of_image: dict[bytes, Vector] = {}
 
-        self.starts = np.array([self._known(self._near(row), row) for row in starts])
-        each = max(1, MOST_GOALS // max(len(goals), 1))
-        images = [[self._known(row, goal) for row in self._images(goal)[:each]] for goal in goals]
-        rows = [row for of_goal in images for row in of_goal[:1]] + [row for of_goal in images for row in of_goal[1:]]
-
-        self.goals = np.array(rows).reshape(-1, len(base))
+        self.starts = np.array([self._remember(self._near(row), row) for row in starts])
+        images_per_goal = max(1, MOST_GOALS // max(len(goals), 1))
+        images_of_goals = [
+            [self._remember(row, goal) for row in self._images(goal)[:images_per_goal]] for goal in goals
+        ]
+        nearest = [image for images in images_of_goals for image in images[:1]]
+        others = [image for images in images_of_goals for image in images[1:]]
+        self.goals = np.array(nearest + others).reshape(-1, len(base))
 
     def bounds(self, lower: Vector, upper: Vector) -> tuple[Vector, Vector]:
         """Bounds of the search, shapes (n,): those given, but of angles a turn to either side of the first start."""
@@ -77,35 +79,37 @@ class Unrolled:
         """A path on the line, shape (k, n), as one whose angles turn the short way; its ends are those given."""
         path = self.divided(rows)
         for end in (0, -1):
-            path[end] = self._given.get(path[end].tobytes(), path[end])
+            path[end] = self._end_of_image.get(path[end].tobytes(), path[end])
         return path
 
     def divided(self, rows: Matrix) -> Matrix:
         """A path on the line, shape (k, n), in pieces in which no angle turns far."""
         return np.vstack([rows[:1], *(pieces(a, b, self._turning)[1:] for a, b in pairwise(rows))])
 
-    def _known(self, image: Vector, given: Vector) -> Vector:
-        self._given[image.tobytes()] = given
+    def _remember(self, image: Vector, end: Vector) -> Vector:
+        """Take note of which start or goal an image is of; returns the image."""
+        self._end_of_image[image.tobytes()] = end
         return image
 
     def _near(self, row: Vector) -> Vector:
+        """The image of a row that is nearest to the first start, shape (n,)."""
         return near_image(row, self._base, self._turning)
 
     def _images(self, row: Vector) -> list[Vector]:
         """The images of a row within a turn of the first start, the nearest ones first."""
-        near = self._near(row)
-        other = np.where(near > self._base, -TAU, TAU)
+        nearest = self._near(row)
+        turn_back = np.where(nearest > self._base, -TAU, TAU)
         axes = np.flatnonzero(self._turning)
 
         if 2 ** len(axes) <= MOST_GOALS:
-            chosen = [np.array(flips) for flips in product((False, True), repeat=len(axes))]
+            flips_of_images = [np.array(flips) for flips in product((False, True), repeat=len(axes))]
         else:
-            chosen = [np.zeros(len(axes), dtype=bool), *np.eye(len(axes), dtype=bool)]
+            flips_of_images = [np.zeros(len(axes), dtype=bool), *np.eye(len(axes), dtype=bool)]
 
         images = []
-        for flips in chosen:
-            image = near.copy()
-            image[axes[flips]] += other[axes[flips]]
+        for flips in flips_of_images:
+            image = nearest.copy()
+            image[axes[flips]] += turn_back[axes[flips]]
             images.append(image)
 
         return sorted(images, key=lambda image: float(np.linalg.norm(image - self._base)))

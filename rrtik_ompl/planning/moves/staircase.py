@@ -168,35 +168,44 @@ def _converted(waypoints: Matrix, world: World, finest: float) -> Matrix:
     rows = _without_tremble(waypoints)
     pieces = [_Piece(a, b, edge, []) for edge, (a, b) in enumerate(pairwise(rows)) if (a != b).any()]
     while any(not piece.orders for piece in pieces):
-        found = iter(_free_orders([piece for piece in pieces if not piece.orders], world))
-        pieces = [piece if piece.orders else replace(piece, orders=next(found)) for piece in pieces]
-        pieces = [part for piece in pieces for part in ([piece] if piece.orders else _halves(piece, world, finest))]
+        orders_found = iter(_free_orders([piece for piece in pieces if not piece.orders], world))
+        tried = [piece if piece.orders else replace(piece, orders=next(orders_found)) for piece in pieces]
 
-    walked = [rows[:1]]
+        pieces = []
+        for piece in tried:
+            pieces += [piece] if piece.orders else _halves(piece, world, finest)
+
+    parts_of_route = [rows[:1]]
     last = -1
     for piece in pieces:
         order = next((order for order in piece.orders if order[0] == last), piece.orders[0])  # two moves become one
-        walked.append(_staircase(piece, order)[1:])
+        parts_of_route.append(_staircase(piece, order)[1:])
         last = order[-1]
-    return merge_moves(np.vstack(walked), tolerance=0.0)
+    return merge_moves(np.vstack(parts_of_route), tolerance=0.0)
 
 
 def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
     """For every piece: last joint first and first joint first, as far as they are free, else whichever order is."""
     joints = [tuple(np.flatnonzero(piece.a != piece.b).tolist()) for piece in pieces]
-    trials = [(piece, order) for piece, own in zip(pieces, joints, strict=True) for order in (own[::-1], own)]
+    trials = [
+        (piece, order)
+        for piece, joints_of_piece in zip(pieces, joints, strict=True)
+        for order in (joints_of_piece[::-1], joints_of_piece)
+    ]
 
     stairs = [_staircase(*trial) for trial in trials]
-    free = world.checks.motions_free(np.vstack([s[:-1] for s in stairs]), np.vstack([s[1:] for s in stairs]))
+    free = world.checks.motions_free(
+        np.vstack([corners[:-1] for corners in stairs]), np.vstack([corners[1:] for corners in stairs])
+    )
 
-    ends = np.cumsum([len(s) - 1 for s in stairs])[:-1]
-    passed = [bool(ok.all()) for ok in np.split(free, ends)]
+    ends = np.cumsum([len(corners) - 1 for corners in stairs])[:-1]
+    passed = [bool(is_free.all()) for is_free in np.split(free, ends)]
 
     found = []
     for k, piece in enumerate(pieces):
         both = zip(trials[2 * k : 2 * k + 2], passed[2 * k : 2 * k + 2], strict=True)
-        plain = [order for (_, order), ok in both if ok]
-        found.append(plain or staircase_orders(piece.a, piece.b, world.checks.motions_free))
+        simple_orders = [order for (_, order), is_free in both if is_free]
+        found.append(simple_orders or staircase_orders(piece.a, piece.b, world.checks.motions_free))
     return found
 
 
