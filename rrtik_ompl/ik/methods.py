@@ -29,6 +29,7 @@ def load_kernels(robot: Robot) -> None:
 
 
 def _closed_form_misfit(robot: Robot, target: Target) -> str:
+    """Why the closed form does not fit a robot and a target; "" if it does."""
     if not has_closed_form(robot):
         return "the robot brings no closed form"
     if form_of(robot).kind == "pose" and not target.oriented:
@@ -40,7 +41,9 @@ def _closed_form(request: IkRequest) -> IkResponse:
     """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
     robot = request.robot
     targets = request.targets
-    q = valid_branches(robot, form_of(robot), _matrix(targets[0]), request.near) if len(targets) == 1 else None
+    q = None
+    if len(targets) == 1:
+        q = valid_branches(robot, form_of(robot), _matrix(targets[0]), request.near)
     if q is None:
         found = branches_of(robot, *_poses_and_hints(request), check=False)
         q = found.branches[found.valid]
@@ -50,17 +53,18 @@ def _closed_form(request: IkRequest) -> IkResponse:
     # none will do: see by forward kinematics which ones are at a goal, and which came nearest
     found = branches_of(robot, *_poses_and_hints(request))
     rows = found.branches.reshape(-1, robot.dof)
-    owner = np.repeat(np.arange(len(targets)), found.real.shape[1])
+    target_of_row = np.repeat(np.arange(len(targets)), found.real.shape[1])
     residuals = np.asarray(found.residuals).reshape(-1, 2)
-    near_enough = residuals <= np.array([target.tolerances for target in targets])[owner]
-    reaching = near_enough.all(axis=1)
-    q = rows[inside_limits(robot, rows) & reaching]
+    within_tolerance = residuals <= np.array([target.tolerances for target in targets])[target_of_row]
+    at_goal = within_tolerance.all(axis=1)
+    q = rows[inside_limits(robot, rows) & at_goal]
 
     if not request.accept(q).any():
         q = np.vstack([q, *(family(robot, _matrix(target), slack=_slack(target)) for target in targets)])
 
-    outside = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)
-    best = np.argmin(np.where(reaching, outside, np.inf) if reaching.any() else residuals.sum(axis=1))
+    beyond_limits = np.maximum(robot.lower - rows, rows - robot.upper).max(axis=1)
+    misses = np.where(at_goal, beyond_limits, np.inf) if at_goal.any() else residuals.sum(axis=1)
+    best = np.argmin(misses)
     return IkResponse(q, rows[int(best)], singular=leaves_a_curve(robot, targets))
 
 
@@ -82,6 +86,7 @@ def _slack(target: Target) -> float:
 
 
 def _matrix(target: Target) -> Matrix:
+    """The pose of a target, shape (4, 4)."""
     return np.asarray(target.pose.homogeneous, dtype=np.float64)
 
 

@@ -24,8 +24,8 @@ NEAR_HALF_TURN = 1e-4  # [rad] from pi, where the skew part of a rotation no lon
 def well_inside(robot: Robot, goal: Target, Q: Matrix) -> Mask:
     """Which rows of Q, shape (m, dof), are at most a hundredth of the tolerance away."""
     position, angle = goal.errors(robot, Q)
-    near, turned = goal.tolerances
-    return (position <= SHARE * near) & (angle <= SHARE * turned)
+    max_distance, max_angle = goal.tolerances
+    return (position <= SHARE * max_distance) & (angle <= SHARE * max_angle)
 
 
 def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
@@ -33,17 +33,17 @@ def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
 
     By Pinocchio and in numbers of Python's own: as `tip_errors`, up to rounding, in a quarter of its time.
     """
-    model, data, frame, plain = _tip_of(robot, get_ident())
-    pin.forwardKinematics(model, data, q if plain else pinocchio_rows(robot, q[None])[0])
+    model, data, frame, q_is_pinocchios = _tip_of(robot, get_ident())
+    pin.forwardKinematics(model, data, q if q_is_pinocchios else pinocchio_rows(robot, q[None])[0])
     tip = pin.updateFramePlacement(model, data, frame)
-    away = math.dist(tip.translation.tolist(), goal.point.tolist())
+    distance = math.dist(tip.translation.tolist(), goal.point.tolist())
     if not goal.oriented:
-        return away, 0.0
+        return distance, 0.0
 
     # sine from the skew part, cosine from the trace: exact for small angles and for large ones
     a, b, c = goal.pose.actInv(tip).rotation.tolist()
     sine = 0.5 * math.hypot(c[1] - b[2], a[2] - c[0], b[0] - a[1])
-    return away, math.atan2(sine, 0.5 * (a[0] + b[1] + c[2] - 1.0))
+    return distance, math.atan2(sine, 0.5 * (a[0] + b[1] + c[2] - 1.0))
 
 
 @lru_cache(maxsize=64)
@@ -52,12 +52,12 @@ def _tip_of(robot: Robot, thread: int) -> tuple[Any, Any, int, bool]:
     del thread
     chain = robot.chain
     model = robot.model
-    plain = model.nq == robot.dof and np.array_equal(chain.gain, np.eye(robot.dof)) and not chain.offset.any()
-    return model, working_memory(model), int(model.getFrameId(robot.tip)), plain
+    q_is_pinocchios = model.nq == robot.dof and np.array_equal(chain.gain, np.eye(robot.dof)) and not chain.offset.any()
+    return model, working_memory(model), int(model.getFrameId(robot.tip)), q_is_pinocchios
 
 
 def walked(
-    robot: Robot, goal: Target, starts: Matrix, step: Callable[[Matrix], Matrix], most: int, enough: int | None
+    robot: Robot, goal: Target, starts: Matrix, step: Callable[[Matrix], Matrix], max_steps: int, enough: int | None
 ) -> tuple[Matrix, int]:
     """Take steps from many starts, inside the limits, until enough of them have arrived.
 
@@ -66,19 +66,19 @@ def walked(
         goal: Where to.
         starts: Shape (m, dof).
         step: From rows that have not arrived, shape (k, dof), to the next ones.
-        most: Steps at most.
+        max_steps: Steps at most.
         enough: So many starts are enough; all of them if None.
 
     Returns:
         Where each start has led to, shape (m, dof), and the steps taken.
     """
     Q = np.clip(starts, robot.lower, robot.upper)
-    for number in range(most):
-        left = np.flatnonzero(~well_inside(robot, goal, Q))
-        if len(Q) - len(left) >= min(len(Q), enough or len(Q)):
+    for number in range(max_steps):
+        not_arrived = np.flatnonzero(~well_inside(robot, goal, Q))
+        if len(Q) - len(not_arrived) >= min(len(Q), enough or len(Q)):
             return Q, number
-        Q[left] = step(Q[left])
-    return Q, most
+        Q[not_arrived] = step(Q[not_arrived])
+    return Q, max_steps
 
 
 def twist(goal: Target, tips: NDArray[np.float64]) -> Matrix:
@@ -96,8 +96,8 @@ def twist_between(tips: NDArray[np.float64], rotations: NDArray[np.float64], pos
 
 def shortened(steps: Matrix, largest: float) -> Matrix:
     """Steps of joints, shape (m, dof), scaled so that no joint moves further than allowed [rad or m]."""
-    most = np.abs(steps).max(axis=1, keepdims=True)
-    bounded: Matrix = steps * np.minimum(1.0, largest / np.maximum(most, 1e-12))
+    largest_of_step = np.abs(steps).max(axis=1, keepdims=True)
+    bounded: Matrix = steps * np.minimum(1.0, largest / np.maximum(largest_of_step, 1e-12))
     return bounded
 
 

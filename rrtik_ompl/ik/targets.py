@@ -31,7 +31,8 @@ def _drawn(goal: TipGoal, max_count: int, rng: np.random.Generator) -> tuple[lis
     parts = goal.parts
     if len(parts) > max_count:
         parts = tuple(parts[k] for k in rng.permutation(len(parts))[:max_count])
-    count = max_count if any(leaves_freedom(part) for part in parts) else len(parts)
+    goal_leaves_freedom = any(leaves_freedom(part) for part in parts)
+    count = max_count if goal_leaves_freedom else len(parts)
     drawn = [parts[k % len(parts)] for k in range(count)]
     bounds = np.array([part.freedom.bounds for part in drawn if part.freedom is not None]).reshape(-1, 6, 2)
     return drawn, rng.uniform(bounds[..., 0], bounds[..., 1])

@@ -93,6 +93,8 @@ class _Objective(ob.OptimizationObjective):  # type: ignore[misc]  # OMPL has no
 
 
 class _Clearance(_Objective):
+    """Length, where pieces near obstacles count more; see the function of the objective."""
+
     def __init__(self, si: ob.SpaceInformation, world: World, weight: float) -> None:
         super().__init__(si, world.robot.dof)
         self._world = world
@@ -105,11 +107,15 @@ class _Clearance(_Objective):
 
 
 class _Moves(_Objective):
+    """The number of joints that move."""
+
     def cost(self, a: Vector, b: Vector) -> float:
         return float(np.count_nonzero(np.abs(b - a) > STILL))
 
 
 class _TipTravel(_Objective):
+    """How far a frame of the arm goes [m]."""
+
     def __init__(self, si: ob.SpaceInformation, robot: Robot, frame: str | None) -> None:
         super().__init__(si, robot.dof)
         self._robot = robot

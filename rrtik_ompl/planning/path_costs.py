@@ -79,5 +79,5 @@ def _seconds(motions: np.ndarray, robot: Robot) -> Vector:
     """Least time of each motion, shapes (m, dof) and (m,)."""
     if not np.isfinite(robot.velocity).any():
         raise InputError(f"objective 'time': robot '{robot.name}' has no velocity limits; give them in its URDF")
-    found: Vector = (np.abs(motions) / robot.velocity).max(axis=1, initial=0.0)
-    return found
+    seconds: Vector = (np.abs(motions) / robot.velocity).max(axis=1, initial=0.0)
+    return seconds

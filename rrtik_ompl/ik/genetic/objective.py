@@ -46,11 +46,11 @@ def score(
         accept: Which configurations will do; the others cost as much as the arm's reach more.
     """
     tips = poses(robot, Q)
-    near, turned = target.tolerances
+    max_distance, max_angle = target.tolerances
     distance, angle = target.tip_errors(tips)
-    reached = distance < near
+    reached = distance < max_distance
     if target.oriented:
-        reached &= angle < turned
+        reached &= angle < max_angle
 
     cost = distance + options.orientation_weight * angle
     if options.motion_weight and last is not None:
@@ -58,10 +58,10 @@ def score(
     if options.singularity_weight:
         cost -= options.singularity_weight * manipulability(robot, Q, not target.oriented)
 
-    good = accept(Q)
-    if not good.all():
-        reached &= good
-        cost += reach_of(robot) * ~good
+    accepted = accept(Q)
+    if not accepted.all():
+        reached &= accepted
+        cost += reach_of(robot) * ~accepted
 
     return Score(cost, distance, angle, reached)
 

@@ -62,7 +62,7 @@ class PublishedSearch:
         self._steps = steps
         self._lower = lower
         self._upper = upper
-        self._free = motion_free
+        self._motion_is_free = motion_free
         self._stop = stop
         self._rng = rng
         self.tree = IkurtTree(start[None], metric.distance(start[None]))
@@ -81,7 +81,7 @@ class PublishedSearch:
             q_rand = self._random()
             near = int(self.tree.nearest(q_rand[None])[0])
             q_new = self._inside(_extend(self.tree.q[near], q_rand, self._steps.step))
-            if self._free(self.tree.q[near], q_new):
+            if self._motion_is_free(self.tree.q[near], q_new):
                 self._add(q_new, near, self._distance(q_new))
         return None
 
@@ -92,7 +92,7 @@ class PublishedSearch:
         q_near = self.tree.q[near].copy()
         while not self._stop():
             q_new = self._towards_any(q_near, delta)
-            if not self._free(q_near, q_new):
+            if not self._motion_is_free(q_near, q_new):
                 missed += 1
                 if missed > self._steps.misses:
                     break

@@ -23,7 +23,7 @@ class IkurtTree:
         self._q = np.empty((max(FIRST_ROOM, len(roots)), roots.shape[1]))
         self._parent = np.empty(len(self._q), dtype=np.int64)
         self._distance = np.empty(len(self._q))
-        self._rank = np.empty(len(self._q))
+        self._penalised_distance = np.empty(len(self._q))
         self.size = 0
         self.add(roots, np.full(len(roots), -1), distances)
 
@@ -44,7 +44,7 @@ class IkurtTree:
         numbers = np.arange(self.size, self.size + len(q))
         self._q[numbers] = q
         self._parent[numbers] = parents
-        self._distance[numbers] = self._rank[numbers] = distances
+        self._distance[numbers] = self._penalised_distance[numbers] = distances
         self.size += len(q)
         return numbers
 
@@ -54,13 +54,13 @@ class IkurtTree:
 
     def best(self) -> int:
         """The vertex nearest to the goal in the workspace, penalties counted."""
-        return int(self._rank[: self.size].argmin())
+        return int(self._penalised_distance[: self.size].argmin())
 
     def penalise(self, first: int, last: int) -> None:
         """CONNECT has failed on its way from vertex ``first`` down to ``last``: prefer other vertices to these."""
         vertex = last
         while vertex >= 0:
-            self._rank[vertex] *= PENALTY
+            self._penalised_distance[vertex] *= PENALTY
             vertex = -1 if vertex == first else int(self._parent[vertex])
 
     def nearest(self, Q: Matrix) -> NDArray[np.int64]:
@@ -81,4 +81,4 @@ class IkurtTree:
         self._q = np.concatenate([self._q, np.empty_like(self._q)])
         self._parent = np.concatenate([self._parent, np.empty_like(self._parent)])
         self._distance = np.concatenate([self._distance, np.empty_like(self._distance)])
-        self._rank = np.concatenate([self._rank, np.empty_like(self._rank)])
+        self._penalised_distance = np.concatenate([self._penalised_distance, np.empty_like(self._penalised_distance)])

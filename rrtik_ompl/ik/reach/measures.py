@@ -88,8 +88,8 @@ MEASURES: Mapping[str, Callable[[int, bool], Counter]] = MappingProxyType(
 def _directions(planar: bool) -> Matrix:
     """Evenly spread unit vectors, shape (DIRECTIONS, 3): a circle, or a sunflower on the sphere."""
     if planar:
-        around = TAU * np.arange(DIRECTIONS) / DIRECTIONS
-        return np.stack([np.cos(around), np.sin(around), np.zeros(DIRECTIONS)], axis=1)
+        angle = TAU * np.arange(DIRECTIONS) / DIRECTIONS
+        return np.stack([np.cos(angle), np.sin(angle), np.zeros(DIRECTIONS)], axis=1)
     height = 1.0 - (2.0 * np.arange(DIRECTIONS) + 1.0) / DIRECTIONS
     turn = GOLDEN * np.arange(DIRECTIONS)
     radius = np.sqrt(1.0 - height**2)

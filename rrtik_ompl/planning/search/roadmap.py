@@ -159,9 +159,9 @@ class Roadmap:
 
     def grow(self, vertices: int, *, seconds: float = SECONDS) -> int:
         """Add so many vertices and check their edges, for some seconds at most; how many were added."""
-        end = time.perf_counter() + positive(seconds, "seconds")
-        added = self.graph.grow(whole_number(vertices, "vertices"), lambda: time.perf_counter() > end)
-        self.graph.check(lambda: time.perf_counter() > end)
+        deadline = time.perf_counter() + positive(seconds, "seconds")
+        added = self.graph.grow(whole_number(vertices, "vertices"), lambda: time.perf_counter() > deadline)
+        self.graph.check(lambda: time.perf_counter() > deadline)
         return added
 
     def path(self, start: ArrayLike, goal: ArrayLike, *, seconds: float = 1.0) -> JointPath | None:
@@ -180,8 +180,8 @@ class Roadmap:
             InputError: If one of them is no configuration of the robot.
         """
         ends = usable_configurations(self.world, {"start": start, "goal": goal})
-        end = time.perf_counter() + positive(seconds, "seconds")
-        rows = self.route(ends["start"][None], ends["goal"][None], lambda: time.perf_counter() > end)
+        deadline = time.perf_counter() + positive(seconds, "seconds")
+        rows = self.route(ends["start"][None], ends["goal"][None], lambda: time.perf_counter() > deadline)
         return None if rows is None else JointPath.of(self.world.robot, rows)
 
     def route(self, starts: Matrix, goals: Matrix, stop: Stop) -> Matrix | None:

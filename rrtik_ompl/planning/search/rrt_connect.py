@@ -78,7 +78,8 @@ class RrtConnect:
         extent = rules.upper - rules.lower
         while not stop() and self.iterations < self._limit:
             self.iterations += 1
-            side = self._last_side = self._next_side()
+            side = self._next_side()
+            self._last_side = side
             growing = self.trees[side]
             other = self.trees[1 - side]
             vertex = extend(growing, lower + extent * self._rng.random(len(lower)), rules, motion_free)
@@ -87,15 +88,17 @@ class RrtConnect:
 
             met = reach(other, growing.row(vertex), rules, motion_free, stop)
             if met is not None:
-                ends = (vertex, met) if side == 0 else (met, vertex)
-                return path_between(self.trees[0].branch(ends[0]), self.trees[1].branch(ends[1]))
+                from_start, from_goal = (vertex, met) if side == 0 else (met, vertex)
+                return path_between(self.trees[0].branch(from_start), self.trees[1].branch(from_goal))
         return None
 
     def _next_side(self) -> int:
         """Number of the tree that grows next."""
         side = 1 - self._last_side
-        larger = self.trees[side].size > self.trees[1 - side].size
-        return 1 - side if self._rules.balanced and larger else side
+        is_larger = self.trees[side].size > self.trees[1 - side].size
+        if self._rules.balanced and is_larger:
+            return 1 - side
+        return side
 
 
 def straight_path(starts: Matrix, goals: Matrix, motion_free: MotionFree, stop: Stop) -> Matrix | None:
@@ -159,5 +162,10 @@ def path_between(first: Matrix, second: Matrix) -> Matrix:
 
 
 def _towards(start: Vector, end: Vector, length: float, max_length: float) -> Vector:
-    """The end, or the point at a distance of ``max_length`` from the start on the straight line to it."""
-    return end if length <= max_length else start + (end - start) * (max_length / length)
+    """The end, or the point at a distance of ``max_length`` from the start on the straight line to it.
+
+    ``length`` is the distance of the two.
+    """
+    if length <= max_length:
+        return end
+    return start + (end - start) * (max_length / length)
