@@ -97,10 +97,10 @@ def attempt(
     traits = traits_of(factory)
     goals = goals[:1] if traits.one_goal else goals
     if len(goals) and not traits.one_joint and has_weights(problem):
-        form = WeightedProblem(problem)
-        aims = form.there(goals)
-        found = attempt(form.problem, factory, aims, budget, parameters=parameters, checked=checked)
-        return replace(found, rows=form.found(found.rows, goals))
+        weighted = WeightedProblem(problem)
+        aims = weighted.weighted_rows(goals)
+        found = attempt(weighted.problem, factory, aims, budget, parameters=parameters, checked=checked)
+        return replace(found, rows=weighted.joint_path(found.rows, goals))
 
     with quiet():
         seed_ompl(budget.seed)

@@ -36,20 +36,20 @@ class WeightedProblem:
         start = frozen(problem.start * self._scale)
         self.problem = changed(problem, settings=settings, start=start, world=weighted)
 
-    def there(self, rows: Matrix) -> Matrix:
+    def weighted_rows(self, rows: Matrix) -> Matrix:
         """Configurations in these coordinates, shape (m, dof)."""
         return np.asarray(rows * self._scale)
 
-    def back(self, rows: Matrix, known: Matrix) -> Matrix:
+    def joint_rows(self, rows: Matrix, known: Matrix) -> Matrix:
         """Configurations of the arm, shape (m, dof); values of those that are ``known`` come back to the bit."""
-        found = rows / self._scale
+        unweighted = rows / self._scale
         for row in known:
-            found = np.where(rows == row * self._scale, row, found)
-        return np.asarray(found)
+            unweighted = np.where(rows == row * self._scale, row, unweighted)
+        return np.asarray(unweighted)
 
-    def found(self, rows: Matrix | None, goals: Matrix) -> Matrix | None:
+    def joint_path(self, rows: Matrix | None, goals: Matrix) -> Matrix | None:
         """A path to one of some goals as one of the arm, shape (k, dof), or None."""
-        return None if rows is None else self.back(rows, np.vstack([self._start, goals]))
+        return None if rows is None else self.joint_rows(rows, np.vstack([self._start, goals]))
 
 
 def has_weights(problem: Problem) -> bool:

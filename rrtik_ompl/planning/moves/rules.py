@@ -79,13 +79,15 @@ class MoveRules:
         """
         route = self._route(route)
 
-        ending = np.diff(route[self.head(route) - 1 :], axis=0)
-        others = np.delete(ending, self.last_joints, axis=1)
-        times = np.count_nonzero(np.diff(merge_moves(route, tolerance=0.0), axis=0), axis=0)  # that each joint moves
-        once = times[self.last_joints] <= 1
-        rests = (route[:, self.frozen_joints] == route[0, self.frozen_joints]).all()
+        last_moves = np.diff(route[self.head(route) - 1 :], axis=0)
+        moves_of_others = np.delete(last_moves, self.last_joints, axis=1)
+        move_counts = np.count_nonzero(np.diff(merge_moves(route, tolerance=0.0), axis=0), axis=0)  # of each joint
+        last_joints_move_once = (move_counts[self.last_joints] <= 1).all()
+        frozen_joints_rest = (route[:, self.frozen_joints] == route[0, self.frozen_joints]).all()
 
-        return bool(rests and once.all() and not others.any() and long_enough(route, self.smallest_move))
+        if not frozen_joints_rest or not last_joints_move_once or moves_of_others.any():
+            return False
+        return long_enough(route, self.smallest_move)
 
     def head(self, route: Matrix) -> int:
         """How many waypoints of a route, shape (k, n), come before the last joints move.

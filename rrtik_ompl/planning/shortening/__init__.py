@@ -262,10 +262,11 @@ def _run(chosen: Method, form: Form, route: Matrix, wishes: Wishes, single: bool
     weighted = WeightedProblem(form.problem, form.motions)
     on_better = wishes.on_better
     if on_better is not None:
-        wishes = replace(wishes, on_better=lambda rows: on_better(weighted.back(rows, route[[0, -1]])))
+        wishes = replace(wishes, on_better=lambda rows: on_better(weighted.joint_rows(rows, route[[0, -1]])))
 
     task = Task(weighted.problem.world, wishes)
-    return task, weighted.back(chosen.run(weighted.there(route), task, weighted.problem), route[[0, -1]])
+    rows = chosen.run(weighted.weighted_rows(route), task, weighted.problem)
+    return task, weighted.joint_rows(rows, route[[0, -1]])
 
 
 def _keeps_single_joint_moves(path: JointPath, method: ShorteningMethod, one_joint: bool | None) -> bool:
