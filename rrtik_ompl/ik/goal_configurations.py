@@ -160,7 +160,9 @@ class GoalSearch:
         goal = self._problem.goal
         if not isinstance(goal, TipGoal):  # of several tips
             regions = () if world.constraints is None else world.constraints.regions
-            return at_all_tips(world.robot, goal, self._problem.start, self._rng, scene=world.scene, kept=regions)
+            return at_all_tips(
+                world.robot, goal, self._problem.start, self._rng, scene=world.scene, path_regions=regions
+            )
 
         found = self._solve_ik_round(goal)
         if self._problem.constraints:

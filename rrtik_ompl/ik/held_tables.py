@@ -39,9 +39,9 @@ class HeldTables:
         self.regions = constraints.regions
         self._limbs = limbs
         dof = robot.dof
-        made = [_region_tables(*pair) for pair in zip(constraints.regions, limbs, strict=True)]
-        addresses = [region.address for region, _ in made]
-        self._parts = [part for parts in made for part in parts]
+        tables = [_region_tables(*pair) for pair in zip(constraints.regions, limbs, strict=True)]
+        addresses = [region.address for region, _ in tables]
+        self._parts = [part for parts in tables for part in parts]
 
         self.held = packed(
             HeldTable,
@@ -121,10 +121,10 @@ def _shortest_step(region: HeldRegion) -> float:
     """Half the step of all joints that has room to bend inside a region, `SHORTEST_STEP` at most."""
     dof = region.robot.dof
     step = np.full((1, dof), SHORTEST_STEP / np.sqrt(dof))
-    room = region.limits(between=True) - region.kept
+    space_left = region.limits(between=True) - region.kept
     bent = region.deviations(np.zeros((1, dof)), step)[0]
     # a chord leaves its curve by the square of its length
-    share = float(np.sqrt((room[bent > 0.0] / bent[bent > 0.0]).min(initial=4.0)))
+    share = float(np.sqrt((space_left[bent > 0.0] / bent[bent > 0.0]).min(initial=4.0)))
     return SHORTEST_STEP * min(0.5 * share, 1.0)
 
 
@@ -132,9 +132,9 @@ def projected_onto(robot: Robot, constraints: HeldRegions, rows: Matrix) -> Matr
     """Configurations, shape (m, dof), moved into all regions and limits; those that got there, shape (k, dof)."""
     tables = held_tables(robot, constraints)
     rows = robot.clamp(rows)  # one that is there already is not moved
-    moved, there = projected_rows(robot, constraints, rows) if tables is None else tables.project(rows)
-    held: Matrix = moved[there & constraints.held(moved)]
-    return held
+    moved, reached = projected_rows(robot, constraints, rows) if tables is None else tables.project(rows)
+    in_all_regions: Matrix = moved[reached & constraints.held(moved)]
+    return in_all_regions
 
 
 def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:

@@ -26,7 +26,13 @@ STARTS = 96  # random ones, for each tip
 
 
 def at_all_tips(
-    robot: Robot, goal: Goal, near: Vector, rng: np.random.Generator, *, scene: Scene, kept: Iterable[HeldRegion]
+    robot: Robot,
+    goal: Goal,
+    near: Vector,
+    rng: np.random.Generator,
+    *,
+    scene: Scene,
+    path_regions: Iterable[HeldRegion],
 ) -> Matrix:
     """Configurations with all tips at their goals that keep path constraints, shape (k, dof).
 
@@ -39,7 +45,7 @@ def at_all_tips(
         near: One of the starts, shape (dof,).
         rng: Of the others.
         scene: Whose attached objects may have goals too.
-        kept: Regions of path constraints.
+        path_regions: Regions of path constraints.
     """
     regions = goal_regions(robot, scene, goal)
     starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
@@ -55,7 +61,7 @@ def at_all_tips(
         moved = _moving(robot, region)
         joined[:, moved] = of_this_tip[rows][:, moved]
 
-    found = projected_onto(robot, HeldRegions((*kept, *regions)), joined)
+    found = projected_onto(robot, HeldRegions((*path_regions, *regions)), joined)
     at_goal: Matrix = found[goal.satisfied(robot, found)] if len(found) else found
     return at_goal
 
@@ -93,7 +99,7 @@ def solve_all_tips(
 
     while rounds == 0 or time.monotonic() < deadline:
         rounds += 1
-        found = at_all_tips(robot, goal, near, rng, scene=scene, kept=())
+        found = at_all_tips(robot, goal, near, rng, scene=scene, path_regions=())
         free = found[accept(found)]
         if len(free):
             turned = joint_difference(robot, free, near)

@@ -19,8 +19,8 @@ BLOCK = 2048  # targets at a time: their arrays stay in the cache
 @lru_cache(maxsize=64)
 def tip_fault(robot: Robot, form: AnalyticSolver) -> str:
     """A line if the robot's tip is carried by another joint than the frame that the form places; else ""."""
-    tip, own = (robot.model.frames[robot.model.getFrameId(name)] for name in (robot.tip, form.frame))
-    if tip.parentJoint == own.parentJoint:
+    tip, solver_frame = (robot.model.frames[robot.model.getFrameId(name)] for name in (robot.tip, form.frame))
+    if tip.parentJoint == solver_frame.parentJoint:
         return ""
     return f"its closed form places '{form.frame}', and the tip '{robot.tip}' does not move with that frame"
 

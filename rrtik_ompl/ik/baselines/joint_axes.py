@@ -86,8 +86,8 @@ class Swing:
 
         # where no turn of it is inside, the better end of the two
         lower_end = A * np.cos(low) + B * np.sin(low) >= A * np.cos(high) + B * np.sin(high)
-        inside = (best >= low) & (best <= high)
-        angle: Vector = np.where(inside, best, np.where(lower_end, low, high))
+        is_inside = (best >= low) & (best <= high)
+        angle: Vector = np.where(is_inside, best, np.where(lower_end, low, high))
         return np.where(np.hypot(A, B) > 0.0, angle, np.clip(0.0, low, high))
 
     def turned(self, angle: Vector) -> NDArray[np.float64]:

@@ -171,12 +171,12 @@ class GaRun:
 
     def will_do(self, Q: Matrix) -> Mask:
         """Which configurations may be taken: near enough to the last point, and accepted."""
-        good = np.ones(len(Q), dtype=bool)
+        usable = np.ones(len(Q), dtype=bool)
         if self.options.largest_step is not None and self.points:
-            good = np.abs(joint_difference(self.robot, Q, self.points[-1])).max(axis=1) <= self.options.largest_step
+            usable = np.abs(joint_difference(self.robot, Q, self.points[-1])).max(axis=1) <= self.options.largest_step
         if self.accept is not None:
-            good[good] = self.accept(Q[good])
-        return good
+            usable[usable] = self.accept(Q[usable])
+        return usable
 
     def remember(self, Q: Matrix, scored: Score) -> None:
         """Keep the best distance for the record, and the posture that came nearest to the farthest point so far."""

@@ -74,8 +74,8 @@ class TipMetric:
             return cls(robot, targets, metres_per_radian=0.0)
         if mu is None:
             tip = poses(robot, start[None])
-            away = min(float(target.tip_errors(tip)[0][0]) for target in targets)
-            mu = 0.5 * np.pi / max(away, NEAREST_START * reach(robot))
+            first_distance = min(float(target.tip_errors(tip)[0][0]) for target in targets)
+            mu = 0.5 * np.pi / max(first_distance, NEAREST_START * reach(robot))
         return cls(robot, targets, metres_per_radian=0.5 / mu, unit=mu)
 
     def distance(self, Q: Matrix) -> Vector:

@@ -97,5 +97,5 @@ def _perpendicular(axis: Matrix, rng: np.random.Generator) -> Matrix:
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(axis, first)
     turn = rng.uniform(-np.pi, np.pi, len(axis))[:, None]
-    around: Matrix = np.cos(turn) * first + np.sin(turn) * second
-    return around
+    perpendicular: Matrix = np.cos(turn) * first + np.sin(turn) * second
+    return perpendicular

@@ -40,21 +40,22 @@ def grow_by_rule_b(axes: Axes, goal: Vector, *, tolerance: float, passes: int, r
     frames[0][0] = axes.fixed[0]
     misses = np.zeros(passes)
 
-    for done in range(passes):
+    for pass_number in range(passes):
         for level in range(axes.count):
-            known = done + 1 if level else 1
+            num_known = pass_number + 1 if level else 1
             sample = goal + axes.max_span[level] * directions(1, 3, rng)[0]
-            parent, angle = _closest_circle(frames[level][:known], axes.points[level], sample)
-            q[level + 1][done] = q[level][parent]
-            q[level + 1][done, level] = angle
-            frames[level + 1][done] = frames[level][parent] @ _about_z(angle) @ axes.fixed[level + 1]
+            parent, angle = _closest_circle(frames[level][:num_known], axes.points[level], sample)
+            q[level + 1][pass_number] = q[level][parent]
+            q[level + 1][pass_number, level] = angle
+            frames[level + 1][pass_number] = frames[level][parent] @ _about_z(angle) @ axes.fixed[level + 1]
 
-        end = frames[-1][done]
-        misses[done] = np.linalg.norm(end[:3, :3] @ axes.aim + end[:3, 3] - goal)
-        if misses[done] < tolerance:
+        end = frames[-1][pass_number]
+        misses[pass_number] = np.linalg.norm(end[:3, :3] @ axes.aim + end[:3, 3] - goal)
+        if misses[pass_number] < tolerance:
             break
 
-    return AxisRun(q[-1][: done + 1] - axes.offset, misses[: done + 1], first_hit(misses[: done + 1], tolerance))
+    misses = misses[: pass_number + 1]
+    return AxisRun(q[-1][: pass_number + 1] - axes.offset, misses, first_hit(misses, tolerance))
 
 
 def _closest_circle(frames: NDArray[np.float64], point: Vector, sample: Vector) -> tuple[int, float]:

@@ -103,14 +103,14 @@ def best_parents(nodes: Matrix, samples: Matrix, length: float, rule: Rule) -> N
         return best
 
     columns = np.ascontiguousarray(nodes.T)
-    before = len(nodes) - len(samples)
+    num_before = len(nodes) - len(samples)
     rows = max(1, SCORES // len(nodes))
     for begin in range(0, len(samples), rows):
         block = samples[begin : begin + rows]
-        known = before + begin + len(block)
-        score = rule(_squared_distances(block, columns[:, :known]), length)
+        num_known = num_before + begin + len(block)
+        score = rule(_squared_distances(block, columns[:, :num_known]), length)
         later = np.triu_indices(len(block), 1)
-        score[later[0], before + begin + later[1]] = np.inf  # nodes of later passes
+        score[later[0], num_before + begin + later[1]] = np.inf  # nodes of later passes
         best[begin : begin + rows] = score.argmin(axis=1)
     return best
 

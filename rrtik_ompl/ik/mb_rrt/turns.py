@@ -62,8 +62,8 @@ def draw_turns(
         outer = np.where(turn_changes_nothing, outer, 0.0)
         inner = np.where(turn_changes_nothing, inner, 0.0)
 
-    drawn, inside = _draw(centre, inner, outer, float(axes.lower[level]), float(axes.upper[level]), rng)
-    return drawn, useful & inside
+    drawn, is_inside = _draw(centre, inner, outer, float(axes.lower[level]), float(axes.upper[level]), rng)
+    return drawn, useful & is_inside
 
 
 def _draw(
@@ -79,7 +79,7 @@ def _draw(
     miss = np.maximum(np.maximum(lower - begins - widths, begins - upper), 0.0).reshape(len(centre), -1)
 
     # arcs inside the limits count by their lengths; where there are none, those that miss them least
-    inside = miss.min(axis=1) <= SLACK
+    is_inside = miss.min(axis=1) <= SLACK
     weight = np.where(miss <= np.minimum(miss.min(axis=1), np.pi)[:, None] + SLACK, ends - starts + SLACK, 0.0)
 
     # one of them, then an angle on it
@@ -88,4 +88,4 @@ def _draw(
     rows = np.arange(len(centre))
     first = starts[rows, pick]
     last = ends[rows, pick]
-    return first + rng.uniform(size=len(centre)) * (last - first), inside
+    return first + rng.uniform(size=len(centre)) * (last - first), is_inside

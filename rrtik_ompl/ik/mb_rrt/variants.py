@@ -53,9 +53,9 @@ def surface(links: Links, goal: Vector, index: int, count: int, rng: np.random.G
 
 def projected(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
     """As `square`, then moved straight to or from the goal onto the circle of `surface` [3, section 4.3]."""
-    away = square(links, goal, index, count, rng) - goal
-    length = np.linalg.norm(away, axis=1, keepdims=True)
-    on_circle: Matrix = goal + links.max_span[index] * away / np.maximum(length, np.finfo(float).tiny)
+    from_goal = square(links, goal, index, count, rng) - goal
+    distance = np.linalg.norm(from_goal, axis=1, keepdims=True)
+    on_circle: Matrix = goal + links.max_span[index] * from_goal / np.maximum(distance, np.finfo(float).tiny)
     return on_circle
 
 

@@ -43,8 +43,8 @@ def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds:
         if number < len(request.targets):
             Q[0] = request.near
         Q, taken = method(robot, target, Q)
-        good = target.satisfied(robot, Q) & inside_limits(robot, Q)
-        found = np.vstack([found, Q[good]])
+        usable = target.satisfied(robot, Q) & inside_limits(robot, Q)
+        found = np.vstack([found, Q[usable]])
         steps += taken
         if request.accept(found).any() and not request.all:
             break
@@ -67,9 +67,9 @@ def nearest_posture(request: IkRequest, *, searched: bool = False) -> Vector:
     aims = aims_of(request)
     if not searched:
         search = Search(robot, aims[:MEMBERS], request.near)
-        inside = search.q[search.advance(np.arange(len(search.q)))]
-        if len(inside):
-            first: Vector = inside[0]
+        solutions = search.q[search.advance(np.arange(len(search.q)))]
+        if len(solutions):
+            first: Vector = solutions[0]
             return first
 
     starts = request.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))

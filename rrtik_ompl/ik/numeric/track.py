@@ -78,7 +78,7 @@ class Tracker:
                 starts[0] = last
             Q, taken = descend(self.robot, target, starts)
             steps += taken
-            Q = self.good(target, Q)
+            Q = self.usable_rows(target, Q)
             if len(Q) or time.monotonic() > self.deadline:
                 break
 
@@ -106,8 +106,8 @@ class Tracker:
             tracks = np.concatenate([tracks[:, goes_on], Q[None, goes_on]])
         return tracks, steps
 
-    def good(self, target: TipGoal, Q: Matrix) -> Matrix:
+    def usable_rows(self, target: TipGoal, Q: Matrix) -> Matrix:
         """The rows that are at the target and will do."""
         Q = Q[target.satisfied(self.robot, Q)]
-        good: Matrix = Q[self.accept(Q)]
-        return good
+        usable: Matrix = Q[self.accept(Q)]
+        return usable

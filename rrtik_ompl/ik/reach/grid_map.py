@@ -54,8 +54,8 @@ class ReachMap:
     @property
     def reached(self) -> NDArray[np.bool_]:
         """Cells in which a sample came, shape (x, y, z)."""
-        inside: NDArray[np.bool_] = self.values > 0.0
-        return inside
+        is_inside: NDArray[np.bool_] = self.values > 0.0
+        return is_inside
 
     @property
     def flat(self) -> bool:
@@ -89,9 +89,9 @@ class ReachMap:
     def value(self, points: Matrix) -> Vector:
         """The values at points, shape (m, 3) [m]; 0 outside the grid. Shape (m,)."""
         places = np.floor((finite_array(points, (None, 3), "points") - self.corner) / self.size).astype(int)
-        inside = ((places >= 0) & (places < self.values.shape)).all(axis=1)
+        is_inside = ((places >= 0) & (places < self.values.shape)).all(axis=1)
         found = np.zeros(len(places))
-        found[inside] = self.values[tuple(places[inside].T)]
+        found[is_inside] = self.values[tuple(places[is_inside].T)]
         return found
 
     def slices(self) -> list[Slice]:

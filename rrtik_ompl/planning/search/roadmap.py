@@ -318,10 +318,10 @@ def _restored(
     world: World, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32], *, seed: int, near: int
 ) -> Roadmap:
     """A roadmap from what another one had; what it adds later begins with other samples."""
-    made = Roadmap(world, vertices=0, seed=seed, near=near)
-    made.graph = graph_in(world, *_box(world.robot), near=near, seed=seed + len(rows), checks=world)
-    made.graph.restore(rows, edges, states)
-    return made
+    roadmap = Roadmap(world, vertices=0, seed=seed, near=near)
+    roadmap.graph = graph_in(world, *_box(world.robot), near=near, seed=seed + len(rows), checks=world)
+    roadmap.graph.restore(rows, edges, states)
+    return roadmap
 
 
 def _box(robot: Robot) -> tuple[Vector, Vector]:

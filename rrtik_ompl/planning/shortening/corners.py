@@ -130,28 +130,28 @@ class _Corners:
         corner = self._last_seen(b, seen, a, nearly_done)
         return corner if self._part_free(a, corner) else seen
 
-    def _last_seen(self, eye: Vector, near: Vector, far: Vector, nearly_done: bool) -> Vector:
-        """The last place that the eye sees between ``near``, which it sees, and ``far``, which it does not.
+    def _last_seen(self, eye: Vector, visible_end: Vector, hidden_end: Vector, nearly_done: bool) -> Vector:
+        """The last place that the eye sees from ``visible_end``, which it sees, to ``hidden_end``, which it does not.
 
         Where the route is nearly done little is to be expected: the search then begins at the near end.
         """
-        segment = far - near
-        segment_length = float(np.linalg.norm(far - near))
+        segment = hidden_end - visible_end
+        segment_length = float(np.linalg.norm(hidden_end - visible_end))
 
         def visible(share: float) -> bool:
-            return self._free(eye, near + share * segment)
+            return self._free(eye, visible_end + share * segment)
 
         def length(share: float) -> float:
-            return float(np.linalg.norm(near + share * segment - eye)) + (1.0 - share) * segment_length
+            return float(np.linalg.norm(visible_end + share * segment - eye)) + (1.0 - share) * segment_length
 
         first = _first_below(length, length(0.0) - self.min_gain) if nearly_done else 1.0
         seen, hidden = _bracket(visible, first)
         if nearly_done and seen == 0.0:
-            return near  # and what is nearer than the first place is not worth a check
+            return visible_end  # and what is nearer than the first place is not worth a check
         while length(seen) - length(hidden) > self.min_gain:
             middle = 0.5 * (seen + hidden)
             seen, hidden = (middle, hidden) if visible(middle) else (seen, middle)
-        return near if seen == 0.0 else near + seen * segment
+        return visible_end if seen == 0.0 else visible_end + seen * segment
 
     def _cut_bends(self, rows: list[Vector]) -> list[Vector]:
         """Bends replaced by two where a chord across them is free and gains enough, and these two likewise."""

@@ -119,8 +119,8 @@ class Task:
         Parts of free edges are checked at other configurations than the whole, so they count as new. They are checked
         even when the time is up.
         """
-        known = self._known.union(edge_keys(old))
-        fresh = [k for k, edge in enumerate(edge_keys(new)) if edge not in known and edge[::-1] not in known]
+        known_free = self._known.union(edge_keys(old))
+        fresh = [k for k, edge in enumerate(edge_keys(new)) if edge not in known_free and edge[::-1] not in known_free]
         self.confirmed_again += len(fresh)
         return not fresh or bool(self._checked(new[fresh], new[np.add(fresh, 1)]).all())
 
