@@ -64,10 +64,10 @@ class Body:
 @lru_cache(maxsize=16)
 def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
     """The robot's own bodies, with a margin [m] and their paddings."""
-    own = [(item, robot.link_of(item)) for item in robot.collision.geometryObjects]
+    objects_and_links = [(item, robot.link_of(item)) for item in robot.collision.geometryObjects]
     return tuple(
         Body(link, item.parentJoint, item.placement, solid, "link", margin, robot.padding.get(link, 0.0))
-        for (item, link), solid in zip(own, robot_solids(robot), strict=True)
+        for (item, link), solid in zip(objects_and_links, robot_solids(robot), strict=True)
     )
 
 
@@ -84,9 +84,9 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
         if name in links:
             raise InputError(f"scene: '{name}' is also the name of a link of robot '{robot.name}'; rename the obstacle")
 
-    found = []
+    bodies = []
     for obstacle in scene.obstacles:
-        found += [
+        bodies += [
             Body(
                 obstacle.name,
                 joint=0,
@@ -110,7 +110,7 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         mount = frame.placement * item.pose
         thickness = item.margin + (robot.padding.get(item.link, 0.0) if item.padding is None else item.padding)
-        found += [
+        bodies += [
             Body(
                 item.name,
                 joint=frame.parentJoint,
@@ -124,7 +124,7 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
             for piece in _pieces(item)
         ]
 
-    return tuple(found)
+    return tuple(bodies)
 
 
 def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
@@ -145,7 +145,7 @@ def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body
         return tuple(bodies)
 
     known = {*robot.link_names, *scene.names}
-    found: dict[str, list[tuple[str, float]]] = {}
+    contacts_of: dict[str, list[tuple[str, float]]] = {}
     for contact in scene.contacts:
         for name in contact.names:
             if name not in known:
@@ -162,9 +162,11 @@ def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body
             )
 
         for name, other in (contact.names, contact.names[::-1]):
-            found.setdefault(name, []).append((other, contact.distance))
+            contacts_of.setdefault(name, []).append((other, contact.distance))
 
-    return tuple(replace(body, contacts=tuple(found[body.name])) if body.name in found else body for body in bodies)
+    return tuple(
+        replace(body, contacts=tuple(contacts_of[body.name])) if body.name in contacts_of else body for body in bodies
+    )
 
 
 def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
@@ -175,16 +177,16 @@ def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
         first: Name of a link, obstacle or attached object.
         second: That of the other.
     """
-    least = {first: np.inf, second: np.inf}
+    widths = {first: np.inf, second: np.inf}
     for body in bodies:
-        if body.name in least:
-            least[body.name] = min(least[body.name], least_width(body.geometry))
-    return SHARE * sum(least.values())
+        if body.name in widths:
+            widths[body.name] = min(widths[body.name], least_width(body.geometry))
+    return SHARE * sum(widths.values())
 
 
 @collector_waits
 def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:
-    """Numbers of the bodies that must not touch: all but what is rigidly joined or allowed, and adjacent links.
+    """Pairs of numbers of bodies that must not touch, sorted: all but what is rigidly joined or allowed, or adjacent.
 
     Links are adjacent if one joint of the description joins them (`joined_links`): they overlap at it by construction.
     What a link holds does not, so it is checked against all links but its own and those that it is allowed to touch.
@@ -198,22 +200,23 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
         UnknownNameError: If an allowed collision names something that does not exist.
     """
     allowed = _allowed(robot, scene)
-    of_links = _pairs_of_links(robot)
-    own = [k for k, body in enumerate(bodies) if body.kind != "obstacle"]
-    found = [
-        (i, j)
-        for place, i in enumerate(own if robot.self_collision else ())
-        for j in own[place + 1 :]
-        if ((i, j) in of_links if bodies[j].kind == "link" else _may_meet(bodies[i], bodies[j]))
-        and frozenset((bodies[i].name, bodies[j].name)) not in allowed
-    ]
+    link_pairs = _pairs_of_links(robot)
+    robot_bodies = [k for k, body in enumerate(bodies) if body.kind != "obstacle"]
+    pairs: list[tuple[int, int]] = []
+    for i, j in combinations(robot_bodies, 2) if robot.self_collision else ():
+        if frozenset((bodies[i].name, bodies[j].name)) in allowed:
+            continue
+        # Links come first, so that two of them are a pair of which the second is a link.
+        between_links = bodies[j].kind == "link"
+        if (i, j) in link_pairs if between_links else _may_meet(bodies[i], bodies[j]):
+            pairs.append((i, j))
 
     obstacles = [(k, body.name) for k, body in enumerate(bodies) if body.kind == "obstacle"]
-    for i in own:
-        met = {name for pair in allowed if bodies[i].name in pair for name in pair}
-        found += [(i, j) if i < j else (j, i) for j, name in obstacles if name not in met]
+    for i in robot_bodies:
+        allowed_with = {name for pair in allowed if bodies[i].name in pair for name in pair}
+        pairs += [(i, j) if i < j else (j, i) for j, name in obstacles if name not in allowed_with]
 
-    return tuple(sorted(found))
+    return tuple(sorted(pairs))
 
 
 def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
@@ -231,7 +234,7 @@ def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
 
 @lru_cache(maxsize=16)
 def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
-    """Numbers of the bodies of links that must not touch.
+    """Pairs of numbers of the bodies of links, the smaller one first, that must not touch.
 
     A description without a list of allowed pairs says nothing about solids that overlap by construction; two that
     touch in every one of many random postures can only be such ones. They are left out, and a warning names them. With
@@ -239,9 +242,9 @@ def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
     or by joints that are fixed or held, and those that are asked for although a joint joins them.
     """
     bodies = link_bodies(robot)
-    solids = [item.name for item in robot.collision.geometryObjects]
-    joined = joined_links(robot)
-    nearest = _carrying_parents(robot, bodies)
+    solid_names = [item.name for item in robot.collision.geometryObjects]
+    joined_pairs = joined_links(robot)
+    carrying_parents = _carrying_parents(robot, bodies)
     pairs: list[tuple[int, int]] = []
     doubtful: list[tuple[int, int]] = []
 
@@ -249,17 +252,18 @@ def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
         first = bodies[i]
         second = bodies[j]
         names = frozenset((first.name, second.name))
-        wanted = names in robot.checked_collisions
-        if (
-            not _may_meet(first, second)
-            or (names in joined and not wanted)
-            or names in robot.allowed_collisions
-            or frozenset((solids[i], solids[j])) in robot.unchecked_solids
-        ):
+        explicitly_checked = names in robot.checked_collisions
+        if not _may_meet(first, second):
+            continue
+        if names in joined_pairs and not explicitly_checked:
+            continue
+        if names in robot.allowed_collisions:
+            continue
+        if frozenset((solid_names[i], solid_names[j])) in robot.unchecked_solids:
             continue
 
         pairs.append((i, j))
-        if not robot.allowed_collisions or wanted or _adjacent(first.joint, second.joint, nearest):
+        if not robot.allowed_collisions or explicitly_checked or _adjacent(first.joint, second.joint, carrying_parents):
             doubtful.append((i, j))
 
     if not robot.self_collision:
@@ -275,13 +279,13 @@ def _may_meet(first: Body, second: Body) -> bool:
 def _carrying_parents(robot: Robot, bodies: Iterable[Body]) -> dict[int, int]:
     """For each joint that carries a body: the nearest joint towards the base that also does."""
     carrying = {0} | {body.joint for body in bodies}
-    found = {0: 0}
+    parents = {0: 0}
     for joint in carrying - {0}:
         above = int(robot.model.parents[joint])
         while above not in carrying:
             above = int(robot.model.parents[above])
-        found[joint] = above
-    return found
+        parents[joint] = above
+    return parents
 
 
 def _adjacent(first: int, second: int, parents: Mapping[int, int]) -> bool:
@@ -292,9 +296,9 @@ def _adjacent(first: int, second: int, parents: Mapping[int, int]) -> bool:
 def _always_touching(robot: Robot, bodies: tuple[Body, ...], pairs: Sequence[tuple[int, int]]) -> set[tuple[int, int]]:
     """Those of the pairs that touch in every posture of a sample; a warning names them."""
     rng = np.random.default_rng(0)
-    samples = robot.joint_frames(rng.uniform(*robot.finite_range(), (ALWAYS_COLLIDING_SAMPLES, robot.dof)))
+    sampled_frames = robot.joint_frames(rng.uniform(*robot.finite_range(), (ALWAYS_COLLIDING_SAMPLES, robot.dof)))
     suspects = set(pairs)
-    for frames in samples:
+    for frames in sampled_frames:
         suspects = {p for p in suspects if _touch(bodies[p[0]], bodies[p[1]], frames)}
 
     if suspects:
@@ -318,15 +322,15 @@ def _touch(first: Body, second: Body, frames: Sequence[pin.SE3]) -> bool:
 def _solid_name(bodies: tuple[Body, ...], number: int) -> str:
     """The link of a body; with its number in the link, counted from 1, if that has several."""
     link = bodies[number].name
-    own = [k for k, body in enumerate(bodies) if body.name == link]
-    return f"'{link}'" if len(own) == 1 else f"'{link}' (solid {own.index(number) + 1})"
+    solids_of_link = [k for k, body in enumerate(bodies) if body.name == link]
+    return f"'{link}'" if len(solids_of_link) == 1 else f"'{link}' (solid {solids_of_link.index(number) + 1})"
 
 
 def by_motion(bodies: Sequence[Body], pairs: Pairs) -> tuple[Pairs, Pairs]:
-    """The pairs of which a body moves, and those that both stand still."""
+    """The pairs of which at least one body moves, and the pairs of two that stand still."""
     moves = np.array([body.joint > 0 for body in bodies], dtype=bool)
-    some: list[bool] = np.logical_or(*moves[pair_array(pairs).T]).tolist()
-    return tuple(compress(pairs, some)), tuple(compress(pairs, map(not_, some)))
+    either_moves: list[bool] = np.logical_or(*moves[pair_array(pairs).T]).tolist()
+    return tuple(compress(pairs, either_moves)), tuple(compress(pairs, map(not_, either_moves)))
 
 
 def pair_array(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
@@ -335,7 +339,9 @@ def pair_array(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
 
 
 def far_apart(first: Body, second: Body, distance: float) -> bool:
-    """Whether the balls around two bodies that stand still are farther apart than a distance [m]."""
-    one, other = (body.placement.act(body.geometry.aabb_center).tolist() for body in (first, second))
-    reach = first.geometry.aabb_radius + second.geometry.aabb_radius + distance
-    return bool(math.dist(one, other) > reach)  # no number where one of them has no end
+    """Whether the bounding balls of two bodies that stand still are farther apart than a distance [m]."""
+    first_centre, second_centre = (body.placement.act(body.geometry.aabb_center).tolist() for body in (first, second))
+    centre_distance_limit = first.geometry.aabb_radius + second.geometry.aabb_radius + distance
+    return bool(
+        math.dist(first_centre, second_centre) > centre_distance_limit
+    )  # no number where one of them has no end

@@ -48,20 +48,20 @@ class BodyArrays:
     def kept_apart(self, pairs: NDArray[np.int64]) -> Vector:
         """How far the bodies of pairs, shape (k, 2), must stay apart [m]; see :func:`.margins.kept_apart`."""
         first, second = pairs.T
-        standing = (self.joints[first] == 0) & (self.joints[second] == 0)
-        kept = self.margins[np.where(self.obstacles[second], second, first)]
-        found: Vector = np.where(standing, 0.0, kept + self.paddings[first] + self.paddings[second])
+        both_stand = (self.joints[first] == 0) & (self.joints[second] == 0)
+        margin = self.margins[np.where(self.obstacles[second], second, first)]
+        separation: Vector = np.where(both_stand, 0.0, margin + self.paddings[first] + self.paddings[second])
 
         for row in np.flatnonzero(self.in_contact(pairs)):
-            found[row] = min(found[row], self.contacts[_ordered(pairs[row])])
-        return found
+            separation[row] = min(separation[row], self.contacts[_ordered(pairs[row])])
+        return separation
 
     def in_contact(self, pairs: NDArray[np.int64]) -> Mask:
         """Which of some pairs of bodies, shape (k, 2), are in contact, shape (k,)."""
-        found: Mask = np.asarray(self.touching[pairs].all(axis=1))
-        for row in np.flatnonzero(found):
-            found[row] = _ordered(pairs[row]) in self.contacts
-        return found
+        in_contact: Mask = np.asarray(self.touching[pairs].all(axis=1))
+        for row in np.flatnonzero(in_contact):
+            in_contact[row] = _ordered(pairs[row]) in self.contacts
+        return in_contact
 
 
 def _ordered(pair: NDArray[np.int64]) -> tuple[int, int]:
@@ -71,13 +71,13 @@ def _ordered(pair: NDArray[np.int64]) -> tuple[int, int]:
 
 def _contacts(bodies: Sequence[Body]) -> dict[tuple[int, int], float]:
     """See :attr:`BodyArrays.contacts`."""
-    found = {}
+    contacts = {}
     touching = [k for k, body in enumerate(bodies) if body.contacts]
     for i, j in combinations(touching, 2):
         distance = contact_distance(bodies[i], bodies[j])
         if distance is not None:
-            found[i, j] = distance
-    return found
+            contacts[i, j] = distance
+    return contacts
 
 
 # Several checks of one world ask for the same; kept for as long as one of them holds them.
@@ -87,10 +87,10 @@ _KNOWN: WeakValueDictionary[tuple[Body, ...], BodyArrays] = WeakValueDictionary(
 def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
     """Numbers of bodies."""
     key = tuple(bodies)
-    known = _KNOWN.get(key)
-    if known is None:
-        _KNOWN[key] = known = _body_arrays(key)
-    return known
+    arrays = _KNOWN.get(key)
+    if arrays is None:
+        _KNOWN[key] = arrays = _body_arrays(key)
+    return arrays
 
 
 def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:

@@ -18,7 +18,7 @@ from rrtik_ompl.geometry.collision.solids import Ends as Ends
 from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
 from rrtik_ompl.model.shapes import PointCloud
 
-LOOK = 0.05  # [m] beyond what was asked for; what is farther away than this is not measured further
+LOOK_AHEAD = 0.05  # [m] beyond what was asked for; what is farther away than this is not measured further
 
 
 class CloudSolid(coal.Sphere):  # type: ignore[misc]
@@ -67,23 +67,23 @@ def cloud_gap(ends: Ends, margin: float) -> float | None:
     What lies wholly inside a hollow mesh touches it.
     """
     cloud, other, to_other, _ = _sides(ends)
-    points, _ = _near(cloud, other, to_other, cloud.radius + margin + LOOK)
+    points, _ = _points_near_box(cloud, other, to_other, cloud.radius + margin + LOOK_AHEAD)
 
     ball = coal.Sphere(cloud.radius)
-    here = coal.Transform3s()
-    there = coal.Transform3s()
-    asked = coal.CollisionRequest()
-    asked.security_margin = margin
+    identity = coal.Transform3s()
+    point_pose = coal.Transform3s()
+    collision_request = coal.CollisionRequest()
+    collision_request.security_margin = margin
 
-    gap = LOOK
+    gap = LOOK_AHEAD
     for point in points:
-        there.setTranslation(point)
+        point_pose.setTranslation(point)
         result = coal.CollisionResult()
-        if coal.collide(other, here, ball, there, asked, result):
+        if coal.collide(other, identity, ball, point_pose, collision_request, result):
             return None
         gap = min(gap, float(result.distance_lower_bound))
 
-    return None if is_mesh(other) and _one_inside(other, points) else gap
+    return None if is_mesh(other) and _any_inside(other, points) else gap
 
 
 class Nearest(NamedTuple):
@@ -98,28 +98,28 @@ def nearest_of_cloud(ends: Ends) -> Nearest:
     """The distance of two geometries, one of them a cloud."""
     cloud, other, to_other, swapped = _sides(ends)
 
-    reach = cloud.radius + LOOK
+    reach = cloud.radius + LOOK_AHEAD
     points = np.zeros((0, 3))
-    bounds = np.zeros(0)
+    box_distances = np.zeros(0)
     while not len(points):
-        points, bounds = _near(cloud, other, to_other, reach)
+        points, box_distances = _points_near_box(cloud, other, to_other, reach)
         reach *= 4.0
 
     ball = coal.Sphere(cloud.radius)
-    here = coal.Transform3s()
-    best = None
-    for point, bound in zip(points, bounds, strict=True):
+    identity = coal.Transform3s()
+    nearest = None
+    for point, box_distance in zip(points, box_distances, strict=True):
         # The points come nearest to the box first: none that follows can be nearer than the best one.
-        if best is not None and bound - cloud.radius >= best.min_distance:
+        if nearest is not None and box_distance - cloud.radius >= nearest.min_distance:
             break
         result = coal.DistanceResult()
-        coal.distance(other, here, ball, coal.Transform3s(np.eye(3), point), coal.DistanceRequest(), result)
-        best = result if best is None or result.min_distance < best.min_distance else best
-    assert best is not None
+        coal.distance(other, identity, ball, coal.Transform3s(np.eye(3), point), coal.DistanceRequest(), result)
+        nearest = result if nearest is None or result.min_distance < nearest.min_distance else nearest
+    assert nearest is not None
 
     pose = ends[1] if swapped else ends[3]
-    found = [pose.transform(np.array(p)) for p in (best.getNearestPoint1(), best.getNearestPoint2())]
-    return Nearest(float(best.min_distance), *(found if swapped else found[::-1]))
+    witness_points = [pose.transform(np.array(p)) for p in (nearest.getNearestPoint1(), nearest.getNearestPoint2())]
+    return Nearest(float(nearest.min_distance), *(witness_points if swapped else witness_points[::-1]))
 
 
 def _sides(ends: Ends) -> tuple[PointCloud, coal.CollisionGeometry, coal.Transform3s, bool]:
@@ -130,30 +130,32 @@ def _sides(ends: Ends) -> tuple[PointCloud, coal.CollisionGeometry, coal.Transfo
     return second.cloud, first, first_pose.inverseTimes(second_pose), True
 
 
-def _near(
+def _points_near_box(
     cloud: PointCloud, other: coal.CollisionGeometry, to_other: coal.Transform3s, reach: float
 ) -> tuple[Matrix, Vector]:
     """Points of a cloud within a reach [m] of the other's bounding box, deepest inside it first, in the other's frame.
 
     Also their distances from that box.
     """
-    turn = np.array(to_other.getRotation())
-    shift = np.array(to_other.getTranslation())
+    rotation = np.array(to_other.getRotation())
+    translation = np.array(to_other.getTranslation())
     low = np.array(other.aabb_local.min_)
     high = np.array(other.aabb_local.max_)
 
-    centre = turn.T @ (0.5 * (low + high) - shift)
-    half = np.abs(turn.T) @ (0.5 * (high - low)) + reach
-    points = cloud.tree.within(centre - half, centre + half).astype(np.float64) @ turn.T + shift
+    centre = rotation.T @ (0.5 * (low + high) - translation)
+    half_extents = np.abs(rotation.T) @ (0.5 * (high - low)) + reach
+    points = (
+        cloud.tree.within(centre - half_extents, centre + half_extents).astype(np.float64) @ rotation.T + translation
+    )
 
     beyond = np.maximum(low - points, points - high)
-    away: NDArray[np.float64] = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
-    kept = np.flatnonzero(away <= reach)
-    kept = kept[np.argsort(away[kept] + np.minimum(beyond[kept].max(axis=1), 0.0))]
-    return points[kept], away[kept]
+    box_distances: NDArray[np.float64] = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    near_rows = np.flatnonzero(box_distances <= reach)
+    near_rows = near_rows[np.argsort(box_distances[near_rows] + np.minimum(beyond[near_rows].max(axis=1), 0.0))]
+    return points[near_rows], box_distances[near_rows]
 
 
-def _one_inside(mesh: coal.BVHModelBase, points: Matrix) -> bool:
+def _any_inside(mesh: coal.BVHModelBase, points: Matrix) -> bool:
     """Whether one of some points is inside a hollow mesh, whose surface they do not touch."""
     box = mesh.aabb_local
     points = points[((points >= np.array(box.min_)) & (points <= np.array(box.max_))).all(axis=1)]

@@ -21,7 +21,7 @@ from rrtik_ompl.model.judgement import Contact
 def measured(
     bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], frames: NDArray[np.float64], *, near_only: bool
 ) -> Iterator[Contact]:
-    """The pairs of bodies and their distances; with ``near_only`` only those that touch or come too near.
+    """The pairs of bodies and their distances [m]; with ``near_only`` only those that touch or come too near.
 
     Args:
         bodies: The solids.
@@ -34,16 +34,16 @@ def measured(
 
     for i, j in pairs:
         margin = kept_apart(bodies[i], bodies[j])
-        ends = (bodies[i].geometry, transforms[i], bodies[j].geometry, transforms[j])
-        if near_only and not _near(ends, margin):
+        placed_geometries = (bodies[i].geometry, transforms[i], bodies[j].geometry, transforms[j])
+        if near_only and not _touch_or_near(placed_geometries, margin):
             continue
 
-        distance, first, second = _distance(ends, depth=near_only)
+        distance, first, second = _distance(placed_geometries, with_depth=near_only)
         distance = min(distance, margin) if near_only else distance
         yield Contact(bodies[i].name, bodies[j].name, distance, first, second, margin)
 
 
-def _near(ends: Ends, margin: float) -> bool:
+def _touch_or_near(ends: Ends, margin: float) -> bool:
     """Whether two geometries touch or come nearer than a margin [m]."""
     ends, margin = solids_of(ends, margin)
     if is_ours(ends):
@@ -53,21 +53,25 @@ def _near(ends: Ends, margin: float) -> bool:
 
 def inside(first: str, second: str) -> Contact:
     """A body wholly inside another: there are no witness points and no meaningful depth."""
-    nowhere = np.full(3, np.nan)
-    return Contact(first, second, 0.0, nowhere, nowhere)
+    unknown_point = np.full(3, np.nan)
+    return Contact(first, second, 0.0, unknown_point, unknown_point)
 
 
-def _distance(ends: Ends, *, depth: bool) -> tuple[float, Vector, Vector]:
-    """Signed distance of two geometries at their places [m], and the points that it is between."""
+def _distance(ends: Ends, *, with_depth: bool) -> tuple[float, Vector, Vector]:
+    """Signed distance of two placed geometries [m], and the points in the world that it is between, shape (3,) each.
+
+    ``with_depth`` asks for the depth of two meshes that overlap, which takes longer.
+    """
     if is_ours(ends):
         return own_nearest(ends)
 
-    touching = coal.CollisionResult()
+    collision = coal.CollisionResult()
     result = coal.DistanceResult()
     distance = float(coal.distance(*ends, coal.DistanceRequest(), result))
 
-    meshes = depth and distance <= 0.0 and is_mesh(ends[0]) and is_mesh(ends[2])
-    if meshes and coal.collide(*ends, request(0.0), touching):
-        result = touching.getContact(0)  # between two meshes that overlap coal knows no distance
+    # Between two meshes that overlap coal knows no distance, but a depth of collision.
+    meshes_overlap = distance <= 0.0 and is_mesh(ends[0]) and is_mesh(ends[2])
+    if with_depth and meshes_overlap and coal.collide(*ends, request(0.0), collision):
+        result = collision.getContact(0)
         distance = float(result.penetration_depth)
     return distance, np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())

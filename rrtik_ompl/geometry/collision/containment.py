@@ -38,8 +38,8 @@ class Containment:
 
     Attributes:
         pairs: Numbers of the bodies, the one that may hold first.
-        ways: For each pair that was given its places in ``pairs``, in the order given and the other one; -1 where the
-            second body cannot be inside the first. Shape (given, 2).
+        rows_of_pairs: For each pair that was given its rows in ``pairs``, in the order given and the other one; -1
+            where the second body cannot be inside the first. Shape (given, 2).
     """
 
     def __init__(
@@ -52,43 +52,44 @@ class Containment:
             pairs: Numbers of those that must not touch.
             covers: For each body balls that contain it, shape (n, 4), as a first look for :meth:`between`.
         """
-        own = body_arrays(bodies)
-        listed = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        arrays = body_arrays(bodies)
+        pair_array = np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
-        holding = np.full(len(bodies), -np.inf)  # [m] around the middle of a hollow body that may hold others
-        for k in distinct(listed).tolist():
+        holding_radius = np.full(len(bodies), -np.inf)  # [m] around the middle of a hollow body that may hold others
+        for k in distinct(pair_array).tolist():
             if _has_inside(bodies[k]):
-                holding[k] = bodies[k].geometry.aabb_radius
+                holding_radius[k] = bodies[k].geometry.aabb_radius
 
-        both_ways = np.concatenate([listed, listed[:, ::-1]])
-        sizes = own.halves.max(axis=1, initial=0.0)
+        both_ways = np.concatenate([pair_array, pair_array[:, ::-1]])
+        sizes = arrays.halves.max(axis=1, initial=0.0)
         sizes[[isinstance(body.geometry, CloudSolid) for body in bodies]] = np.inf  # its points are asked one by one
-        may_hold = sizes[both_ways[:, 1]] <= holding[both_ways[:, 0]]
+        may_hold = sizes[both_ways[:, 1]] <= holding_radius[both_ways[:, 0]]
 
         outer, inner = both_ways[may_hold].T
         self.pairs: list[tuple[int, int]] = list(zip(outer.tolist(), inner.tolist(), strict=True))
-        self.ways = np.where(may_hold, np.cumsum(may_hold) - 1, -1).reshape(2, -1).T
+        self.rows_of_pairs = np.where(may_hold, np.cumsum(may_hold) - 1, -1).reshape(2, -1).T
 
-        self._outer_joint = own.joints[outer]
-        self._inner_joint = own.joints[inner]
+        self._outer_joint = arrays.joints[outer]
+        self._inner_joint = arrays.joints[inner]
 
-        held = distinct(inner)
-        points = _end_points([bodies[k].geometry for k in held.tolist()], own.halves[held])
-        placed = points @ own.placements[held, :3, :3].transpose(0, 2, 1) + own.placements[held, None, :3, 3]
-        self._points = placed[np.searchsorted(held, inner)]
+        inner_bodies = distinct(inner)
+        points = _end_points([bodies[k].geometry for k in inner_bodies.tolist()], arrays.halves[inner_bodies])
+        rotations = arrays.placements[inner_bodies, :3, :3]
+        placed_points = points @ rotations.transpose(0, 2, 1) + arrays.placements[inner_bodies, None, :3, 3]
+        self._points = placed_points[np.searchsorted(inner_bodies, inner)]
 
-        self._to_outer = np.linalg.inv(own.placements)[outer]
-        self._centres = own.centres[outer]
-        self._halves = own.halves[outer] + ROUNDING
+        self._to_outer = np.linalg.inv(arrays.placements)[outer]
+        self._centres = arrays.centres[outer]
+        self._halves = arrays.halves[outer] + ROUNDING
 
         everywhere = np.array([[0.0, 0.0, 0.0, np.inf]])
-        hollow = distinct(outer).tolist()
-        self._covers = {o: everywhere if covers is None else covers[o] for o in hollow}
-        self._meshes = {o: bodies[o].geometry for o in hollow}
+        outer_bodies = distinct(outer).tolist()
+        self._covers = {o: everywhere if covers is None else covers[o] for o in outer_bodies}
+        self._meshes = {o: bodies[o].geometry for o in outer_bodies}
 
     @cached_property
-    def _places(self) -> dict[tuple[int, int], int]:
-        """The place of each of the pairs."""
+    def _row_of_pair(self) -> dict[tuple[int, int], int]:
+        """For each of the pairs its row in ``pairs``."""
         return {pair: k for k, pair in enumerate(self.pairs)}
 
     def holds(self, pair: tuple[int, int], frames: NDArray[np.float64]) -> bool:
@@ -98,36 +99,37 @@ class Containment:
             pair: Numbers of the bodies, in either order.
             frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
         """
-        return any(self._holds(self._places[p], frames) for p in (pair, pair[::-1]) if p in self._places)
+        rows = (self._row_of_pair[p] for p in (pair, pair[::-1]) if p in self._row_of_pair)
+        return any(self._holds_in_row(row, frames) for row in rows)
 
-    def _holds(self, k: int, frames: NDArray[np.float64]) -> bool:
-        inner = frames[self._inner_joint[k]]
-        outer = frames[self._outer_joint[k]]
-        world = self._points[k] @ inner[:3, :3].T + inner[:3, 3]
+    def _holds_in_row(self, row: int, frames: NDArray[np.float64]) -> bool:
+        inner = frames[self._inner_joint[row]]
+        outer = frames[self._outer_joint[row]]
+        world = self._points[row] @ inner[:3, :3].T + inner[:3, 3]
         in_joint = (world - outer[:3, 3]) @ outer[:3, :3]  # the inverse of a rotation is its transpose
-        local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
+        local = in_joint @ self._to_outer[row, :3, :3].T + self._to_outer[row, :3, 3]
 
-        if (np.abs(local - self._centres[k]) > self._halves[k]).any():
+        if (np.abs(local - self._centres[row]) > self._halves[row]).any():
             return False
-        return self._inside(k, local)
+        return self._inside(row, local)
 
-    def reached(self, places: NDArray[np.int64], frames: NDArray[np.float64]) -> Mask:
+    def reached(self, rows: NDArray[np.int64], frames: NDArray[np.float64]) -> Mask:
         """Which of some pairs may be such: the ends of the inner body are in the bounding box of the outer one.
 
         Args:
-            places: Places in ``pairs``, shape (k,).
+            rows: Rows in ``pairs``, shape (k,).
             frames: Poses of all joint frames for each of them, shape (k, joints + 1, 4, 4).
         """
-        every = np.arange(len(places))
-        inner = frames[every, self._inner_joint[places]]
-        outer = frames[every, self._outer_joint[places]]
-        to_outer = self._to_outer[places]
+        every_row = np.arange(len(rows))
+        inner = frames[every_row, self._inner_joint[rows]]
+        outer = frames[every_row, self._outer_joint[rows]]
+        to_outer = self._to_outer[rows]
 
         turn = to_outer[:, :3, :3] @ outer[:, :3, :3].transpose(0, 2, 1)
-        world = self._points[places] @ inner[:, :3, :3].transpose(0, 2, 1) + inner[:, None, :3, 3]
+        world = self._points[rows] @ inner[:, :3, :3].transpose(0, 2, 1) + inner[:, None, :3, 3]
         local = (world - outer[:, None, :3, 3]) @ turn.transpose(0, 2, 1) + to_outer[:, None, :3, 3]
-        inside: Mask = (np.abs(local - self._centres[places, None]) <= self._halves[places, None]).all(axis=(1, 2))
-        return inside
+        may_be_inside: Mask = (np.abs(local - self._centres[rows, None]) <= self._halves[rows, None]).all(axis=(1, 2))
+        return may_be_inside
 
     def between(self, pairs: Iterable[tuple[int, int]], joints: Sequence[pin.SE3]) -> bool:
         """Whether in one of some pairs, in either order, a body holds the other.
@@ -136,28 +138,28 @@ class Containment:
             pairs: Numbers of the bodies.
             joints: ``pinocchio.SE3`` of every joint frame in the world, world first.
         """
-        both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self._places)
+        both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self._row_of_pair)
         for pair in both_ways:
-            k = self._places[pair]
-            between = joints[int(self._outer_joint[k])].actInv(joints[int(self._inner_joint[k])])
-            in_joint = self._points[k] @ between.rotation.T + between.translation
-            local = in_joint @ self._to_outer[k, :3, :3].T + self._to_outer[k, :3, 3]
-            if (np.abs(local - self._centres[k]) > self._halves[k]).any():
+            row = self._row_of_pair[pair]
+            inner_in_outer = joints[int(self._outer_joint[row])].actInv(joints[int(self._inner_joint[row])])
+            in_joint = self._points[row] @ inner_in_outer.rotation.T + inner_in_outer.translation
+            local = in_joint @ self._to_outer[row, :3, :3].T + self._to_outer[row, :3, 3]
+            if (np.abs(local - self._centres[row]) > self._halves[row]).any():
                 continue
 
             balls = self._covers[pair[0]]
-            away = ((balls[:, None, :3] - local) ** 2).sum(axis=2) - (balls[:, None, 3] + ROUNDING) ** 2
-            if (away <= 0.0).any() and self._inside(k, local):
+            squared_gaps = ((balls[:, None, :3] - local) ** 2).sum(axis=2) - (balls[:, None, 3] + ROUNDING) ** 2
+            if (squared_gaps <= 0.0).any() and self._inside(row, local):
                 return True
         return False
 
-    def _inside(self, k: int, local: Matrix) -> bool:
+    def _inside(self, row: int, local: Matrix) -> bool:
         """Whether the end points of a body, shape (6, 3), are inside the mesh that may hold it.
 
         Surfaces that do not cross have all of a body on one side, but the cells at an open mesh's surface belong to no
         side; hence all of the points are tried there.
         """
-        mesh = self._meshes[self.pairs[k][0]]
+        mesh = self._meshes[self.pairs[row][0]]
         return inside_mesh(*mesh_arrays(mesh), local[0]) if is_closed(mesh) else enclosure(mesh).holds(local)
 
 

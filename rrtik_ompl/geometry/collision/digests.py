@@ -78,7 +78,7 @@ def _numbers(values: ArrayLike) -> bytes:
 
 
 def _hash(parts: Iterable[bytes]) -> str:
-    found = sha256()
+    digest = sha256()
     for part in parts:
-        found.update(len(part).to_bytes(8, "big") + part)
-    return found.hexdigest()[:DIGITS]
+        digest.update(len(part).to_bytes(8, "big") + part)
+    return digest.hexdigest()[:DIGITS]

@@ -40,10 +40,10 @@ class Enclosure:
         self.origin: Vector = low - 1.5 * self.size
         shape = np.ceil((high - low) / self.size).astype(np.int64) + 3
 
-        near = np.zeros(shape, dtype=bool)
-        for part in _small((corners - self.origin) / self.size):
-            _mark(near, part)
-        self.inside = ~near & ~_outside(near)
+        near_surface = np.zeros(shape, dtype=bool)
+        for triangles_part in _cut_small((corners - self.origin) / self.size):
+            _flag_cells(near_surface, triangles_part)
+        self.inside = ~near_surface & ~_outside(near_surface)
 
     def boxes(self) -> tuple[Matrix, Matrix]:
         """Boxes that make up the enclosed cells: lowest and highest corners [m], shape (k, 3) each."""
@@ -56,8 +56,8 @@ class Enclosure:
     def holds(self, points: Matrix) -> bool:
         """Whether one of some points, shape (k, 3), is enclosed."""
         cells = np.floor((points - self.origin) / self.size).astype(np.int64)
-        known = ((cells >= 0) & (cells < self.inside.shape)).all(axis=1)
-        return bool(self.inside[tuple(cells[known].T)].any())
+        in_grid = ((cells >= 0) & (cells < self.inside.shape)).all(axis=1)
+        return bool(self.inside[tuple(cells[in_grid].T)].any())
 
 
 @once_per_geometry
@@ -66,36 +66,36 @@ def enclosure(geometry: coal.CollisionGeometry) -> Enclosure:
     return Enclosure(*mesh_arrays(geometry))
 
 
-def _small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _cut_small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Triangles, shape (k, 3, 3), cut across their longest edges until none is longer than a cell along any axis."""
-    found = []
+    small_triangles = []
     for _ in range(HALVINGS):
-        large = (np.ptp(triangles, axis=1) > 1.0).any(axis=1)
-        found.append(triangles[~large])
-        triangles = triangles[large]
+        is_large = (np.ptp(triangles, axis=1) > 1.0).any(axis=1)
+        small_triangles.append(triangles[~is_large])
+        triangles = triangles[is_large]
 
         edges = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)  # from each corner to the next
-        first = edges.argmax(axis=1)
+        longest_edge = edges.argmax(axis=1)
         rows = np.arange(len(triangles))
-        a, b, c = (triangles[rows, (first + k) % 3] for k in range(3))
+        a, b, c = (triangles[rows, (longest_edge + k) % 3] for k in range(3))
         middle = 0.5 * (a + b)
         triangles = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-    return [*found, triangles]
+    return [*small_triangles, triangles]
 
 
-def _mark(near: NDArray[np.bool_], triangles: NDArray[np.float64]) -> None:
+def _flag_cells(near_surface: NDArray[np.bool_], triangles: NDArray[np.float64]) -> None:
     """Flag all cells that the boxes around triangles reach into."""
     low = np.floor(triangles.min(axis=1)).astype(np.int64)
     high = np.floor(triangles.max(axis=1)).astype(np.int64)
     for steps in np.ndindex(*(np.max(high - low, axis=0, initial=0) + 1)):
         cells = low + np.array(steps)
-        near[tuple(cells[(cells <= high).all(axis=1)].T)] = True
+        near_surface[tuple(cells[(cells <= high).all(axis=1)].T)] = True
 
 
-def _outside(near: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _outside(near_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Cells that can be reached from the border through faces of cells that are not near the surface."""
     from scipy.ndimage import label  # loads slower than most plans take, and few meshes are open
 
-    region, _ = label(~near)
+    region, _ = label(~near_surface)
     outside: NDArray[np.bool_] = region == region[0, 0, 0]  # the outermost cells are free, so this is the outside
     return outside

@@ -31,60 +31,60 @@ def joined_links(robot: Robot) -> frozenset[frozenset[str]]:
         [['base', 'link1'], ['link1', 'link2'], ['link2', 'link3']]
     """
     links = _links(robot)
-    solid = {robot.link_of(item) for item in robot.collision.geometryObjects}
-    beside: dict[str, list[str]] = {}
+    solid_links = {robot.link_of(item) for item in robot.collision.geometryObjects}
+    fixed_neighbours: dict[str, list[str]] = {}
     for link in links:
         if link.fixed:
-            beside.setdefault(link.name, []).append(link.parent)
-            beside.setdefault(link.parent, []).append(link.name)
+            fixed_neighbours.setdefault(link.name, []).append(link.parent)
+            fixed_neighbours.setdefault(link.parent, []).append(link.name)
 
-    found = set()
+    pairs = set()
     for link in links:
         if link.fixed:
             continue
 
-        below = _nearest(link.name, beside, solid)
-        above = _nearest(link.parent, beside, solid)
-        if len(below) == 1 and len(above) == 1:
-            found.add(below | above)
+        lower_links = _nearest(link.name, fixed_neighbours, solid_links)
+        upper_links = _nearest(link.parent, fixed_neighbours, solid_links)
+        if len(lower_links) == 1 and len(upper_links) == 1:
+            pairs.add(lower_links | upper_links)
 
-    return frozenset(found)
+    return frozenset(pairs)
 
 
 def _links(robot: Robot) -> list[_Link]:
     """All links but the base. The frames of a model tell how it was described: a link's hangs on that of its joint."""
     frames = robot.model.frames
-    found = []
+    links = []
     for frame in frames:
         if frame.type != pin.FrameType.BODY:
             continue
 
-        above = frames[frame.parentFrame]
-        held = False
-        if above.type != pin.FrameType.BODY:
-            held = above.name in robot.movable
-            above = frames[above.parentFrame]
+        parent = frames[frame.parentFrame]
+        is_held = False
+        if parent.type != pin.FrameType.BODY:
+            is_held = parent.name in robot.movable
+            parent = frames[parent.parentFrame]
 
-        if above.type == pin.FrameType.BODY:
-            moves = frame.parentJoint != above.parentJoint
-            found.append(_Link(frame.name, above.name, not (moves or held)))
-    return found
+        if parent.type == pin.FrameType.BODY:
+            moves = frame.parentJoint != parent.parentJoint
+            links.append(_Link(frame.name, parent.name, not (moves or is_held)))
+    return links
 
 
-def _nearest(link: str, beside: Mapping[str, Iterable[str]], solid: set[str]) -> frozenset[str]:
+def _nearest(link: str, fixed_neighbours: Mapping[str, Iterable[str]], solid_links: set[str]) -> frozenset[str]:
     """The link if it has solids, else those that fixed joints lead to over links without any."""
-    found = set()
-    seen = {link}
-    ahead = [link]
+    nearest = set()
+    visited = {link}
+    to_visit = [link]
 
-    while ahead:
-        here = ahead.pop()
-        if here in solid:
-            found.add(here)
+    while to_visit:
+        visited_link = to_visit.pop()
+        if visited_link in solid_links:
+            nearest.add(visited_link)
             continue
-        for other in beside.get(here, ()):
-            if other not in seen:
-                seen.add(other)
-                ahead.append(other)
+        for other in fixed_neighbours.get(visited_link, ()):
+            if other not in visited:
+                visited.add(other)
+                to_visit.append(other)
 
-    return frozenset(found)
+    return frozenset(nearest)

@@ -15,9 +15,9 @@ def kept_apart(first: Body, second: Body) -> float:
     Negative is the depth to which two that are in contact may overlap. No margin between bodies of which neither moves,
     for no posture of the arm would give what is missing: they must only not touch.
     """
-    least = contact_distance(first, second)
-    usual = usually_apart(first, second)
-    return usual if least is None else min(usual, least)
+    contact = contact_distance(first, second)
+    without_contact = usually_apart(first, second)
+    return without_contact if contact is None else min(without_contact, contact)
 
 
 def usually_apart(first: Body, second: Body) -> float:
@@ -41,6 +41,6 @@ def contact_distance(first: Body, second: Body) -> float | None:
 
 def request(margin: float) -> coal.DistanceRequest:
     """A fresh request to coal: do two geometries touch, or stay no farther than ``margin`` [m] apart."""
-    asked = coal.CollisionRequest()
-    asked.security_margin = margin
-    return asked
+    collision_request = coal.CollisionRequest()
+    collision_request.security_margin = margin
+    return collision_request

@@ -34,12 +34,12 @@ def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple
 
     A joint that carries both of them turns them as one.
     """
-    each = np.zeros((len(bodies), len(robot.chain.parent)))
+    weights_of_body = np.zeros((len(bodies), len(robot.chain.parent)))
     for k, body in enumerate(bodies):
         if body.joint > 0:
-            each[k] = _body_weights(robot, body)
+            weights_of_body[k] = _body_weights(robot, body)
 
-    first, second = each[np.array(pairs, dtype=np.int64).reshape(-1, 2).T]
+    first, second = weights_of_body[np.array(pairs, dtype=np.int64).reshape(-1, 2).T]
     return frozen(np.where((first > 0.0) & (second > 0.0), 0.0, first + second) @ np.abs(robot.chain.gain))
 
 
@@ -90,6 +90,6 @@ def _from_axis(point: Vector, axis: Vector) -> float:
 
 def _stroke(robot: Robot, row: int) -> float:
     """Largest distance of a sliding joint from its zero [m]."""
-    moving = robot.chain.gain[row] != 0.0  # joints with limits all of them, or the robot would have been refused
-    ends = np.maximum(np.abs(robot.lower[moving]), np.abs(robot.upper[moving]))
-    return float(np.abs(robot.chain.gain[row, moving]) @ ends + abs(robot.chain.offset[row]))
+    is_driven = robot.chain.gain[row] != 0.0  # joints with limits all of them, or the robot would have been refused
+    largest_values = np.maximum(np.abs(robot.lower[is_driven]), np.abs(robot.upper[is_driven]))
+    return float(np.abs(robot.chain.gain[row, is_driven]) @ largest_values + abs(robot.chain.offset[row]))

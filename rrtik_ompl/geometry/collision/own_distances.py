@@ -36,16 +36,18 @@ def own_nearest(ends: Ends) -> Nearest:
     if has_cloud(ends):
         return nearest_of_cloud(ends)
 
-    first = _axis(ends[0], ends[1])
-    second = _axis(ends[2], ends[3])
+    first_axis = _axis(ends[0], ends[1])
+    second_axis = _axis(ends[2], ends[3])
 
-    one, other = nearest_points(first, second)
-    between = other - one
-    apart = float(np.linalg.norm(between))
+    first_point, second_point = nearest_points(first_axis, second_axis)
+    connection = second_point - first_point
+    axis_distance = float(np.linalg.norm(connection))
 
     radii = [_core(capsule).radius + float(capsule.getSweptSphereRadius()) for capsule in (ends[0], ends[2])]
-    way = between / apart if apart > 0.0 else _across(first, second)
-    return Nearest(apart - radii[0] - radii[1], one + radii[0] * way, other - radii[1] * way)
+    direction = connection / axis_distance if axis_distance > 0.0 else _across(first_axis, second_axis)
+    return Nearest(
+        axis_distance - radii[0] - radii[1], first_point + radii[0] * direction, second_point - radii[1] * direction
+    )
 
 
 def nearest_points(first: Segment, second: Segment) -> tuple[Vector, Vector]:
@@ -61,11 +63,11 @@ def nearest_points(first: Segment, second: Segment) -> tuple[Vector, Vector]:
     u = first[1] - first[0]
     v = second[1] - second[0]
     normal = np.cross(u, v)
-    square = float(normal @ normal)
-    if square > 0.0:
+    squared_norm = float(normal @ normal)
+    if squared_norm > 0.0:
         offset = second[0] - first[0]
-        on_first = first[0] + np.clip(np.cross(offset, v) @ normal / square, 0.0, 1.0) * u
-        on_second = second[0] + np.clip(np.cross(offset, u) @ normal / square, 0.0, 1.0) * v
+        on_first = first[0] + np.clip(np.cross(offset, v) @ normal / squared_norm, 0.0, 1.0) * u
+        on_second = second[0] + np.clip(np.cross(offset, u) @ normal / squared_norm, 0.0, 1.0) * v
         candidates.append((on_first, on_second))
 
     return min(candidates, key=lambda pair: float(np.linalg.norm(pair[1] - pair[0])))
@@ -73,12 +75,12 @@ def nearest_points(first: Segment, second: Segment) -> tuple[Vector, Vector]:
 
 def _foot(point: Vector, segment: Segment) -> Vector:
     """The point of a segment that is nearest to a point."""
-    along = segment[1] - segment[0]
-    square = float(along @ along)
-    if square == 0.0:
+    direction = segment[1] - segment[0]
+    squared_length = float(direction @ direction)
+    if squared_length == 0.0:
         return segment[0]
-    share = np.clip((point - segment[0]) @ along / square, 0.0, 1.0)
-    return np.asarray(segment[0] + share * along)
+    fraction = np.clip((point - segment[0]) @ direction / squared_length, 0.0, 1.0)
+    return np.asarray(segment[0] + fraction * direction)
 
 
 def _is_capsule(geometry: coal.CollisionGeometry) -> bool:
@@ -101,5 +103,5 @@ def _axis(capsule: coal.CollisionGeometry, pose: coal.Transform3s) -> Segment:
 def _across(first: Segment, second: Segment) -> Vector:
     """A unit vector across two segments that meet."""
     normal = np.cross(first[1] - first[0], second[1] - second[0])
-    size = float(np.linalg.norm(normal))
-    return normal / size if size > 0.0 else np.array([1.0, 0.0, 0.0])
+    length = float(np.linalg.norm(normal))
+    return normal / length if length > 0.0 else np.array([1.0, 0.0, 0.0])

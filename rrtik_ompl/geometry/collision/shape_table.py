@@ -141,8 +141,8 @@ def _mesh(mesh: Mesh) -> list[Any]:
 def _solids_of_pile(pile: BoxPile) -> list[Any]:
     """A box of coal for each box; those of one size share it."""
     sizes = pile.boxes[1].tolist()
-    kept = {tuple(size): coal.Box(*size) for size in sizes}
-    return [kept[tuple(size)] for size in sizes]
+    box_of_size = {tuple(size): coal.Box(*size) for size in sizes}
+    return [box_of_size[tuple(size)] for size in sizes]
 
 
 def _places_of_pile(pile: BoxPile) -> list[Any]:
@@ -232,7 +232,7 @@ def pieces(shape: Shape) -> tuple[Piece, ...]:
         raise TypeError(f"no coal geometry for {kind.__name__}")
 
     numbers = tuple(np.asarray(getattr(shape, measure.name)).tobytes() for measure in kind.measures)
-    return _kept_pieces(_Measured(kind, numbers, shape)) if numbers else _pieces(shape)
+    return _cached_pieces(_Measured(kind, numbers, shape)) if numbers else _pieces(shape)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +245,7 @@ class _Measured:
 
 
 @lru_cache(maxsize=4096)
-def _kept_pieces(key: _Measured) -> tuple[Piece, ...]:
+def _cached_pieces(key: _Measured) -> tuple[Piece, ...]:
     return _pieces(key.shape)
 
 

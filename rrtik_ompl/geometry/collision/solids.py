@@ -36,19 +36,19 @@ def once_per_geometry(find: Callable[[Any], Found]) -> Callable[[Any], Found]:
 
     What it returns must not hold the geometry, which would otherwise never go.
     """
-    known: dict[int, tuple[weakref.ref[Any], Found]] = {}
+    answers: dict[int, tuple[weakref.ref[Any], Found]] = {}
 
     @wraps(find)
-    def found(geometry: coal.CollisionGeometry) -> Found:
+    def cached(geometry: coal.CollisionGeometry) -> Found:
         key = id(geometry)
-        if key in known:
-            return known[key][1]
+        if key in answers:
+            return answers[key][1]
 
         answer = find(geometry)
-        known[key] = weakref.ref(geometry, lambda _: known.pop(key, None)), answer
+        answers[key] = weakref.ref(geometry, lambda _: answers.pop(key, None)), answer
         return answer
 
-    return found
+    return cached
 
 
 def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> coal.BVHModelBase:
@@ -95,11 +95,11 @@ def convexified(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
         return geometry
 
     vertices, triangles = mesh_arrays(geometry)
-    solid = around(geometry)
+    hull_solid = around(geometry)
 
-    if len(triangles) * solid.num_polygons > MOST_COMPARED:
+    if len(triangles) * hull_solid.num_polygons > MOST_COMPARED:
         return geometry
-    return solid if _depth(vertices, triangles, solid) <= DEEPEST_DENT else geometry
+    return hull_solid if _depth(vertices, triangles, hull_solid) <= DEEPEST_DENT else geometry
 
 
 def fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
@@ -109,14 +109,14 @@ def fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
 
 @once_per_geometry
 def _fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
-    solid = around(geometry)
-    if is_mesh(solid):  # which is flat
+    hull_solid = around(geometry)
+    if is_mesh(hull_solid):  # which is flat
         return False
 
     vertices, triangles = mesh_arrays(geometry)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
-    return bool(volume >= CONVEX_VOLUME_RATIO * solid.computeVolume())
+    return bool(volume >= CONVEX_VOLUME_RATIO * hull_solid.computeVolume())
 
 
 def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -> float:
@@ -128,12 +128,12 @@ def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -
     normals, _ = face_normals(*convex_arrays(solid))
     corners = vertices[triangles]
 
-    parts = 1 + len(triangles) * len(normals) // COMPARED_AT_ONCE
-    tops = np.concatenate([(vertices @ part.T).max(axis=0) for part in np.array_split(normals, parts)])
-    middles = np.array_split(corners.mean(axis=1), parts)
-    nearest = np.concatenate([(tops - part @ normals.T).argmin(axis=1) for part in middles])
+    part_count = 1 + len(triangles) * len(normals) // COMPARED_AT_ONCE
+    hull_offsets = np.concatenate([(vertices @ part.T).max(axis=0) for part in np.array_split(normals, part_count)])
+    middle_parts = np.array_split(corners.mean(axis=1), part_count)
+    nearest = np.concatenate([(hull_offsets - part @ normals.T).argmin(axis=1) for part in middle_parts])
 
-    return float((tops[nearest, None] - np.einsum("tcj,tj->tc", corners, normals[nearest])).max())
+    return float((hull_offsets[nearest, None] - np.einsum("tcj,tj->tc", corners, normals[nearest])).max())
 
 
 def is_mesh(geometry: coal.CollisionGeometry) -> bool:
@@ -152,24 +152,30 @@ def vertices_of(geometry: coal.CollisionGeometry) -> Matrix | None:
 
 def of_each(geometries: Iterable[Any], find: Callable[[Any], Found]) -> list[Found]:
     """What is found of each of some coal geometries; looked for once where several are one object."""
-    known: dict[int, Found] = {}
-    return [known[key] if (key := id(each)) in known else known.setdefault(key, find(each)) for each in geometries]
+    answers: dict[int, Found] = {}
+    found = []
+    for geometry in geometries:
+        key = id(geometry)
+        if key not in answers:
+            answers[key] = find(geometry)
+        found.append(answers[key])
+    return found
 
 
 def around(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
     """A convex solid that contains a coal geometry: a mesh's hull (the mesh, if it is flat), a solid itself."""
-    found = _hull_of_mesh(geometry) if is_mesh(geometry) else None
-    return geometry if found is None else found
+    hull_solid = _hull_of_mesh(geometry) if is_mesh(geometry) else None
+    return geometry if hull_solid is None else hull_solid
 
 
 @once_per_geometry
 def _hull_of_mesh(mesh: coal.CollisionGeometry) -> coal.CollisionGeometry | None:
     """The convex hull of a mesh; None if it is flat."""
     vertices, triangles = mesh_arrays(mesh)
-    used = vertices[distinct(triangles)]
-    if len(used) < 4 or not _thickness(used) >= FLATTEST * _extent(used):
+    used_vertices = vertices[distinct(triangles)]
+    if len(used_vertices) < 4 or not _thickness(used_vertices) >= FLATTEST * _extent(used_vertices):
         return None
-    solid = hull(used)
+    solid = hull(used_vertices)
     solid.computeLocalAABB()
     return solid
 
@@ -220,9 +226,9 @@ def is_closed(geometry: coal.CollisionGeometry) -> bool:
 
     start = corners.ravel()
     end = np.roll(corners, -1, axis=1).ravel()
-    edges = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
-    _, which = np.unique(edges, return_inverse=True)
-    return not np.bincount(np.asarray(which).ravel(), weights=np.sign(end - start)).any()
+    edge_keys = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
+    _, edge_numbers = np.unique(edge_keys, return_inverse=True)
+    return not np.bincount(np.asarray(edge_numbers).ravel(), weights=np.sign(end - start)).any()
 
 
 @lru_cache(maxsize=16)
@@ -244,11 +250,13 @@ def inside_mesh(vertices: Matrix, triangles: NDArray[np.int64], point: Vector) -
     number [38].
     """
     a, b, c = (vertices[triangles[:, k]] - point for k in range(3))
-    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    length_a, length_b, length_c = (np.linalg.norm(v, axis=1) for v in (a, b, c))
 
     numerator = np.einsum("ij,ij->i", a, np.cross(b, c))
-    dot = np.einsum
-    denominator = la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
+    denominator = length_a * length_b * length_c
+    denominator = denominator + np.einsum("ij,ij->i", a, b) * length_c
+    denominator = denominator + np.einsum("ij,ij->i", b, c) * length_a
+    denominator = denominator + np.einsum("ij,ij->i", c, a) * length_b
     return bool(abs(np.arctan2(numerator, denominator).sum()) > np.pi)  # half of 4 pi, as each angle is counted halved
 
 
@@ -260,5 +268,8 @@ def solids_of(ends: Ends, margin: float) -> tuple[Ends, float]:
     """
     if margin >= 0.0:
         return ends, margin
-    hulls = around(ends[0]), around(ends[2])
-    return (hulls[0], ends[1], hulls[1], ends[3]), 0.0 if any(map(is_mesh, hulls)) else margin
+    first_hull = around(ends[0])
+    second_hull = around(ends[2])
+    if is_mesh(first_hull) or is_mesh(second_hull):
+        margin = 0.0
+    return (first_hull, ends[1], second_hull, ends[3]), margin

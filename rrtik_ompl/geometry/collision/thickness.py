@@ -80,16 +80,18 @@ def _way_through(number: int, corners: tuple[Matrix, Matrix, Matrix], normals: M
     origin = (a[number] + b[number] + c[number]) / 3.0
     direction = normals[number] / areas[number]
 
-    across = normals @ direction
-    crossing = np.abs(across) > PARALLEL
+    cosines = normals @ direction
+    crossing = np.abs(cosines) > PARALLEL
     crossing[number] = False
 
     a = a[crossing]
     b = b[crossing]
     c = c[crossing]
-    away = np.einsum("ij,ij->i", a - origin, normals[crossing]) / across[crossing]
-    places = origin + away[:, None] * direction
+    distances = np.einsum("ij,ij->i", a - origin, normals[crossing]) / cosines[crossing]
+    hit_points = origin + distances[:, None] * direction
 
-    sides = [np.einsum("ij,ij->i", np.cross(q - p, places - p), normals[crossing]) for p, q in ((a, b), (b, c), (c, a))]
-    hit = (np.array(sides) >= 0.0).all(axis=0)
-    return float(np.abs(away[hit]).min(initial=np.inf))
+    edge_sides = [
+        np.einsum("ij,ij->i", np.cross(q - p, hit_points - p), normals[crossing]) for p, q in ((a, b), (b, c), (c, a))
+    ]
+    is_hit = (np.array(edge_sides) >= 0.0).all(axis=0)
+    return float(np.abs(distances[is_hit]).min(initial=np.inf))

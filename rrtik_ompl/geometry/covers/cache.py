@@ -29,15 +29,15 @@ PIECES = 2  # counts up when rrtik_ompl.geometry.covers.mesh_pieces makes other 
 
 def cached_outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
     """``outer_cover``, from the cache if it is there; of the hull of a mesh that nearly fills it, which is tighter."""
-    covered = around(geometry) if fills_its_hull(geometry) else geometry
+    solid = around(geometry) if fills_its_hull(geometry) else geometry
 
     def make() -> Matrix:
         # It comes with scipy, which takes longer to load than covers to read.
         from rrtik_ompl.geometry.covers.spheres import outer_cover
 
-        return outer_cover(covered, protrusion=protrusion)
+        return outer_cover(solid, protrusion=protrusion)
 
-    return _cached(covered, f"outer {protrusion!r}", make)
+    return _cached(solid, f"outer {protrusion!r}", make)
 
 
 def cached_inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None) -> Matrix:
@@ -58,9 +58,12 @@ def cached_convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], ...]:
         from rrtik_ompl.geometry.covers.mesh_pieces import convex_pieces
 
         kinds = convex_pieces(mesh)
-        numbered = [(len(kinds) * k + kind, p) for kind, pieces in enumerate(kinds) for k, p in enumerate(pieces)]
-        rows = [np.column_stack([corners, np.full(len(corners), float(number))]) for number, corners in numbered]
-        return np.concatenate([np.empty((0, 4)), *rows])
+        rows = [np.empty((0, 4))]
+        for kind, pieces in enumerate(kinds):
+            for k, corners in enumerate(pieces):
+                number = float(len(kinds) * k + kind)
+                rows.append(np.column_stack([corners, np.full(len(corners), number)]))
+        return np.concatenate(rows)
 
     rows = _cached(mesh, f"convex pieces {PIECES}", make)
     numbers = np.unique(rows[:, 3])
@@ -98,15 +101,16 @@ def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[]
         return shipped
 
     file = None if folder is None or key is None else folder / f"{key}.npz"
-    found = _read(file, key) if file is not None and key is not None and nobody_else_s(file) else None
+    cover = _read(file, key) if file is not None and key is not None and nobody_else_s(file) else None
+    if cover is not None:
+        return cover
 
-    if found is None:
-        if needs_long(geometry):
-            tell_once(COVERING)
-        found = make()
-        if file is not None and key is not None:
-            _write(file, key, found)
-    return found
+    if needs_long(geometry):
+        tell_once(COVERING)
+    cover = make()
+    if file is not None and key is not None:
+        _write(file, key, cover)
+    return cover
 
 
 def needs_long(geometry: coal.CollisionGeometry) -> bool:
@@ -119,16 +123,16 @@ def _read(file: Path, key: str) -> Matrix | None:
     try:
         stored = NamedArrays(file)
         spheres = stored["spheres"]
-        name = str(stored["key"])
-        check = str(stored["check"])
+        stored_key = str(stored["key"])
+        checksum = str(stored["check"])
     except InputError:
         return None
-    whole = spheres.dtype == np.float64 and spheres.ndim == 2 and spheres.shape[1] == 4
-    if not whole or name != key or check != _check(spheres):
+    has_shape = spheres.dtype == np.float64 and spheres.ndim == 2 and spheres.shape[1] == 4
+    if not has_shape or stored_key != key or checksum != _check(spheres):
         return None
 
-    sound = np.isfinite(spheres[:, :3]).all() and (spheres[:, 3] >= 0.0).all()
-    return np.asarray(spheres) if sound else None
+    is_valid = np.isfinite(spheres[:, :3]).all() and (spheres[:, 3] >= 0.0).all()
+    return np.asarray(spheres) if is_valid else None
 
 
 def _check(spheres: Matrix) -> str:
@@ -136,6 +140,6 @@ def _check(spheres: Matrix) -> str:
 
 
 def _write(file: Path, key: str, spheres: Matrix) -> None:
-    name = np.array(key)
-    check = np.array(_check(spheres))
-    write_whole(file, lambda stream: np.savez(stream, spheres=spheres, key=name, check=check))
+    key_array = np.array(key)
+    checksum = np.array(_check(spheres))
+    write_whole(file, lambda stream: np.savez(stream, spheres=spheres, key=key_array, check=checksum))

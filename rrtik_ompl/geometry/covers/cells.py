@@ -81,73 +81,75 @@ def elements(solid: Solid, crossed: int, detail: int = 4) -> Elements:
         detail: Points of an element closer than its size over ``detail`` are put together into one small ball.
     """
     grid = _grid(solid.triangles, crossed)
-    pieces, cell = _pieces(grid.to_cells(solid.triangles), grid.shape)
+    surface_pieces, cell_of_piece = _cut_at_planes(grid.to_cells(solid.triangles), grid.shape)
     crossed_cells = np.zeros(grid.shape, dtype=bool)
-    crossed_cells.ravel()[cell] = True
+    crossed_cells.ravel()[cell_of_piece] = True
 
-    count, doubtful = winding(grid.to_cells(np.concatenate([solid.triangles, solid.rim])), grid.shape)
-    corner_inside = ((count != 0) | doubtful) & (len(solid.rim) == 0)
-    points, owner = _corner_points(crossed_cells, corner_inside)
+    winding_numbers, doubtful = winding(grid.to_cells(np.concatenate([solid.triangles, solid.rim])), grid.shape)
+    corner_inside = ((winding_numbers != 0) | doubtful) & (len(solid.rim) == 0)
+    corner_points, cell_of_corner = _inner_corners(crossed_cells, corner_inside)
 
     boxes = np.concatenate([_boxes(*level) for level in _blocks(~crossed_cells & all_corners(corner_inside))])
     boxes = np.concatenate([boxes, grid.to_cells(solid.enclosed)])
 
-    parts = np.concatenate([pieces.reshape(-1, 3), points])
-    owners = np.concatenate([np.repeat(cell, 3), owner])
-    parts, radii, owners = _thinned(parts, owners, detail, grid)
+    points = np.concatenate([surface_pieces.reshape(-1, 3), corner_points])
+    cell_of_point = np.concatenate([np.repeat(cell_of_piece, 3), cell_of_corner])
+    points, radii, cell_of_point = _merged_within_cells(points, cell_of_point, detail, grid)
 
-    return _assembled(grid, parts, radii, owners, boxes, np.argwhere((count != 0) & ~doubtful))
+    return _as_elements(grid, points, radii, cell_of_point, boxes, np.argwhere((winding_numbers != 0) & ~doubtful))
 
 
 def lattice_inside(solid: Solid, fewest: int) -> Matrix:
     """Points of a lattice that are surely inside a closed solid, shape (k, 3): ``fewest`` or more unless it is thin."""
     crossed = LATTICE_CROSSED
-    found = np.empty((0, 3))
+    lattice_points = np.empty((0, 3))
 
-    while len(found) < fewest and crossed <= MOST_LATTICE_CROSSED:
+    while len(lattice_points) < fewest and crossed <= MOST_LATTICE_CROSSED:
         grid = _grid(solid.triangles, crossed, LATTICE_LEAST)
-        count, doubtful = winding(grid.to_cells(solid.triangles), grid.shape)
-        found = grid.from_cells(np.argwhere((count != 0) & ~doubtful).astype(np.float64))
+        winding_numbers, doubtful = winding(grid.to_cells(solid.triangles), grid.shape)
+        lattice_points = grid.from_cells(np.argwhere((winding_numbers != 0) & ~doubtful).astype(np.float64))
         crossed *= 4
-    return found
+    return lattice_points
 
 
-def _grid(triangles: Triangles, crossed: int, least: int = 1) -> Grid:
+def _grid(triangles: Triangles, crossed: int, min_cells: int = 1) -> Grid:
     low = triangles.min(axis=(0, 1))
     high = triangles.max(axis=(0, 1))
     extent = np.maximum(high - low, 1e-9)
 
     a, b, c = (triangles[:, k] for k in range(3))
     area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    box = 2.0 * float(extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0])
-    step = max(np.sqrt(1.5 * min(0.5 * area, 2.0 * box) / crossed), float(np.prod(extent) / MAX_CELLS) ** (1.0 / 3.0))
+    box_area = 2.0 * float(extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0])
+    cell_edge = max(
+        np.sqrt(1.5 * min(0.5 * area, 2.0 * box_area) / crossed), float(np.prod(extent) / MAX_CELLS) ** (1.0 / 3.0)
+    )
 
-    number = np.maximum(np.ceil(extent / step), float(least))
-    number = np.minimum(number, MAX_CELLS_ALONG_AXIS)
-    while np.prod(number) > 4 * MAX_CELLS:
-        number = np.maximum(np.ceil(number / 2.0), float(least))
+    cell_counts = np.maximum(np.ceil(extent / cell_edge), float(min_cells))
+    cell_counts = np.minimum(cell_counts, MAX_CELLS_ALONG_AXIS)
+    while np.prod(cell_counts) > 4 * MAX_CELLS:
+        cell_counts = np.maximum(np.ceil(cell_counts / 2.0), float(min_cells))
 
-    size = extent / (number - 2.0 * np.array(MARGINS) * 0.999)
+    size = extent / (cell_counts - 2.0 * np.array(MARGINS) * 0.999)
     origin = low - size * MARGINS
-    return Grid(origin, size, (int(number[0]), int(number[1]), int(number[2])))
+    return Grid(origin, size, (int(cell_counts[0]), int(cell_counts[1]), int(cell_counts[2])))
 
 
-def _pieces(triangles: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int64]]:
+def _cut_at_planes(triangles: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int64]]:
     """Triangles (in cells) cut along the planes between cells, and the number of the cell that each piece is in."""
     for axis in range(3):
-        done = []
-        rest = triangles
-        while len(rest):
-            low = rest[:, :, axis].min(axis=1)
-            high = rest[:, :, axis].max(axis=1)
-            first = np.floor(low + EDGE_TOLERANCE) + 1.0
-            spans = high > first + EDGE_TOLERANCE
-            done.append(rest[~spans])
-            last = np.ceil(high[spans] - EDGE_TOLERANCE) - 1.0
-            rest = _cut(rest[spans], axis, np.floor(0.5 * (first[spans] + last)))
-        triangles = np.concatenate(done)
+        finished = []
+        unfinished = triangles
+        while len(unfinished):
+            low = unfinished[:, :, axis].min(axis=1)
+            high = unfinished[:, :, axis].max(axis=1)
+            first_plane = np.floor(low + EDGE_TOLERANCE) + 1.0
+            spans_plane = high > first_plane + EDGE_TOLERANCE
+            finished.append(unfinished[~spans_plane])
+            last_plane = np.ceil(high[spans_plane] - EDGE_TOLERANCE) - 1.0
+            unfinished = _cut(unfinished[spans_plane], axis, np.floor(0.5 * (first_plane[spans_plane] + last_plane)))
+        triangles = np.concatenate(finished)
 
-    return _placed(triangles, shape)
+    return _with_cells(triangles, shape)
 
 
 def _cut(triangles: Triangles, axis: int, plane: Vector) -> Triangles:
@@ -155,105 +157,105 @@ def _cut(triangles: Triangles, axis: int, plane: Vector) -> Triangles:
     if not len(triangles):
         return triangles
 
-    beyond = triangles[:, :, axis] > plane[:, None]
+    is_beyond = triangles[:, :, axis] > plane[:, None]
     # The corner that lies alone on its side comes first.
-    lone = np.where((beyond.sum(axis=1) == 1)[:, None], beyond, ~beyond).argmax(axis=1)
+    lone_corner = np.where((is_beyond.sum(axis=1) == 1)[:, None], is_beyond, ~is_beyond).argmax(axis=1)
     row = np.arange(len(triangles))
-    a, b, c = (triangles[row, (lone + k) % 3] for k in range(3))
+    a, b, c = (triangles[row, (lone_corner + k) % 3] for k in range(3))
 
-    ab = _meet(a, b, axis, plane)
-    ac = _meet(a, c, axis, plane)
+    ab = _edge_crossing(a, b, axis, plane)
+    ac = _edge_crossing(a, c, axis, plane)
     return np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ac), (ab, b, c), (ab, c, ac))])
 
 
-def _meet(a: Matrix, b: Matrix, axis: int, plane: Vector) -> Matrix:
-    share = np.clip((plane - a[:, axis]) / (b[:, axis] - a[:, axis]), 0.0, 1.0)
-    point = np.asarray(a + share[:, None] * (b - a))
+def _edge_crossing(a: Matrix, b: Matrix, axis: int, plane: Vector) -> Matrix:
+    fraction = np.clip((plane - a[:, axis]) / (b[:, axis] - a[:, axis]), 0.0, 1.0)
+    point = np.asarray(a + fraction[:, None] * (b - a))
     point[:, axis] = plane
     return point
 
 
-def _placed(pieces: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int64]]:
+def _with_cells(pieces: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int64]]:
     """Cell of every piece; a piece that lies in the plane between two cells belongs to both."""
-    index = np.floor(pieces.mean(axis=1))
+    cell_index = np.floor(pieces.mean(axis=1))
     for axis in range(3):
-        level = np.round(pieces[:, 0, axis])
-        flat = np.abs(pieces[:, :, axis] - level[:, None]).max(axis=1) <= 2.0 * EDGE_TOLERANCE
+        plane = np.round(pieces[:, 0, axis])
+        lies_in_plane = np.abs(pieces[:, :, axis] - plane[:, None]).max(axis=1) <= 2.0 * EDGE_TOLERANCE
         for side in (-1.0, 0.0):
-            twin = index[: len(flat)][flat]
-            twin[:, axis] = level[flat] + side
-            pieces = np.concatenate([pieces, pieces[: len(flat)][flat]])
-            index = np.concatenate([index, twin])
+            neighbour_index = cell_index[: len(lies_in_plane)][lies_in_plane]
+            neighbour_index[:, axis] = plane[lies_in_plane] + side
+            pieces = np.concatenate([pieces, pieces[: len(lies_in_plane)][lies_in_plane]])
+            cell_index = np.concatenate([cell_index, neighbour_index])
 
-    index = np.clip(index, 0, np.array(shape) - 1).astype(np.int64)
-    return pieces, np.ravel_multi_index((index[:, 0], index[:, 1], index[:, 2]), shape)
+    cell_index = np.clip(cell_index, 0, np.array(shape) - 1).astype(np.int64)
+    return pieces, np.ravel_multi_index((cell_index[:, 0], cell_index[:, 1], cell_index[:, 2]), shape)
 
 
-def _corner_points(cells: Flags, inside: Flags) -> tuple[Matrix, NDArray[np.int64]]:
+def _inner_corners(cells: Flags, inside: Flags) -> tuple[Matrix, NDArray[np.int64]]:
     """Corners of the given cells that are inside, and the cell of each."""
-    index = np.argwhere(cells)
-    number = np.flatnonzero(cells)
-    corner = index[:, None] + CORNERS
-    keep = inside[corner[..., 0], corner[..., 1], corner[..., 2]]
-    return corner[keep].astype(np.float64), np.repeat(number, 8).reshape(-1, 8)[keep]
+    cell_index = np.argwhere(cells)
+    cell_number = np.flatnonzero(cells)
+    corner = cell_index[:, None] + CORNERS
+    is_inside = inside[corner[..., 0], corner[..., 1], corner[..., 2]]
+    return corner[is_inside].astype(np.float64), np.repeat(cell_number, 8).reshape(-1, 8)[is_inside]
 
 
 def _blocks(full: Flags) -> list[tuple[Matrix, int]]:
     """Full cells put together into cubes of 4, 2 and 1 cells: lowest corners and sizes."""
-    found = []
-    rest = full.copy()
+    cubes = []
+    remaining = full.copy()
     for size in (4, 2, 1):
-        pad = [(0, -n % size) for n in rest.shape]
-        tiles = np.pad(rest, pad)
+        pad = [(0, -n % size) for n in remaining.shape]
+        tiles = np.pad(remaining, pad)
         nx, ny, nz = (n // size for n in tiles.shape)
-        together = tiles.reshape(nx, size, ny, size, nz, size).all(axis=(1, 3, 5))
-        found.append((np.argwhere(together).astype(np.float64) * size, size))
+        is_full_cube = tiles.reshape(nx, size, ny, size, nz, size).all(axis=(1, 3, 5))
+        cubes.append((np.argwhere(is_full_cube).astype(np.float64) * size, size))
 
-        taken = together.repeat(size, axis=0).repeat(size, axis=1).repeat(size, axis=2)
-        rest &= ~taken[: rest.shape[0], : rest.shape[1], : rest.shape[2]]
-    return found
+        taken = is_full_cube.repeat(size, axis=0).repeat(size, axis=1).repeat(size, axis=2)
+        remaining &= ~taken[: remaining.shape[0], : remaining.shape[1], : remaining.shape[2]]
+    return cubes
 
 
 def _boxes(low: Matrix, size: int) -> NDArray[np.float64]:
     return np.asarray(low[:, None] + CORNERS * float(size))
 
 
-def _thinned(
+def _merged_within_cells(
     points: Matrix, owner: NDArray[np.int64], detail: int, grid: Grid
 ) -> tuple[Matrix, Vector, NDArray[np.int64]]:
     """Points of one cell that are close together replaced by one ball around them; the cell of each."""
     cell = np.column_stack(np.unravel_index(owner, grid.shape))
-    within = np.clip(np.floor((points - cell) * detail).astype(np.int64), 0, detail - 1)
-    key = ((owner * detail + within[:, 0]) * detail + within[:, 1]) * detail + within[:, 2]
+    subcell = np.clip(np.floor((points - cell) * detail).astype(np.int64), 0, detail - 1)
+    subcell_key = ((owner * detail + subcell[:, 0]) * detail + subcell[:, 1]) * detail + subcell[:, 2]
 
-    order = np.argsort(key, kind="stable")
-    first = np.r_[True, np.diff(key[order]) > 0]
-    start = np.flatnonzero(first)
-    group = np.cumsum(first) - 1
+    order = np.argsort(subcell_key, kind="stable")
+    starts_group = np.r_[True, np.diff(subcell_key[order]) > 0]
+    start = np.flatnonzero(starts_group)
+    group = np.cumsum(starts_group) - 1
 
     sorted_points = points[order]
-    middle = 0.5 * (np.minimum.reduceat(sorted_points, start) + np.maximum.reduceat(sorted_points, start))
-    away = np.linalg.norm((sorted_points - middle[group]) * grid.size, axis=1)
-    return middle, np.maximum.reduceat(away, start), owner[order][start]
+    centres = 0.5 * (np.minimum.reduceat(sorted_points, start) + np.maximum.reduceat(sorted_points, start))
+    distances = np.linalg.norm((sorted_points - centres[group]) * grid.size, axis=1)
+    return centres, np.maximum.reduceat(distances, start), owner[order][start]
 
 
-def _assembled(
+def _as_elements(
     grid: Grid,
     points: Matrix,
     radii: Vector,
     owner: NDArray[np.int64],
     boxes: NDArray[np.float64],
-    sure: NDArray[np.int64],
+    inside_corners: NDArray[np.int64],
 ) -> Elements:
     """Elements in the solid's frame; radii make up for surface that pokes into a cell by under ``EDGE_TOLERANCE``."""
-    poke = 4.0 * EDGE_TOLERANCE * float(np.linalg.norm(grid.size))
+    protrusion = 4.0 * EDGE_TOLERANCE * float(np.linalg.norm(grid.size))
     start = np.flatnonzero(np.r_[True, np.diff(owner) > 0])
-    middle = np.add.reduceat(points, start) / np.diff(np.r_[start, len(points)])[:, None]
+    centres = np.add.reduceat(points, start) / np.diff(np.r_[start, len(points)])[:, None]
 
     return Elements(
         grid.from_cells(np.concatenate([points, boxes.reshape(-1, 3)])),
-        np.concatenate([radii, np.zeros(8 * len(boxes))]) + poke,
+        np.concatenate([radii, np.zeros(8 * len(boxes))]) + protrusion,
         np.concatenate([start, len(points) + 8 * np.arange(len(boxes))]),
-        grid.from_cells(sure.astype(np.float64)),
-        grid.from_cells(middle),
+        grid.from_cells(inside_corners.astype(np.float64)),
+        grid.from_cells(centres),
     )

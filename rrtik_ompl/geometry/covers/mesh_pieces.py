@@ -35,16 +35,16 @@ GRID = 24  # steps along the longest side, to which corners are moved for a sket
 MAX_PLANES = 90  # of a piece inside
 SHRINKAGE = 1e-6  # of a cell's size, by which a piece inside keeps away from the surface
 THINNEST = 1e-3  # [m] radius of the largest ball in a piece inside that is worth the while
-FREELY = [(None, None)] * 4
+UNBOUNDED = [(None, None)] * 4  # bounds of a ball's centre and radius, for linprog: none
 DIRECTIONS = 100  # in which extreme points are sought where volumes are compared
 NO_BOXES = np.empty((0, 2, 3))
-OCTANTS = np.array(list(np.ndindex(2, 2, 2)), dtype=bool)  # corners of a box: low or high along each axis
+CORNER_IS_HIGH = np.array(list(np.ndindex(2, 2, 2)), dtype=bool)  # of a box's 8 corners, along each axis, shape (8, 3)
 
 Triangles = NDArray[np.float64]  # shape (m, 3, 3): triangle, corner, coordinate
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _Cell:
     """What a cell (``low``, ``high``) holds: surface, and boxes inside the solid, shape (k, 2, 3): low, high.
 
     ``shell`` is the number of the closed surface that it belongs to.
@@ -59,8 +59,8 @@ class _Part:
     @cached_property
     def points(self) -> Matrix:
         """Corners of the surface and of the boxes, shape (n, 3)."""
-        of_boxes = np.where(OCTANTS, self.boxes[:, None, 1], self.boxes[:, None, 0])
-        return np.unique(np.concatenate([self.surface.reshape(-1, 3), of_boxes.reshape(-1, 3)]), axis=0)
+        box_corners = np.where(CORNER_IS_HIGH, self.boxes[:, None, 1], self.boxes[:, None, 0])
+        return np.unique(np.concatenate([self.surface.reshape(-1, 3), box_corners.reshape(-1, 3)]), axis=0)
 
     @cached_property
     def volume(self) -> float:
@@ -68,36 +68,37 @@ class _Part:
         if not len(self.points):
             return 0.0
         try:
-            return float(ConvexHull(_outermost(self.points)).volume)
+            return float(ConvexHull(_extreme_points(self.points)).volume)
         except (QhullError, ValueError):  # flat
             return 0.0
 
     @cached_property
-    def halves(self) -> tuple[_Part, _Part]:
-        """The two parts of the best cut."""
+    def halves(self) -> tuple[_Cell, _Cell]:
+        """The two cells of the best cut: below it and above it."""
         cuts = [self._cut(axis, share) for axis in range(3) for share in SHARES]
         return min(cuts, key=lambda pair: pair[0].volume + pair[1].volume)
 
     @property
     def gain(self) -> float:
-        """How much volume the best cut takes away."""
+        """How much volume the best cut takes away [m^3]."""
         return self.volume - self.halves[0].volume - self.halves[1].volume
 
-    def _cut(self, axis: int, share: float) -> tuple[_Part, _Part]:
-        place = float((1.0 - share) * self.low[axis] + share * self.high[axis])
-        below, above = clipped(self.surface, axis, place)
+    def _cut(self, axis: int, share: float) -> tuple[_Cell, _Cell]:
+        """The cells below and above a plane across an axis, at a share of this cell's length."""
+        coordinate = float((1.0 - share) * self.low[axis] + share * self.high[axis])
+        surface_below, surface_above = clipped(self.surface, axis, coordinate)
 
-        first = self.boxes[self.boxes[:, 0, axis] < place]
-        second = self.boxes[self.boxes[:, 1, axis] > place]
-        first[:, 1, axis] = np.minimum(first[:, 1, axis], place)
-        second[:, 0, axis] = np.maximum(second[:, 0, axis], place)
+        boxes_below = self.boxes[self.boxes[:, 0, axis] < coordinate]
+        boxes_above = self.boxes[self.boxes[:, 1, axis] > coordinate]
+        boxes_below[:, 1, axis] = np.minimum(boxes_below[:, 1, axis], coordinate)
+        boxes_above[:, 0, axis] = np.maximum(boxes_above[:, 0, axis], coordinate)
 
-        ends = self.high.copy()
-        ends[axis] = place
-        starts = self.low.copy()
-        starts[axis] = place
-        lower = replace(self, high=ends, surface=below, boxes=first)
-        upper = replace(self, low=starts, surface=above, boxes=second)
+        lower_high = self.high.copy()
+        lower_high[axis] = coordinate
+        upper_low = self.low.copy()
+        upper_low[axis] = coordinate
+        lower = replace(self, high=lower_high, surface=surface_below, boxes=boxes_below)
+        upper = replace(self, low=upper_low, surface=surface_above, boxes=boxes_above)
         return lower, upper
 
 
@@ -121,45 +122,56 @@ def convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], list[Matrix], 
 
     if not is_closed(mesh):
         boxes = np.stack(enclosure(mesh).boxes(), axis=1)
-        parts = [_whole(part, surface) for part in _cut_up([_start(surface, boxes)])]
-        points = [_outermost(part.surface.reshape(-1, 3)) for part in parts]
-        return _not_empty([_hull(part.points)[1] for part in parts]), [], _not_empty(points)
+        cells = [_with_whole_surface(cell, surface) for cell in _split_into_cells([_first_cell(surface, boxes)])]
+        surface_points = [_extreme_points(cell.surface.reshape(-1, 3)) for cell in cells]
+        outer_pieces = [_hull(cell.points)[1] for cell in cells]
+        return _without_empty(outer_pieces), [], _without_empty(surface_points)
 
     return _closed_pieces(_shells(vertices, triangles))
 
 
-def _not_empty(pieces: list[Matrix]) -> list[Matrix]:
+def _without_empty(pieces: list[Matrix]) -> list[Matrix]:
     return [corners for corners in pieces if len(corners)]
 
 
 def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
-    """Pieces of closed surfaces: what is in one of them, and not in one turned inside out, is inside the mesh."""
+    """Pieces of closed surfaces; see `convex_pieces`.
+
+    Most of the volume tells which way triangles of this mesh turn. A shell that turns the other way bounds a cavity;
+    what is in a shell that bounds a solid, and in no cavity, is inside the mesh.
+    """
     volumes = np.array([_signed_volume(shell) for shell in shells])
-    inverted = [shell for shell, turned in zip(shells, volumes * volumes.sum() < 0.0, strict=True) if turned]
+    orientation = volumes * volumes.sum()
+    bounds_solid = orientation > 0.0
+    bounds_cavity = orientation < 0.0
+    cavities = [shell for shell, is_cavity in zip(shells, bounds_cavity, strict=True) if is_cavity]
 
-    around = []
-    inside = []
-    points = []
-    for part in _cut_up([_start(shell, NO_BOXES, number) for number, shell in enumerate(shells)]):
-        shell = shells[part.shell]
-        whole = _whole(part, shell)
-        corners = np.where(OCTANTS, part.high, part.low)
-        held = np.array([_holds(shell, corner) for corner in corners])
-        planes, span = _hull(np.concatenate([whole.points, corners[held]]))
-        around.append(span)
-        points.append(_outermost(whole.surface.reshape(-1, 3)))  # a corner of a cell may lie in another shell's hollow
-        if not len(planes) or not volumes[part.shell] * volumes.sum() > 0.0:
+    outer_pieces = []
+    inner_pieces = []
+    surface_points = []
+    cells = _split_into_cells([_first_cell(shell, NO_BOXES, number) for number, shell in enumerate(shells)])
+    for cell in cells:
+        shell = shells[cell.shell]
+        cell_with_surface = _with_whole_surface(cell, shell)
+        corners = np.where(CORNER_IS_HIGH, cell.high, cell.low)
+        corner_is_inside = np.array([_shell_contains(shell, corner) for corner in corners])
+        planes, hull_corners = _hull(np.concatenate([cell_with_surface.points, corners[corner_is_inside]]))
+        outer_pieces.append(hull_corners)
+        # Of the surface alone: a corner of a cell may lie in another shell's hollow.
+        surface_points.append(_extreme_points(cell_with_surface.surface.reshape(-1, 3)))
+        if not len(planes) or not bounds_solid[cell.shell]:
             continue
 
-        obstacles = np.concatenate([whole.surface, *(_within(other, part.low, part.high) for other in inverted)])
-        kernel = _kernel(planes, replace(part, surface=obstacles))
-        if kernel is None:
+        cavity_walls = [_clipped_to_box(cavity, cell.low, cell.high) for cavity in cavities]
+        obstacles = np.concatenate([cell_with_surface.surface, *cavity_walls])
+        body_corners = _convex_body_inside(planes, replace(cell, surface=obstacles))
+        if body_corners is None:
             continue
-        centre = kernel.mean(axis=0)
-        if _holds(shell, centre) and not any(_holds(other, centre) for other in inverted):
-            inside.append(kernel)
+        centre = body_corners.mean(axis=0)
+        if _shell_contains(shell, centre) and not any(_shell_contains(cavity, centre) for cavity in cavities):
+            inner_pieces.append(body_corners)
 
-    return _not_empty(around), inside, _not_empty(points)
+    return _without_empty(outer_pieces), inner_pieces, _without_empty(surface_points)
 
 
 def _shells(vertices: Matrix, triangles: NDArray[np.int64]) -> list[Triangles]:
@@ -167,97 +179,101 @@ def _shells(vertices: Matrix, triangles: NDArray[np.int64]) -> list[Triangles]:
     _, welded = np.unique(vertices, axis=0, return_inverse=True)
     corners = np.asarray(welded).ravel()[triangles]
 
-    ends = corners.ravel(), np.roll(corners, 1, axis=1).ravel()
+    edge_ends = corners.ravel(), np.roll(corners, 1, axis=1).ravel()
     size = int(corners.max()) + 1
-    _, label = connected_components(coo_matrix((np.ones(corners.size), ends), shape=(size, size)), directed=False)
+    _, label = connected_components(coo_matrix((np.ones(corners.size), edge_ends), shape=(size, size)), directed=False)
 
-    numbers = np.unique(label[corners[:, 0]])
-    if len(numbers) > MAX_PIECES:
+    shell_numbers = np.unique(label[corners[:, 0]])
+    if len(shell_numbers) > MAX_PIECES:
         return [vertices[triangles]]
-    return [vertices[triangles[label[corners[:, 0]] == number]] for number in numbers]
+    return [vertices[triangles[label[corners[:, 0]] == number]] for number in shell_numbers]
 
 
 def _signed_volume(shell: Triangles) -> float:
     return float(np.einsum("ij,ij->i", shell[:, 0], np.cross(shell[:, 1], shell[:, 2])).sum()) / 6.0
 
 
-def _holds(shell: Triangles, point: Vector) -> bool:
+def _shell_contains(shell: Triangles, point: Vector) -> bool:
     return inside_mesh(shell.reshape(-1, 3), np.arange(3 * len(shell)).reshape(-1, 3), point)
 
 
-def _start(surface: Triangles, boxes: NDArray[np.float64], shell: int = 0) -> _Part:
-    """A sketch of a surface as one part."""
+def _first_cell(surface: Triangles, boxes: NDArray[np.float64], shell: int = 0) -> _Cell:
+    """The cell around all of a surface and of some boxes, with a sketch of the surface."""
     bounds = np.concatenate([surface.reshape(-1, 3), boxes.reshape(-1, 3)])
-    return _Part(bounds.min(axis=0), bounds.max(axis=0), _sketch(surface), boxes, shell)
+    return _Cell(bounds.min(axis=0), bounds.max(axis=0), _sketch(surface), boxes, shell)
 
 
-def _whole(part: _Part, surface: Triangles) -> _Part:
-    """A part with the surface itself for its sketch."""
-    return replace(part, surface=_within(surface, part.low, part.high))
+def _with_whole_surface(cell: _Cell, surface: Triangles) -> _Cell:
+    """A cell with what it holds of the surface itself, in the place of its sketch."""
+    return replace(cell, surface=_clipped_to_box(surface, cell.low, cell.high))
 
 
-def _cut_up(parts: list[_Part]) -> list[_Part]:
-    """Parts after the best cuts, the one that takes most away first, while that is worth it."""
-    least = SMALLEST_GAIN * sum(part.volume for part in parts)
-    while len(parts) < MAX_PIECES:
-        best = max(parts, key=lambda part: part.gain)
-        if best.gain <= least:
+def _split_into_cells(cells: list[_Cell]) -> list[_Cell]:
+    """The cells after the best cuts, the one that takes most volume away first, while that is worth it."""
+    min_gain = SMALLEST_GAIN * sum(cell.volume for cell in cells)
+    while len(cells) < MAX_PIECES:
+        best = max(cells, key=lambda cell: cell.gain)
+        if best.gain <= min_gain:
             break
-        parts.remove(best)
-        parts += best.halves
-    return parts
+        cells.remove(best)
+        cells += best.halves
+    return cells
 
 
 def _sketch(surface: Triangles) -> Triangles:
     """Fewer triangles of about the same shape: corners moved to a grid, what coincides left out."""
     low = surface.min(axis=(0, 1))
-    size = max(float(np.ptp(surface, axis=(0, 1)).max()) / GRID, 1e-12)
+    grid_step = max(float(np.ptp(surface, axis=(0, 1)).max()) / GRID, 1e-12)
 
-    steps = np.round((surface - low) / size).astype(np.int64)
-    numbers = np.sort(steps @ ((GRID + 1) ** np.arange(3)), axis=1)
-    first = np.unique(numbers, axis=0, return_index=True)[1]
-    distinct = (numbers[first, 1:] != numbers[first, :-1]).all(axis=1)
-    return np.asarray(low + size * steps[first[distinct]])
+    grid_points = np.round((surface - low) / grid_step).astype(np.int64)
+    corner_numbers = np.sort(grid_points @ ((GRID + 1) ** np.arange(3)), axis=1)
+    distinct_rows = np.unique(corner_numbers, axis=0, return_index=True)[1]
+    has_area = (corner_numbers[distinct_rows, 1:] != corner_numbers[distinct_rows, :-1]).all(axis=1)
+    return np.asarray(low + grid_step * grid_points[distinct_rows[has_area]])
 
 
-def _within(surface: Triangles, low: Vector, high: Vector) -> Triangles:
-    """The parts of triangles inside a cell."""
-    near = (surface.min(axis=1) <= high) & (surface.max(axis=1) >= low)
-    surface = surface[near.all(axis=1)]
+def _clipped_to_box(surface: Triangles, low: Vector, high: Vector) -> Triangles:
+    """The parts of triangles inside a box, as triangles."""
+    overlaps_box = (surface.min(axis=1) <= high) & (surface.max(axis=1) >= low)
+    surface = surface[overlaps_box.all(axis=1)]
     for axis in range(3):
         _, surface = clipped(surface, axis, float(low[axis]))
         surface, _ = clipped(surface, axis, float(np.nextafter(high[axis], np.inf)))
     return surface
 
 
-def clipped(surface: Triangles, axis: int, place: float) -> tuple[Triangles, Triangles]:
+def clipped(surface: Triangles, axis: int, coordinate: float) -> tuple[Triangles, Triangles]:
     """The parts of triangles on both sides of a plane across an axis, as triangles: below, above."""
-    above = surface[:, :, axis] >= place
+    above = surface[:, :, axis] >= coordinate
     count = above.sum(axis=1)
     crossing = (count == 1) | (count == 2)
     lone_above = count[crossing] == 1
-    lone = np.where(lone_above[:, None], above[crossing], ~above[crossing]).argmax(axis=1)
+    lone_corner = np.where(lone_above[:, None], above[crossing], ~above[crossing]).argmax(axis=1)
 
-    rows = np.arange(len(lone))
-    a, b, c = (surface[crossing][rows, (lone + k) % 3] for k in range(3))
-    p = _crossed(a, b, axis, place)
-    q = _crossed(a, c, axis, place)
+    rows = np.arange(len(lone_corner))
+    a, b, c = (surface[crossing][rows, (lone_corner + k) % 3] for k in range(3))
+    p = _plane_crossings(a, b, axis, coordinate)
+    q = _plane_crossings(a, c, axis, coordinate)
 
-    tips = np.stack([a, p, q], axis=1)
-    rests = np.stack([p, b, c], axis=1), np.stack([p, c, q], axis=1)
-    low = [surface[count == 0], tips[~lone_above], *(rest[lone_above] for rest in rests)]
-    high = [surface[count == 3], tips[lone_above], *(rest[~lone_above] for rest in rests)]
+    corner_triangles = np.stack([a, p, q], axis=1)
+    quad_triangles = np.stack([p, b, c], axis=1), np.stack([p, c, q], axis=1)
+    low = [surface[count == 0], corner_triangles[~lone_above], *(triangles[lone_above] for triangles in quad_triangles)]
+    high = [
+        surface[count == 3],
+        corner_triangles[lone_above],
+        *(triangles[~lone_above] for triangles in quad_triangles),
+    ]
 
     return np.concatenate(low), np.concatenate(high)
 
 
-def _crossed(first: Matrix, second: Matrix, axis: int, place: float) -> Matrix:
-    """Where edges cross the plane; their ends lie on different sides."""
-    from_first = first[:, axis] - place
-    from_second = second[:, axis] - place
-    share = from_first / (from_first - from_second)
+def _plane_crossings(first: Matrix, second: Matrix, axis: int, coordinate: float) -> Matrix:
+    """Where edges from first to second, shape (k, 3) each, cross the plane; their ends lie on different sides of it."""
+    first_offset = first[:, axis] - coordinate
+    second_offset = second[:, axis] - coordinate
+    share = first_offset / (first_offset - second_offset)
     points: Matrix = first + share[:, None] * (second - first)
-    points[:, axis] = place
+    points[:, axis] = coordinate
     return points
 
 
@@ -273,40 +289,44 @@ def _hull(points: Matrix) -> tuple[Matrix, Matrix]:
     return hull.equations * (1.0, 1.0, 1.0, -1.0), np.asarray(points[hull.vertices])
 
 
-def _kernel(planes: Matrix, part: _Part) -> Matrix | None:
+def _convex_body_inside(planes: Matrix, cell: _Cell) -> Matrix | None:
     """Corners of a convex body in the cell that no surface reaches into, shape (n, 3); None if there is none.
 
     Each triangle is kept out by the plane that has to move inwards least for it.
     """
-    sides = np.concatenate([np.column_stack([np.eye(3), part.high]), np.column_stack([-np.eye(3), -part.low])])
-    kept = np.concatenate([sides, most_different(planes, MAX_PLANES)])
+    cell_planes = np.concatenate([np.column_stack([np.eye(3), cell.high]), np.column_stack([-np.eye(3), -cell.low])])
+    all_planes = np.concatenate([cell_planes, most_different(planes, MAX_PLANES)])
 
     # Of each triangle along each normal.
-    lowest = np.min([part.surface[:, k] @ kept[:, :3].T for k in range(3)], axis=0)
-    nearest = (kept[:, 3] - lowest).argmin(axis=1)
-    offsets = kept[:, 3].copy()
+    lowest = np.min([cell.surface[:, k] @ all_planes[:, :3].T for k in range(3)], axis=0)
+    nearest = (all_planes[:, 3] - lowest).argmin(axis=1)
+    offsets = all_planes[:, 3].copy()
     np.minimum.at(offsets, nearest, lowest[np.arange(len(nearest)), nearest])
-    offsets -= SHRINKAGE * float((part.high - part.low).max())
+    offsets -= SHRINKAGE * float((cell.high - cell.low).max())
 
     # The largest ball behind all planes: its centre is a point inside, which qhull asks for.
-    found = linprog([0.0, 0.0, 0.0, -1.0], np.column_stack([kept[:, :3], np.ones(len(kept))]), offsets, bounds=FREELY)
-    if found.status != 0 or not found.x[3] > THINNEST:
+    largest_ball = linprog(
+        [0.0, 0.0, 0.0, -1.0], np.column_stack([all_planes[:, :3], np.ones(len(all_planes))]), offsets, bounds=UNBOUNDED
+    )
+    if largest_ball.status != 0 or not largest_ball.x[3] > THINNEST:
         return None
 
     try:
-        return np.asarray(HalfspaceIntersection(np.column_stack([kept[:, :3], -offsets]), found.x[:3]).intersections)
+        return np.asarray(
+            HalfspaceIntersection(np.column_stack([all_planes[:, :3], -offsets]), largest_ball.x[:3]).intersections
+        )
     except (QhullError, ValueError):
         return None
 
 
-def _outermost(points: Matrix) -> Matrix:
+def _extreme_points(points: Matrix) -> Matrix:
     """Some of the points that lie farthest in some direction."""
-    return points[np.unique((points @ _directions().T).argmax(axis=0))] if len(points) else points
+    return points[np.unique((points @ _unit_directions().T).argmax(axis=0))] if len(points) else points
 
 
-def _directions() -> Matrix:
+def _unit_directions() -> Matrix:
     """Unit vectors spread over all directions, shape (DIRECTIONS, 3)."""
     z = (2.0 * np.arange(DIRECTIONS) + 1.0) / DIRECTIONS - 1.0
-    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(DIRECTIONS)
-    across = np.sqrt(1.0 - z * z)
-    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
+    azimuth = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(DIRECTIONS)
+    radius = np.sqrt(1.0 - z * z)
+    return np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z])

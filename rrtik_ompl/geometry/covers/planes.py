@@ -21,10 +21,10 @@ def most_different(planes: Matrix, count: int) -> Matrix:
         return planes
 
     taken = [0]
-    nearest = planes[:, :3] @ planes[0, :3]
+    largest_cosine = planes[:, :3] @ planes[0, :3]
     while len(taken) < count:
-        taken.append(int(np.argmin(nearest)))
-        nearest = np.maximum(nearest, planes[:, :3] @ planes[taken[-1], :3])
+        taken.append(int(np.argmin(largest_cosine)))
+        largest_cosine = np.maximum(largest_cosine, planes[:, :3] @ planes[taken[-1], :3])
     return planes[taken]
 
 

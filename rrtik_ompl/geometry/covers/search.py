@@ -23,12 +23,12 @@ CANDIDATES = 400
 LEAST_ON_SURFACE = 80  # candidates for what is thin or open
 BISECTIONS = 7
 MATCHINGS = 7  # of matching elements with balls
-STEPS = 10  # of every ball in a round
-MOVES = 4  # balls moved elsewhere in a round, at most
-WORTH = 0.95  # a ball is moved elsewhere if the protrusion it leaves behind is below this share of the worst
+RECENTRING_STEPS = 10  # of every ball in a round
+MAX_RELOCATIONS = 4  # balls moved elsewhere in a round, at most
+RELOCATION_GAIN = 0.95  # a ball is moved elsewhere if the protrusion it leaves behind is below this share of the worst
 CHUNK = 64
 
-Needs = NDArray[np.float32]  # shape (centres, elements)
+CentreElementTable = NDArray[np.float32]  # shape (centres, elements)
 
 
 @dataclass(slots=True, eq=False)
@@ -43,26 +43,35 @@ class Places:
 
 
 def smallest_cover(
-    parts: Elements, surface: cKDTree, limit: int, wanted: float | None, *, lenient: bool = False
+    elements: Elements, surface: cKDTree, limit: int, target: float | None, *, lenient: bool = False
 ) -> Matrix:
     """Balls that hold all elements, at most ``limit``, shape (n, 4).
 
     Args:
-        parts: The elements.
+        elements: What has to be held.
         surface: Points spread over the surface (``surface_points``).
-        limit: Largest number of balls, unless the protrusion ``wanted`` takes more.
-        wanted: Protrusion that is good enough; None for the smallest.
+        limit: Largest number of balls, unless the protrusion ``target`` takes more.
+        target: Protrusion that is good enough; None for the smallest.
         lenient: Not to count a protrusion that no candidate can save an element: one such element, as an open mesh has
             at its rim, would end the search with few balls that stick out as far everywhere.
     """
-    places = candidates(parts, surface)
-    needs = reaches(parts, places.centres) - places.depth[:, None].astype(np.float32)
-    spared = np.maximum(needs.min(axis=0), 0.0) if lenient else np.zeros_like(needs[0])
-    needs -= spared
+    candidate_places = candidates(elements, surface)
+    protrusions = reaches(elements, candidate_places.centres) - candidate_places.depth[:, None].astype(np.float32)
+    unavoidable = np.maximum(protrusions.min(axis=0), 0.0) if lenient else np.zeros_like(protrusions[0])
+    protrusions -= unavoidable
 
-    chosen = _cover(needs, limit, wanted)
-    found = _refined(parts, surface, places, needs, spared, places[chosen], max(limit, len(chosen)), wanted)
-    return _shrunk(parts, found)
+    chosen = _cover_by_bisection(protrusions, limit, target)
+    improved = _improved(
+        elements,
+        surface,
+        candidate_places,
+        protrusions,
+        unavoidable,
+        candidate_places[chosen],
+        max(limit, len(chosen)),
+        target,
+    )
+    return _fitted_to_elements(elements, improved)
 
 
 def surface_points(triangles: Triangles, count: int) -> Matrix:
@@ -78,197 +87,203 @@ def surface_points(triangles: Triangles, count: int) -> Matrix:
     return np.concatenate([spread, triangles[:: -(-len(triangles) // count)].reshape(-1, 3)])
 
 
-def candidates(parts: Elements, surface: cKDTree) -> Places:
+def candidates(elements: Elements, surface: cKDTree) -> Places:
     """Places for centres: lattice points inside, and points at the surface for what is thin or open."""
-    inside = every(parts.inside, CANDIDATES)
-    edge = every(parts.on_surface, max(CANDIDATES - len(inside), LEAST_ON_SURFACE))
-    centres = np.concatenate([inside, edge])
-    side = np.where(np.arange(len(centres)) < len(inside), 1.0, -1.0)
-    return Places(centres, side * surface.query(centres)[0])
+    inside = random_subset(elements.inside, CANDIDATES)
+    near_surface = random_subset(elements.on_surface, max(CANDIDATES - len(inside), LEAST_ON_SURFACE))
+    centres = np.concatenate([inside, near_surface])
+    sign = np.where(np.arange(len(centres)) < len(inside), 1.0, -1.0)
+    return Places(centres, sign * surface.query(centres)[0])
 
 
-def every(points: Matrix, most: int) -> Matrix:
-    """At most so many of the points, spread evenly by lot (the same every time)."""
-    if len(points) <= most:
+def random_subset(points: Matrix, count: int) -> Matrix:
+    """At most ``count`` of the points, drawn by lot (the same ones every time)."""
+    if len(points) <= count:
         return points
-    return points[np.sort(np.random.default_rng(0).choice(len(points), most, replace=False))]
+    return points[np.sort(np.random.default_rng(0).choice(len(points), count, replace=False))]
 
 
-def reaches(parts: Elements, centres: Matrix) -> Needs:
-    """Radius that a ball around each centre needs to hold each element."""
-    points = parts.points.astype(np.float32).T
-    squares = (points**2).sum(axis=0)
-    radii = parts.radii.astype(np.float32)
-    found = np.empty((len(centres), len(parts.start)), dtype=np.float32)
+def reaches(elements: Elements, centres: Matrix) -> CentreElementTable:
+    """Radius that a ball around each centre needs to hold each element, shape (centres, elements)."""
+    points = elements.points.astype(np.float32).T
+    squared_norms = (points**2).sum(axis=0)
+    ball_radii = elements.radii.astype(np.float32)
+    radii = np.empty((len(centres), len(elements.start)), dtype=np.float32)
 
     for k in range(0, len(centres), CHUNK):
-        some = centres[k : k + CHUNK].astype(np.float32)
+        chunk = centres[k : k + CHUNK].astype(np.float32)
         # |p - c|^2 = |p|^2 - 2 p c + |c|^2, in one array.
-        square = some @ points
-        square *= -2.0
-        square += squares
-        square += (some**2).sum(axis=1)[:, None]
-        np.maximum(square, 0.0, out=square)
-        np.sqrt(square, out=square)
-        square += radii
-        np.maximum.reduceat(square, parts.start, axis=1, out=found[k : k + CHUNK])
+        distances = chunk @ points
+        distances *= -2.0
+        distances += squared_norms
+        distances += (chunk**2).sum(axis=1)[:, None]
+        np.maximum(distances, 0.0, out=distances)
+        np.sqrt(distances, out=distances)
+        distances += ball_radii
+        np.maximum.reduceat(distances, elements.start, axis=1, out=radii[k : k + CHUNK])
 
-    return found
+    return radii
 
 
-def _cover(needs: Needs, limit: int, wanted: float | None) -> NDArray[np.int64]:
-    """Numbers of the centres of a cover."""
-    low = float(needs.min(axis=0).max())
-    high = float(needs.max(axis=1).min())
+def _cover_by_bisection(protrusions: CentreElementTable, limit: int, target: float | None) -> NDArray[np.int64]:
+    """Numbers of the centres of a cover, whose largest protrusion is found by bisection; at most ``limit`` of them."""
+    low = float(protrusions.min(axis=0).max())
+    high = float(protrusions.max(axis=1).min())
 
-    if wanted is not None:
-        found = _greedy(needs <= max(low, wanted))
-        if len(found) <= limit:
-            return found
+    if target is not None:
+        rows = _greedy_set_cover(protrusions <= max(low, target))
+        if len(rows) <= limit:
+            return rows
 
-    best = np.array([int(needs.max(axis=1).argmin())])
+    best = np.array([int(protrusions.max(axis=1).argmin())])
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        found = _greedy(needs <= middle)
-        if len(found) <= limit:
-            best = found
-            high = min(middle, float(needs[found].min(axis=0).max()))
+        rows = _greedy_set_cover(protrusions <= middle)
+        if len(rows) <= limit:
+            best = rows
+            high = min(middle, float(protrusions[rows].min(axis=0).max()))
         else:
             low = middle
 
     return best
 
 
-def _greedy(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Rows that together hold every column, the one that adds most first."""
-    left = np.ones(holds.shape[1], dtype=bool)
+def _greedy_set_cover(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Greedy set cover: rows that together hold every column, the one that adds most first."""
+    not_held = np.ones(holds.shape[1], dtype=bool)
     chosen = []
     columns = np.array(holds.T, dtype=np.float32, order="C")
     gains = columns.sum(axis=0)  # whole numbers, exact
 
-    while left.any():
+    while not_held.any():
         row = int(gains.argmax())
         chosen.append(row)
-        added = np.flatnonzero(left & holds[row])
-        left[added] = False
-        gains -= columns[added].sum(axis=0)
+        newly_held = np.flatnonzero(not_held & holds[row])
+        not_held[newly_held] = False
+        gains -= columns[newly_held].sum(axis=0)
 
     return np.array(chosen)
 
 
-def _refined(
-    parts: Elements,
+def _improved(
+    elements: Elements,
     surface: cKDTree,
-    spare: Places,
-    spare_needs: Needs,
-    spared: NDArray[np.float32],
+    candidate_places: Places,
+    candidate_protrusions: CentreElementTable,
+    unavoidable: NDArray[np.float32],
     places: Places,
     limit: int,
-    wanted: float | None,
+    target: float | None,
 ) -> Places:
-    """Better places for the balls of a cover: the best set of all rounds."""
-    element = np.repeat(np.arange(len(parts.start)), np.diff(np.r_[parts.start, len(parts.points)]))
+    """Better places for the balls of a cover, found by turns of matching and moving: the best set of all rounds."""
+    element_of_point = np.repeat(np.arange(len(elements.start)), np.diff(np.r_[elements.start, len(elements.points)]))
     best = places
-    least = np.inf
+    best_protrusion = np.inf
 
-    for turn in range(MATCHINGS + 1):
-        needs = reaches(parts, places.centres) - places.depth[:, None].astype(np.float32) - spared
-        worst = float(needs.min(axis=0).max())
-        if worst < least:
+    for round_number in range(MATCHINGS + 1):
+        protrusions = reaches(elements, places.centres) - places.depth[:, None].astype(np.float32) - unavoidable
+        worst = float(protrusions.min(axis=0).max())
+        if worst < best_protrusion:
             best = places
-            least = worst
+            best_protrusion = worst
 
-        if turn == MATCHINGS or (wanted is not None and least <= wanted):
+        if round_number == MATCHINGS or (target is not None and best_protrusion <= target):
             break
-        if turn < MATCHINGS - 2:
-            places, needs = _moved_elsewhere(places, needs, spare, spare_needs, limit)
+        if round_number < MATCHINGS - 2:
+            places, protrusions = _relocated(places, protrusions, candidate_places, candidate_protrusions, limit)
 
-        owner = needs.argmin(axis=0)
-        kept, owner = np.unique(owner, return_inverse=True)
-        places = _descended(parts, surface, places[kept], owner.ravel()[element])
+        owner = protrusions.argmin(axis=0)
+        used, owner = np.unique(owner, return_inverse=True)
+        places = _recentred(elements, surface, places[used], owner.ravel()[element_of_point])
 
     return best
 
 
-def _moved_elsewhere(
-    places: Places, needs: Needs, spare: Places, spare_needs: Needs, limit: int
-) -> tuple[Places, Needs]:
+def _relocated(
+    places: Places,
+    protrusions: CentreElementTable,
+    candidate_places: Places,
+    candidate_protrusions: CentreElementTable,
+    limit: int,
+) -> tuple[Places, CentreElementTable]:
     """Balls that others can replace moved (or, below the limit, new ones put) to where the protrusion is worst."""
     centres = places.centres.copy()
     depth = places.depth.copy()
-    needs = needs.copy()
+    protrusions = protrusions.copy()
 
-    for _ in range(MOVES):
-        owner = needs.argmin(axis=0)
-        least = needs.min(axis=0)
-        if not least.max() > 0.0:
+    for _ in range(MAX_RELOCATIONS):
+        owner = protrusions.argmin(axis=0)
+        element_protrusion = protrusions.min(axis=0)
+        if not element_protrusion.max() > 0.0:
             break
 
-        worst = int(owner[least.argmax()])
-        bad = np.flatnonzero((owner == worst) & (least > 0.7 * least.max()))
-        row = int(spare_needs[:, bad].max(axis=1).argmin())
-        if spare_needs[row, bad].max() >= WORTH * least.max():
+        worst_ball = int(owner[element_protrusion.argmax()])
+        worst_elements = np.flatnonzero((owner == worst_ball) & (element_protrusion > 0.7 * element_protrusion.max()))
+        row = int(candidate_protrusions[:, worst_elements].max(axis=1).argmin())
+        if candidate_protrusions[row, worst_elements].max() >= RELOCATION_GAIN * element_protrusion.max():
             break
 
         if len(centres) < limit:
-            centres = np.concatenate([centres, spare.centres[[row]]])
-            depth = np.r_[depth, spare.depth[row]]
-            needs = np.concatenate([needs, spare_needs[[row]]])
+            centres = np.concatenate([centres, candidate_places.centres[[row]]])
+            depth = np.r_[depth, candidate_places.depth[row]]
+            protrusions = np.concatenate([protrusions, candidate_protrusions[[row]]])
             continue
 
-        without = np.zeros(len(centres))
-        np.maximum.at(without, owner, np.partition(needs, 1, axis=0)[1])
-        without[worst] = np.inf
-        poorest = int(without.argmin())
-        if without[poorest] >= WORTH * least.max():
+        protrusion_without = np.zeros(len(centres))
+        np.maximum.at(protrusion_without, owner, np.partition(protrusions, 1, axis=0)[1])
+        protrusion_without[worst_ball] = np.inf
+        most_replaceable = int(protrusion_without.argmin())
+        if protrusion_without[most_replaceable] >= RELOCATION_GAIN * element_protrusion.max():
             break
 
-        centres[poorest] = spare.centres[row]
-        depth[poorest] = spare.depth[row]
-        needs[poorest] = spare_needs[row]
+        centres[most_replaceable] = candidate_places.centres[row]
+        depth[most_replaceable] = candidate_places.depth[row]
+        protrusions[most_replaceable] = candidate_protrusions[row]
 
-    return Places(centres, depth), needs
+    return Places(centres, depth), protrusions
 
 
-def _descended(parts: Elements, surface: cKDTree, places: Places, owner: NDArray[np.int64]) -> Places:
+def _recentred(elements: Elements, surface: cKDTree, places: Places, owner: NDArray[np.int64]) -> Places:
     """Each ball moved to where it sticks out least while it holds its points.
 
     It goes away from the surface that is nearest and towards the point that is farthest, in ever shorter steps (after
     [43]). A step is shorter than the depth, so a centre stays inside.
     """
     order = np.argsort(owner, kind="stable")
-    points = parts.points[order]
-    radii = parts.radii[order]
+    points = elements.points[order]
+    radii = elements.radii[order]
     owner = owner[order]
     first = np.flatnonzero(np.r_[True, np.diff(owner) > 0])
 
     centres = places.centres
     best = places
-    least = np.full(len(places.centres), np.inf)
-    side = np.where(places.depth > 0.0, 1.0, -1.0)
+    best_protrusion = np.full(len(places.centres), np.inf)
+    sign = np.where(places.depth > 0.0, 1.0, -1.0)
     stride = 0.0
 
-    for step in range(STEPS + 1):
+    for step in range(RECENTRING_STEPS + 1):
         distance, nearest = surface.query(centres)
-        away = points - centres[owner]
-        reach = np.sqrt(np.einsum("ij,ij->i", away, away)) + radii
+        offsets = points - centres[owner]
+        reach = np.sqrt(np.einsum("ij,ij->i", offsets, offsets)) + radii
         radius = np.maximum.reduceat(reach, first)
 
-        better = radius - side * distance < least
-        least = np.where(better, radius - side * distance, least)
-        best = Places(np.where(better[:, None], centres, best.centres), np.where(better, side * distance, best.depth))
+        is_better = radius - sign * distance < best_protrusion
+        best_protrusion = np.where(is_better, radius - sign * distance, best_protrusion)
+        best = Places(
+            np.where(is_better[:, None], centres, best.centres), np.where(is_better, sign * distance, best.depth)
+        )
 
-        last = np.flatnonzero(reach >= radius[owner])
+        outermost = np.flatnonzero(reach >= radius[owner])
         farthest = np.empty(len(first), dtype=np.int64)
-        farthest[owner[last]] = last
+        farthest[owner[outermost]] = outermost
         if step == 0:
-            stride = 0.5 * np.maximum(least, 0.0)
+            stride = 0.5 * np.maximum(best_protrusion, 0.0)
 
-        out = points[farthest] - centres
+        outward = points[farthest] - centres
         inward = centres - surface.data[nearest]
-        way = _unit(out) + _unit(inward)
-        length = np.minimum(stride / (step + 2.0), 0.25 * np.maximum(side * distance, 0.0))
-        centres = centres + length[:, None] * way
+        direction = _unit(outward) + _unit(inward)
+        length = np.minimum(stride / (step + 2.0), 0.25 * np.maximum(sign * distance, 0.0))
+        centres = centres + length[:, None] * direction
 
     return best
 
@@ -277,14 +292,14 @@ def _unit(vectors: Matrix) -> Matrix:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])
 
 
-def _shrunk(parts: Elements, places: Places) -> Matrix:
+def _fitted_to_elements(elements: Elements, places: Places) -> Matrix:
     """Balls no larger than what they have to hold; each element goes to the ball that sticks out least for it."""
-    needs = reaches(parts, places.centres) - places.depth[:, None]
-    element = np.repeat(np.arange(len(parts.start)), np.diff(np.r_[parts.start, len(parts.points)]))
-    owner = needs.argmin(axis=0)[element]
-    away = np.linalg.norm(parts.points - places.centres[owner], axis=1) + parts.radii
+    protrusions = reaches(elements, places.centres) - places.depth[:, None]
+    element_of_point = np.repeat(np.arange(len(elements.start)), np.diff(np.r_[elements.start, len(elements.points)]))
+    owner = protrusions.argmin(axis=0)[element_of_point]
+    needed_radii = np.linalg.norm(elements.points - places.centres[owner], axis=1) + elements.radii
 
     radius = np.zeros(len(places.centres))
-    np.maximum.at(radius, owner, away)
+    np.maximum.at(radius, owner, needed_radii)
     used = np.bincount(owner, minlength=len(places.centres)) > 0
     return np.column_stack([places.centres, radius])[used]

@@ -127,7 +127,7 @@ class MeshSolid:
         self.enclosed = enclosed
         self.rim = rim_caps(vertices, faces)
         self._closed = np.concatenate([self.triangles, self.rim])
-        self._centres, self._reach = _round_about(self._closed)
+        self._centres, self._reach = _bounding_balls(self._closed)
         self._corners = self._closed.reshape(-1, 3)
         self._indices = np.arange(len(self._corners)).reshape(-1, 3)
 
@@ -142,8 +142,8 @@ class MeshSolid:
 
     def _distance(self, point: Vector) -> float:
         to_centre = np.linalg.norm(self._centres - point, axis=1)
-        could_be = to_centre - self._reach <= (to_centre + self._reach).min()
-        rows = self._closed[could_be]
+        may_be_nearest = to_centre - self._reach <= (to_centre + self._reach).min()
+        rows = self._closed[may_be_nearest]
         return float(distance_to_triangles(np.broadcast_to(point, (len(rows), 3)), rows).min())
 
 
@@ -157,9 +157,9 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
     """
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    turned = (points - middle) @ axes.T
-    centre = middle + 0.5 * (turned.min(axis=0) + turned.max(axis=0)) @ axes
-    extent = np.ptp(turned, axis=0)
+    in_axes = (points - middle) @ axes.T
+    centre = middle + 0.5 * (in_axes.min(axis=0) + in_axes.max(axis=0)) @ axes
+    extent = np.ptp(in_axes, axis=0)
     frame = Frame(centre, axes.T, float(np.linalg.norm(extent)))
 
     if not extent.min() > 1e-13 * frame.scale:
@@ -178,19 +178,21 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
     outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals)
     triangles[outward < 0.0] = triangles[outward < 0.0][:, ::-1]
 
-    beyond = float((local @ normals.T - offsets).max())
-    below = float((offsets[:, None] - np.einsum("ijk,ik->ij", triangles, normals)).max())
-    return ConvexSolid(triangles, normals, offsets, max(beyond, 0.0) + max(below, 0.0) + ROUNDING), frame
+    points_beyond_planes = float((local @ normals.T - offsets).max())
+    planes_beyond_triangles = float((offsets[:, None] - np.einsum("ijk,ik->ij", triangles, normals)).max())
+    return ConvexSolid(
+        triangles, normals, offsets, max(points_beyond_planes, 0.0) + max(planes_beyond_triangles, 0.0) + ROUNDING
+    ), frame
 
 
 def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Frame]:
     """A cylinder about z, inside a regular prism."""
     frame = Frame(np.zeros(3), np.eye(3), 2.0 * float(np.hypot(radius, half_length)))
-    small = radius / frame.scale
-    high = half_length / frame.scale
-    turn = (np.arange(CYLINDER_SIDES) + 0.5) * (TAU / CYLINDER_SIDES)
-    ring = np.column_stack([np.cos(turn), np.sin(turn)]) * (small / np.cos(np.pi / CYLINDER_SIDES))
-    return CylinderSolid(small, high, _prism(ring, high), ROUNDING), frame
+    unit_radius = radius / frame.scale
+    unit_half_length = half_length / frame.scale
+    angles = (np.arange(CYLINDER_SIDES) + 0.5) * (TAU / CYLINDER_SIDES)
+    ring = np.column_stack([np.cos(angles), np.sin(angles)]) * (unit_radius / np.cos(np.pi / CYLINDER_SIDES))
+    return CylinderSolid(unit_radius, unit_half_length, _prism(ring, unit_half_length), ROUNDING), frame
 
 
 def _prism(ring: Matrix, high: float) -> Triangles:
@@ -214,8 +216,8 @@ def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matr
         triangles: Vertex numbers, shape (m, 3).
         boxes: Lowest and highest corners, shape (k, 3) each.
     """
-    used, number = np.unique(triangles, return_inverse=True)
-    points, same = np.unique(vertices[used], axis=0, return_inverse=True)
+    used_vertices, point_of_corner = np.unique(triangles, return_inverse=True)
+    points, welded = np.unique(vertices[used_vertices], axis=0, return_inverse=True)
 
     low = points.min(axis=0)
     high = points.max(axis=0)
@@ -223,10 +225,10 @@ def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matr
 
     enclosed = np.where(CORNERS[None] == 1, boxes[1][:, None], boxes[0][:, None])
     local = frame.to_local(enclosed.reshape(-1, 3)).reshape(-1, 8, 3)
-    return MeshSolid(frame.to_local(points), same.ravel()[number.reshape(-1, 3)], local), frame
+    return MeshSolid(frame.to_local(points), welded.ravel()[point_of_corner.reshape(-1, 3)], local), frame
 
 
-def _round_about(triangles: Triangles) -> tuple[Matrix, Vector]:
+def _bounding_balls(triangles: Triangles) -> tuple[Matrix, Vector]:
     """A ball around each triangle: centres, shape (m, 3), and radii, shape (m,)."""
     centres = 0.5 * (triangles.min(axis=1) + triangles.max(axis=1))
     return centres, np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
@@ -244,16 +246,16 @@ def rim_caps(vertices: Matrix, faces: NDArray[np.int64]) -> Triangles:
     """
     start = faces.T.ravel()
     end = np.roll(faces, -1, axis=1).T.ravel()
-    key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
-    edges, which = np.unique(key, return_inverse=True)
-    turns = np.bincount(which.ravel(), weights=np.sign(end - start), minlength=len(edges)).astype(np.int64)
+    edge_keys = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
+    edges, edge_of_side = np.unique(edge_keys, return_inverse=True)
+    surplus = np.bincount(edge_of_side.ravel(), weights=np.sign(end - start), minlength=len(edges)).astype(np.int64)
 
-    open_edges = np.flatnonzero(turns)
+    open_edges = np.flatnonzero(surplus)
     low = vertices[edges[open_edges] // len(vertices)]
     high = vertices[edges[open_edges] % len(vertices)]
-    flip = (turns[open_edges] < 0)[:, None]
-    ends = np.stack([np.where(flip, low, high), np.where(flip, high, low)], axis=1)
-    ends = np.repeat(ends, np.abs(turns[open_edges]), axis=0)
+    is_reversed = (surplus[open_edges] < 0)[:, None]
+    ends = np.stack([np.where(is_reversed, low, high), np.where(is_reversed, high, low)], axis=1)
+    ends = np.repeat(ends, np.abs(surplus[open_edges]), axis=0)
 
     if not len(ends):
         return np.empty((0, 3, 3))
@@ -268,13 +270,13 @@ def _loop_centres(ends: NDArray[np.float64]) -> Matrix:
     start, end = number.reshape(-1, 2).T
     size = int(number.max()) + 1
     links = coo_matrix((np.ones(len(start)), (start, end)), shape=(size, size))
-    _, loop = connected_components(links, directed=False)
+    _, loop_of_vertex = connected_components(links, directed=False)
 
-    edge_loop = loop[start]
-    weight = np.bincount(edge_loop)
+    loop_of_edge = loop_of_vertex[start]
+    edge_counts = np.bincount(loop_of_edge)
     middles = ends.mean(axis=1)
-    sums = np.column_stack([np.bincount(edge_loop, weights=middles[:, k]) for k in range(3)])
-    return np.asarray((sums / np.maximum(weight, 1)[:, None])[edge_loop])
+    sums = np.column_stack([np.bincount(loop_of_edge, weights=middles[:, k]) for k in range(3)])
+    return np.asarray((sums / np.maximum(edge_counts, 1)[:, None])[loop_of_edge])
 
 
 def distance_to_triangles(points: Matrix, triangles: Triangles) -> Vector:
@@ -284,17 +286,17 @@ def distance_to_triangles(points: Matrix, triangles: Triangles) -> Vector:
     c = triangles[:, 2]
     normal = np.cross(b - a, c - a)
     area = np.einsum("ij,ij->i", normal, normal)
-    above = np.ones(len(points), dtype=bool)
+    projects_inside = np.ones(len(points), dtype=bool)
     nearest = np.full(len(points), np.inf)
 
     for p, q in ((a, b), (b, c), (c, a)):
         side = q - p
-        away = points - p
+        offset = points - p
         length = np.einsum("ij,ij->i", side, side)
-        along = np.clip(np.einsum("ij,ij->i", away, side) / np.maximum(length, 1e-300), 0.0, 1.0)
-        gap = away - along[:, None] * side
-        nearest = np.minimum(nearest, np.einsum("ij,ij->i", gap, gap))
-        above &= np.einsum("ij,ij->i", np.cross(side, away), normal) >= 0.0
+        fraction = np.clip(np.einsum("ij,ij->i", offset, side) / np.maximum(length, 1e-300), 0.0, 1.0)
+        to_nearest = offset - fraction[:, None] * side
+        nearest = np.minimum(nearest, np.einsum("ij,ij->i", to_nearest, to_nearest))
+        projects_inside &= np.einsum("ij,ij->i", np.cross(side, offset), normal) >= 0.0
 
     plane = np.einsum("ij,ij->i", points - a, normal) ** 2 / np.maximum(area, 1e-300)
-    return np.asarray(np.sqrt(np.where(above & (area > 0.0), np.minimum(nearest, plane), nearest)))
+    return np.asarray(np.sqrt(np.where(projects_inside & (area > 0.0), np.minimum(nearest, plane), nearest)))

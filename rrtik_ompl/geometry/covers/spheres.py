@@ -57,29 +57,29 @@ def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = 
             cover reaches farther (see ``protrusion_bound``). None: what a number of balls that suits the size of
             the solid allows.
     """
-    swept = _swept_radius(geometry)
+    swept_radius = _swept_radius(geometry)
     core = core_of(geometry)
 
     if core is not None and core.rounded:
-        return _grown(_round_cover(core, protrusion), swept)
+        return _grown(_round_cover(core, protrusion), swept_radius)
     if is_mesh(geometry) and geometry.num_tris == 0:
         return np.empty((0, 4))
 
-    made = _solid(geometry)
-    if made is None:
-        return _bounding_ball(geometry, swept)
+    known_solid = _solid(geometry)
+    if known_solid is None:
+        return _bounding_ball(geometry, swept_radius)
 
-    solid, frame = made
-    wanted = None if protrusion is None else max(protrusion, 0.0) / frame.scale
-    usual = balls_for(frame.scale) * (BALLS_OF_OPEN if len(solid.rim) else 1)
-    limit = usual if protrusion is None else MAX_BALLS_ON_REQUEST
+    solid, frame = known_solid
+    target = None if protrusion is None else max(protrusion, 0.0) / frame.scale
+    usual_count = balls_for(frame.scale) * (BALLS_OF_OPEN if len(solid.rim) else 1)
+    limit = usual_count if protrusion is None else MAX_BALLS_ON_REQUEST
 
-    found = _searched_cover(solid, limit, wanted)
+    searched = _searched_cover(solid, limit, target)
     regular = None if core is None else regular_cover(core, limit, protrusion)
-    cover = frame.spheres_out(found, solid.slack + ROUNDING)
+    cover = frame.spheres_out(searched, solid.slack + ROUNDING)
     if regular is not None and _better(geometry, regular, cover, protrusion):
         cover = regular
-    return _grown(cover, swept)
+    return _grown(cover, swept_radius)
 
 
 def inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None) -> Matrix:
@@ -93,16 +93,16 @@ def inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None)
     if core is not None and core.rounded:
         return _round_inner(core, count)
 
-    made = _solid(geometry)
-    if made is None or not _closed(geometry, made[0]):
+    known_solid = _solid(geometry)
+    if known_solid is None or not _closed(geometry, known_solid[0]):
         return np.empty((0, 4))
 
-    solid, frame = made
-    wanted = round(INNER_SHARE * balls_for(frame.scale)) if count is None else count
-    found = frame.spheres_out(
-        inscribed(solid, cKDTree(surface_points(solid.triangles, SURFACE_POINTS)), wanted), -ROUNDING
+    solid, frame = known_solid
+    wanted_count = round(INNER_SHARE * balls_for(frame.scale)) if count is None else count
+    spheres = frame.spheres_out(
+        inscribed(solid, cKDTree(surface_points(solid.triangles, SURFACE_POINTS)), wanted_count), -ROUNDING
     )
-    return np.asarray(found[found[:, 3] > 0.0], dtype=np.float64)
+    return np.asarray(spheres[spheres[:, 3] > 0.0], dtype=np.float64)
 
 
 def protrusion_bound(geometry: coal.CollisionGeometry, spheres: Matrix) -> float:
@@ -119,11 +119,11 @@ def protrusion_bound(geometry: coal.CollisionGeometry, spheres: Matrix) -> float
         from_axis = np.linalg.norm(np.column_stack([spheres[:, :2], beyond]), axis=1)
         return max(float((spheres[:, 3] + from_axis).max()) - core.radius, 0.0)
 
-    made = _solid(geometry)
-    if made is None:
+    known_solid = _solid(geometry)
+    if known_solid is None:
         return np.inf
 
-    solid, frame = made
+    solid, frame = known_solid
     depth = frame.scale * solid.depth(frame.to_local(spheres[:, :3]))
     return max(float((spheres[:, 3] - depth).max()), 0.0)
 
@@ -143,11 +143,11 @@ def _grown(spheres: Matrix, by: float) -> Matrix:
 
 def _round_cover(core: Core, protrusion: float | None) -> Matrix:
     radius = core.radius
-    half = core.half_length
+    half_length = core.half_length
     if len(core.corners) == 1:
         return np.array([[0.0, 0.0, 0.0, radius]])
-    limit = balls_for(2.0 * (half + radius)) if protrusion is None else MAX_BALLS_ON_REQUEST
-    return rod_cover(radius, half, limit, protrusion)
+    limit = balls_for(2.0 * (half_length + radius)) if protrusion is None else MAX_BALLS_ON_REQUEST
+    return rod_cover(radius, half_length, limit, protrusion)
 
 
 def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
@@ -171,29 +171,35 @@ def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
 
 def _mesh(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
     vertices, triangles = mesh_arrays(geometry)
-    used = vertices[np.unique(triangles)]
-    if not len(used) or not np.isfinite(used).all() or not np.ptp(used, axis=0).max() > SMALLEST:
+    used_vertices = vertices[np.unique(triangles)]
+    if (
+        not len(used_vertices)
+        or not np.isfinite(used_vertices).all()
+        or not np.ptp(used_vertices, axis=0).max() > SMALLEST
+    ):
         return None
 
     if len(triangles) <= MAX_TRIANGLES:
-        nothing = (np.empty((0, 3)), np.empty((0, 3)))
-        made = mesh_solid(vertices, triangles, nothing if is_closed(geometry) else enclosure(geometry).boxes())
-        if len(made[0].rim) <= MAX_OPEN_EDGES:
-            return made
+        no_boxes = (np.empty((0, 3)), np.empty((0, 3)))
+        solid_and_frame = mesh_solid(
+            vertices, triangles, no_boxes if is_closed(geometry) else enclosure(geometry).boxes()
+        )
+        if len(solid_and_frame[0].rim) <= MAX_OPEN_EDGES:
+            return solid_and_frame
 
-    low = used.min(axis=0)
-    high = used.max(axis=0)
-    thick = np.maximum(0.5 * (high - low), 1e-6 * float((high - low).max()))  # a box may be larger, never flat
-    return convex_solid(box_corners(thick) + 0.5 * (low + high))
+    low = used_vertices.min(axis=0)
+    high = used_vertices.max(axis=0)
+    half_sides = np.maximum(0.5 * (high - low), 1e-6 * float((high - low).max()))  # a box may be larger, never flat
+    return convex_solid(box_corners(half_sides) + 0.5 * (low + high))
 
 
-def _bounding_ball(geometry: coal.CollisionGeometry, swept: float) -> Matrix:
+def _bounding_ball(geometry: coal.CollisionGeometry, swept_radius: float) -> Matrix:
     geometry.computeLocalAABB()
     centre = np.array(geometry.aabb_center)
     radius = float(geometry.aabb_radius)
     if not (_finite(geometry) and np.isfinite(centre).all() and np.isfinite(radius) and np.abs(centre).max() < 1e300):
         return np.array([[0.0, 0.0, 0.0, np.inf]])
-    return np.array([[*centre, radius * (1.0 + 1e-12) + 1e-15 * float(np.abs(centre).max()) + swept]])
+    return np.array([[*centre, radius * (1.0 + 1e-12) + 1e-15 * float(np.abs(centre).max()) + swept_radius]])
 
 
 def _finite(geometry: coal.CollisionGeometry) -> bool:
@@ -202,30 +208,30 @@ def _finite(geometry: coal.CollisionGeometry) -> bool:
     return vertices is None or bool(np.isfinite(vertices).all())
 
 
-def _searched_cover(solid: Solid, limit: int, wanted: float | None) -> Matrix:
-    """A cover found by search, at most ``limit`` balls unless ``wanted`` takes more; a finer cut if that helps."""
+def _searched_cover(solid: Solid, limit: int, target: float | None) -> Matrix:
+    """A cover found by search, at most ``limit`` balls unless ``target`` takes more; a finer cut if that helps."""
     surface = cKDTree(surface_points(solid.triangles, SURFACE_POINTS))
-    aim = None if wanted is None else 0.9 * wanted  # depths are estimated in the search
+    search_target = None if target is None else 0.9 * target  # depths are estimated in the search
     cuts = [CROSSED_CELLS, 4 * CROSSED_CELLS]
-    if wanted is None:
+    if target is None:
         cuts = [min(CROSSED_CELLS, CELLS_PER_BALL * (limit + 4))]
 
-    lenient = wanted is None and len(solid.rim) > 0
+    lenient = target is None and len(solid.rim) > 0
     for crossed in cuts:
-        spheres = smallest_cover(elements(solid, crossed), surface, limit, aim, lenient=lenient)
-        if wanted is None or len(spheres) >= limit:
+        spheres = smallest_cover(elements(solid, crossed), surface, limit, search_target, lenient=lenient)
+        if target is None or len(spheres) >= limit:
             break
-        if (spheres[:, 3] - solid.depth(spheres[:, :3])).max() <= wanted:
+        if (spheres[:, 3] - solid.depth(spheres[:, :3])).max() <= target:
             break
     return spheres
 
 
 def _better(geometry: coal.CollisionGeometry, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
     """Whether the first cover is better: it sticks out less or, if both stay within what is required, is smaller."""
-    reach = [protrusion_bound(geometry, cover) for cover in (first, second)]
-    if protrusion is not None and max(reach) <= protrusion * (1.0 + 1e-9):
+    protrusions = [protrusion_bound(geometry, cover) for cover in (first, second)]
+    if protrusion is not None and max(protrusions) <= protrusion * (1.0 + 1e-9):
         return len(first) <= len(second)
-    return reach[0] <= reach[1]
+    return protrusions[0] <= protrusions[1]
 
 
 def _closed(geometry: coal.CollisionGeometry, solid: Solid) -> bool:
@@ -242,8 +248,8 @@ def _closed(geometry: coal.CollisionGeometry, solid: Solid) -> bool:
 def _round_inner(core: Core, count: int | None) -> Matrix:
     """Balls inside a ball or a capsule, as many as its cover has."""
     radius = core.radius
-    half = core.half_length
+    half_length = core.half_length
     if len(core.corners) == 1:
         return np.array([[0.0, 0.0, 0.0, radius]])[:count]
-    number = min(balls_on_axis(radius, half, ROD_PROTRUSION * radius), balls_for(2.0 * (half + radius)))
-    return row_on_z(spread(half, number if count is None else min(count, number)), radius)
+    number = min(balls_on_axis(radius, half_length, ROD_PROTRUSION * radius), balls_for(2.0 * (half_length + radius)))
+    return row_on_z(spread(half_length, number if count is None else min(count, number)), radius)

@@ -67,9 +67,9 @@ def test_a_body_may_be_inside_a_mesh_that_is_large_enough():
         for way, (outer, inner) in enumerate(((i, j), (j, i))):
             geometry = world.bodies[outer].geometry
             fits = is_mesh(geometry) and own.halves[inner].max() <= geometry.aabb_radius
-            assert (found.ways[place, way] >= 0) == fits
-            assert not fits or found.pairs[found.ways[place, way]] == (outer, inner)
-    assert (found.ways >= 0).any()
+            assert (found.rows_of_pairs[place, way] >= 0) == fits
+            assert not fits or found.pairs[found.rows_of_pairs[place, way]] == (outer, inner)
+    assert (found.rows_of_pairs >= 0).any()
 
 
 def test_solids_are_placed_as_their_points_are(world):
