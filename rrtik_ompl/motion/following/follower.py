@@ -15,7 +15,7 @@ from rrtik_ompl.motion.following.links import RobotLink
 from rrtik_ompl.motion.following.pace import Pace
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
 
-AGAIN_SECONDS = 0.02  # after which a change of pace is tried again that has kept no limits
+RETRY_SECONDS = 0.02  # after which a change of pace is tried again that has kept no limits
 NEAR = 0.05  # [rad] or [m] by which an arm may be elsewhere than it was told, unless said otherwise
 MOST_PERIODS = 3.0  # of a step of run(), however late it is
 SLACK = 1e-6  # of a limit, by which a trajectory may exceed it
@@ -97,18 +97,18 @@ class Follower:
 
         self._motion = trajectory
         self._link = link
-        self._step = 1.0 / positive(rate, "rate of a follower")
+        self._period = 1.0 / positive(rate, "rate of a follower")
         self._tolerance = positive(tolerance, "tolerance")
         _check_rest(trajectory)
-        self._pace = Pace(trajectory, _kept_limits(trajectory, limits))
+        self._pace = Pace(trajectory, _limits_to_keep(trajectory, limits))
 
         self._lock = Lock()
-        self._wanted = 1.0
+        self._target_pace = 1.0  # unless it is paused or stopping
         self._paused = False
         self._stopping = False
-        self._reason = ""
-        self._again = 0.0
-        self._late = 0.0
+        self._reason = ""  # of a stop; "" while there is none
+        self._retry_time = 0.0  # [s] of the motion's clock, before which no other pace is tried
+        self._lateness = 0.0  # [s]
         self._ended = False
 
         self._check_begin(trajectory.positions[0])
@@ -133,7 +133,7 @@ class Follower:
             reason = reason or "on its way"
         elif reason:
             reason = f"{reason}: too late for a rest before the end"
-        return Followed(arrived, reason, pace.place, pace.now, self._late)
+        return Followed(arrived, reason, pace.place, pace.now, self._lateness)
 
     def pause(self) -> None:
         """Come to rest on the trajectory, until ``resume``."""
@@ -158,7 +158,7 @@ class Follower:
         share = finite_number(pace, "pace")
         if not 0.0 < share <= 1.0:
             raise InputError(f"pace must be greater than 0 and at most 1, got {share:g}")
-        self._wanted = share
+        self._target_pace = share
 
     def step(self, seconds: float) -> None:
         """Advance by a time [s] and command the set point then.
@@ -187,76 +187,78 @@ class Follower:
             clock: Tells the time [s].
             sleep: Waits for a time [s].
         """
-        before = clock()
+        last_tick = clock()
         while not self._ended:
             try:
-                sleep(max(0.0, before + self._step - clock()))
-                told = self._motion(self._pace.place).positions
+                sleep(max(0.0, last_tick + self._period - clock()))
+                commanded = self._motion(self._pace.place).positions
                 now = clock()
-                if fault := self._fault(told):
+                if fault := self._fault(commanded):
                     self.stop(fault)
 
-                passed = max(now - before, 1e-6)
-                before = now
-                due = min(passed, MOST_PERIODS * self._step)
-                self._late += passed - due
-                self.step(due)
+                elapsed = max(now - last_tick, 1e-6)
+                last_tick = now
+                step_seconds = min(elapsed, MOST_PERIODS * self._period)
+                self._lateness += elapsed - step_seconds
+                self.step(step_seconds)
             except KeyboardInterrupt:
                 self.stop("interrupted")
         return self.result
 
     def _advance(self, seconds: float) -> None:
         """Go on at the pace of the moment; decide on another pace if one is wanted."""
-        target = 0.0 if self._paused or self._stopping else self._wanted
+        target = 0.0 if self._paused or self._stopping else self._target_pace
         pace = self._pace
-        if target != pace.end and pace.now >= self._again:
+        if target != pace.end and pace.now >= self._retry_time:
             pace.turn_to(target)
-            self._again = pace.now + AGAIN_SECONDS
+            self._retry_time = pace.now + RETRY_SECONDS
 
         pace.advance(seconds)
         pace.place = min(pace.place, self._motion.duration)
 
-    def _check_begin(self, told: Vector) -> None:
-        here = finite_array(self._link.positions(), (None,), "positions of the arm")
-        if here.shape != told.shape:
-            raise InputError(f"the arm has {here.size} joints, the trajectory moves {told.size}: it is another robot's")
-        if away := self._away(here, told):
-            raise InputError(f"the trajectory begins elsewhere: {away} rad or m away; move the arm there first")
+    def _check_begin(self, first_position: Vector) -> None:
+        positions = finite_array(self._link.positions(), (None,), "positions of the arm")
+        if positions.shape != first_position.shape:
+            has = positions.size
+            moves = first_position.size
+            raise InputError(f"the arm has {has} joints, the trajectory moves {moves}: it is another robot's")
+        if deviation := self._deviation_in_words(positions, first_position):
+            raise InputError(f"the trajectory begins elsewhere: {deviation} rad or m away; move the arm there first")
 
-    def _fault(self, told: Vector) -> str:
-        """Why an arm that was told to be at ``told`` has to stop; "" if it need not.
+    def _fault(self, commanded: Vector) -> str:
+        """Why an arm that was told to be at ``commanded``, shape (dof,), has to stop; "" if it need not.
 
         Whatever a link raises here, the arm is brought to rest by the set points that it may still take.
         """
         try:
-            here = finite_array(self._link.positions(), told.shape, "positions of the arm")
+            positions = finite_array(self._link.positions(), commanded.shape, "positions of the arm")
         except Exception as error:
             return f"where the arm is cannot be read: {' '.join(str(error).split()) or type(error).__name__}"
-        away = self._away(here, told)
-        return away and f"{away} away from where it was told to be"
+        deviation = self._deviation_in_words(positions, commanded)
+        return deviation and f"{deviation} away from where it was told to be"
 
-    def _away(self, here: Vector, told: Vector) -> str:
+    def _deviation_in_words(self, positions: Vector, commanded: Vector) -> str:
         """Which joint is farthest from where it was told to be, and how far; "" if all are near enough."""
-        apart = np.abs(here - told)
-        if (apart <= self._tolerance).all():
+        deviation = np.abs(positions - commanded)
+        if (deviation <= self._tolerance).all():
             return ""
-        name = self._motion.joint_names[int(np.nan_to_num(apart, nan=np.inf).argmax())]
-        return f"joint '{name}' is {apart.max():.3g}"
+        name = self._motion.joint_names[int(np.nan_to_num(deviation, nan=np.inf).argmax())]
+        return f"joint '{name}' is {deviation.max():.3g}"
 
 
 def _check_rest(motion: Trajectory) -> None:
     """Refuse a motion that begins or ends at speed: an arm at rest cannot follow it, and no change of pace ends it."""
-    ends = np.abs(motion.velocities[[0, -1]])
-    if (ends > AT_REST * motion.peaks().velocity).any():
-        end, joint = np.unravel_index(int(ends.argmax()), ends.shape)
-        place = ("start", "end")[int(end)]
+    end_speeds = np.abs(motion.velocities[[0, -1]])
+    if (end_speeds > AT_REST * motion.peaks().velocity).any():
+        end, joint = np.unravel_index(int(end_speeds.argmax()), end_speeds.shape)
+        end_name = ("start", "end")[int(end)]
         raise InputError(
-            f"trajectory to follow: at its {place} joint '{motion.joint_names[int(joint)]}' moves at "
-            f"{ends[end, joint]:.3g} rad/s or m/s; it must begin and end at rest, as time_parameterize() has it"
+            f"trajectory to follow: at its {end_name} joint '{motion.joint_names[int(joint)]}' moves at "
+            f"{end_speeds[end, joint]:.3g} rad/s or m/s; it must begin and end at rest, as time_parameterize() has it"
         )
 
 
-def _kept_limits(motion: Trajectory, limits: RateLimits | None) -> RateLimits:
+def _limits_to_keep(motion: Trajectory, limits: RateLimits | None) -> RateLimits:
     """What changes of pace keep: the limits, or the peaks of the motion where there are none.
 
     Raises:
@@ -270,14 +272,14 @@ def _kept_limits(motion: Trajectory, limits: RateLimits | None) -> RateLimits:
     for name, unit in (("velocity", ""), ("acceleration", "^2"), ("jerk", "^3")):
         peak = getattr(peaks, name)
         bound = getattr(bounds, name)
-        over = peak > bound * (1.0 + SLACK)
-        if over.any():
-            joint = int(np.argmax(np.where(over, peak / bound, 0.0)))
+        exceeds = peak > bound * (1.0 + SLACK)
+        if exceeds.any():
+            joint = int(np.argmax(np.where(exceeds, peak / bound, 0.0)))
             raise InputError(
                 f"limits of a follower: joint '{motion.joint_names[joint]}' has a {name} of {peak[joint]:.4g} in the "
                 f"trajectory, its limit is {bound[joint]:.4g} rad/s{unit} or m/s{unit}; time the path anew with these "
                 "limits, or slow the trajectory down by slowed()"
             )
 
-    rows = zip((bounds.velocity, bounds.acceleration, bounds.jerk), peaks, strict=True)
-    return RateLimits(*(np.maximum(bound, peak) for bound, peak in rows))
+    pairs = zip((bounds.velocity, bounds.acceleration, bounds.jerk), peaks, strict=True)
+    return RateLimits(*(np.maximum(bound, peak) for bound, peak in pairs))

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
 
-LOOKS = 80  # along a change of pace
-FIRST_LOOKS = 12  # along each of those that are tried; most that keep no limits are found by them
+SAMPLES = 80  # along a change of pace
+FIRST_SAMPLES = 12  # along each of those that are tried; most that keep no limits are found by them
 SHORTEST = 0.03  # [s] of a change of pace
 LENGTHS_PER_DECADE = 12  # of those that are tried
 DELAYS = np.concatenate([[0.0], np.geomspace(0.03, 1.0, 12)])  # [s] until it begins
-BESIDE = 1e-5  # [s] from a knot
+KNOT_OFFSET = 1e-5  # [s] from a knot
 SLACK = 1.0 + 1e-9  # times a limit
-LOWER = (1.0, 0.7, 0.4)  # shares of a higher pace that are tried in turn: less of it leaves room for the change
+SHARES_OF_RISE = (1.0, 0.7, 0.4)  # of a higher pace, tried in turn: less of it leaves room for the change
 
 
 class Change(NamedTuple):
@@ -45,11 +45,13 @@ class Change(NamedTuple):
         """After times since the beginning, shape (..., k): how far it came, its pace and two derivatives of that."""
         c = self.coefficients
         rows = (polyint(c), c, polyder(c), polyder(c, 2))
-        gained, pace, rise, bend = (np.asarray(polyval(clock, row, tensor=False), dtype=np.float64) for row in rows)
-        return gained, pace, rise, bend
+        advance, pace, rise, curvature = (
+            np.asarray(polyval(clock, row, tensor=False), dtype=np.float64) for row in rows
+        )
+        return advance, pace, rise, curvature
 
-    def some(self, numbers: int | NDArray[np.int64]) -> Change:
-        """Some of several, or one."""
+    def selected(self, numbers: int | NDArray[np.int64]) -> Change:
+        """Those of several with these numbers, or the one with this number."""
         return Change(self.moment[numbers], self.length[numbers], self.coefficients[:, numbers], self.end)
 
 
@@ -59,9 +61,9 @@ def changes_to(end: float, starts: Matrix, moments: Vector, lengths: Vector) -> 
     v = starts[1] * lengths
     a = starts[2] * lengths**2
     # what the three highest powers have to bring about at the end: of the pace and its two derivatives
-    rest = np.stack([end - p - v - 0.5 * a, -v - a, -a])
-    ends = np.array([[1.0, 1.0, 1.0], [3.0, 4.0, 5.0], [6.0, 12.0, 20.0]])
-    coefficients = np.concatenate([np.stack([p, v, 0.5 * a]), np.linalg.solve(ends, rest)])
+    missing = np.stack([end - p - v - 0.5 * a, -v - a, -a])
+    end_conditions = np.array([[1.0, 1.0, 1.0], [3.0, 4.0, 5.0], [6.0, 12.0, 20.0]])
+    coefficients = np.concatenate([np.stack([p, v, 0.5 * a]), np.linalg.solve(end_conditions, missing)])
     return Change(moments, lengths, coefficients / lengths ** np.arange(6)[:, None], end)
 
 
@@ -83,123 +85,130 @@ class Pace:
         self._limits = limits
         self._jerks = motion.jerks
         self._changes: list[Change] = []  # at most two, one after the other
-        self._steady = 1.0  # before the first of them
+        self._pace_before = 1.0  # steady, before the first of them
 
         # a change to rest takes as much of the motion's time as half its length: no longer one ends before the motion
         longest = max(2.0 * motion.duration, 2.0 * SHORTEST)
         count = 2 + int(LENGTHS_PER_DECADE * np.log10(longest / SHORTEST))
-        waits, lengths = np.meshgrid(DELAYS, np.geomspace(SHORTEST, longest, count), indexing="ij")
-        order = np.argsort((waits + lengths).ravel(), kind="stable")
-        self._waits = np.unravel_index(order, waits.shape)[0]
+        delays, lengths = np.meshgrid(DELAYS, np.geomspace(SHORTEST, longest, count), indexing="ij")
+        order = np.argsort((delays + lengths).ravel(), kind="stable")
+        self._delay_numbers = np.unravel_index(order, delays.shape)[0]
         self._lengths = lengths.ravel()[order]
 
     @property
     def steady(self) -> float | None:
         """The pace, if it does not change."""
-        return None if self._changes else self._steady
+        return None if self._changes else self._pace_before
 
     def advance(self, seconds: float) -> None:
         """Let time pass [s]: go on along the motion, and past changes of pace that end meanwhile."""
-        self.place = self._after(seconds)[0]
+        self.place = self._state_after(seconds)[0]
         self.now += seconds
-        while self._changes and self._ends(0) <= self.now:
-            self._steady = self._changes.pop(0).end
+        while self._changes and self._end_time(0) <= self.now:
+            self._pace_before = self._changes.pop(0).end
 
     def turn_to(self, end: float) -> None:
         """Decide on a change to another pace, now or soon, or to one nearer to it; on none if none keeps the limits."""
-        starts = np.array([self._after(delay) for delay in DELAYS]).T[:, self._waits]
+        starts = np.array([self._state_after(delay) for delay in DELAYS]).T[:, self._delay_numbers]
 
-        for share in LOWER if end > self.end else LOWER[:1]:
+        for share in SHARES_OF_RISE if end > self.end else SHARES_OF_RISE[:1]:
             if share * end <= self.end < end:
                 return
-            tried = changes_to(share * end, starts[1:], self.now + DELAYS[self._waits], self._lengths)
-            for k in np.flatnonzero(self._promising(tried, starts[0])):
-                change = tried.some(int(k))
+            changes = changes_to(share * end, starts[1:], self.now + DELAYS[self._delay_numbers], self._lengths)
+            for k in np.flatnonzero(self._passes_first_look(changes, starts[0])):
+                change = changes.selected(int(k))
                 if self._keeps_limits(change, starts[0, k]):
                     self._changes = [c for c in self._changes if c.moment < change.moment] + [change]
                     self.end = change.end
                     return
 
-    def _promising(self, tried: Change, places: Vector) -> Mask:
+    def _passes_first_look(self, changes: Change, starts: Vector) -> Mask:
         """Which of k changes keep the limits at a first look and never go back, from places, shape (k,)."""
-        clock = np.linspace(0.0, 1.0, FIRST_LOOKS)[:, None] * tried.length
-        gained, pace, *_ = tried.at(clock)
-        found: Mask = np.all((pace >= -1e-9) & (pace <= SLACK), axis=0)
+        clock = np.linspace(0.0, 1.0, FIRST_SAMPLES)[:, None] * changes.length
+        advance, pace, *_ = changes.at(clock)
+        keeps: Mask = np.all((pace >= -1e-9) & (pace <= SLACK), axis=0)
 
-        if tried.end == 0.0:  # the motion rests at its own end too
-            ahead = self._motion.duration - self.place
-            found &= places + gained[-1] < self._motion.duration
-            found &= (tried.moment + tried.length - self.now) * self._after(0.0)[1] < ahead
+        if changes.end == 0.0:  # the motion rests at its own end too
+            remaining = self._motion.duration - self.place
+            keeps &= starts + advance[-1] < self._motion.duration
+            keeps &= (changes.moment + changes.length - self.now) * self._state_after(0.0)[1] < remaining
 
-        numbers = np.flatnonzero(found)
-        found[numbers] = self._kept_at(clock[:, numbers], tried.some(numbers), places[numbers]).all(axis=0)
-        return found
+        numbers = np.flatnonzero(keeps)
+        within = self._within_limits_at(clock[:, numbers], changes.selected(numbers), starts[numbers])
+        keeps[numbers] = within.all(axis=0)
+        return keeps
 
     def _keeps_limits(self, change: Change, place: float) -> bool:
         """Whether the motion keeps the limits all along a change of pace from a place, and never goes back."""
-        clock = np.linspace(0.0, change.length, LOOKS)
-        gained, pace, *_ = change.at(clock)
+        clock = np.linspace(0.0, change.length, SAMPLES)
+        advance, pace, *_ = change.at(clock)
         if pace.min() < -1e-9 or pace.max() > SLACK:
             return False
 
         # the motion's jerk jumps at its knots: just before and after each that is passed
-        places = place + gained
+        places = place + advance
         knots = self._motion.times[(self._motion.times > places[0]) & (self._motion.times < places[-1])]
-        at = np.interp(knots, places, clock)
-        looks = np.clip(np.concatenate([clock, at - BESIDE, at + BESIDE]), 0.0, change.length)
-        return bool(self._kept_at(looks, change, place).all())
+        knot_clock = np.interp(knots, places, clock)
+        samples = np.clip(
+            np.concatenate([clock, knot_clock - KNOT_OFFSET, knot_clock + KNOT_OFFSET]), 0.0, change.length
+        )
+        return bool(self._within_limits_at(samples, change, place).all())
 
-    def _kept_at(self, clock: Vector, change: Change, place: float | Vector) -> Mask:
+    def _within_limits_at(self, clock: Vector, change: Change, place: float | Vector) -> Mask:
         """Whether the limits are kept after times since the beginning of changes; of the shape of ``clock``."""
-        gained, *paces = change.at(clock)
-        places = np.ravel(place + gained)
+        advance, *paces = change.at(clock)
+        places = np.ravel(place + advance)
         state = self._motion(places)
-        p, rise, bend = (row.reshape(-1, 1) for row in paces)
+        p, rise, curvature = (row.reshape(-1, 1) for row in paces)
         v = state.velocities
         a = state.accelerations
         j = self._jerks_at(places)
 
-        rates = (v * p, a * p**2 + v * rise, j * p**3 + 3.0 * a * p * rise + v * bend)
+        rates = (v * p, a * p**2 + v * rise, j * p**3 + 3.0 * a * p * rise + v * curvature)
         bounds = (self._limits.velocity, self._limits.acceleration, self._limits.jerk)
-        kept = [(np.abs(rate) <= SLACK * bound + 1e-12).all(axis=1) for rate, bound in zip(rates, bounds, strict=True)]
-        found: Mask = np.logical_and.reduce(kept).reshape(np.shape(clock))
-        return found
+        within = [
+            (np.abs(rate) <= SLACK * bound + 1e-12).all(axis=1) for rate, bound in zip(rates, bounds, strict=True)
+        ]
+        keeps: Mask = np.logical_and.reduce(within).reshape(np.shape(clock))
+        return keeps
 
     def _jerks_at(self, places: Vector) -> Matrix:
         """The motion's jerk, shape (k, n); just after a jump, and none before its beginning and from its end on."""
         motion = self._motion
         pieces = np.clip(np.searchsorted(motion.times, places, side="right") - 1, 0, len(motion.times) - 2)
         moving = (places >= 0.0) & (places < motion.duration)
-        found: Matrix = np.where(moving[:, None], self._jerks[pieces], 0.0)
-        return found
+        jerks: Matrix = np.where(moving[:, None], self._jerks[pieces], 0.0)
+        return jerks
 
-    def _ends(self, number: int) -> float:
+    def _end_time(self, number: int) -> float:
         """When a change ends, or gives way to the next."""
         change = self._changes[number]
-        later = [self._changes[number + 1].moment] if number + 1 < len(self._changes) else []
-        return float(min([change.moment + change.length, *later]))
+        next_moment = [self._changes[number + 1].moment] if number + 1 < len(self._changes) else []
+        return float(min([change.moment + change.length, *next_moment]))
 
-    def _after(self, seconds: float) -> tuple[float, float, float, float]:
+    def _state_after(self, seconds: float) -> tuple[float, float, float, float]:
         """Place, pace and its two derivatives after a time from now, as has been decided."""
-        until = self.now + seconds
-        at = self.now
+        target_time = self.now + seconds
+        time = self.now
         place = self.place
-        steady = self._steady
+        pace_now = self._pace_before
 
         for number, change in enumerate(self._changes):
-            if change.moment >= until:
-                break
+            if change.moment >= target_time:
+                break  # it has not begun then
             moment = float(change.moment)
-            if moment > at:
-                place += steady * (moment - at)
-                at = moment
+            if moment > time:
+                place += pace_now * (moment - time)
+                time = moment
 
-            stop = min(self._ends(number), until)
-            gained, pace, rise, bend = (row.tolist() for row in change.at(np.array([at - moment, stop - moment])))
-            place += gained[1] - gained[0]
-            at = stop
-            steady = change.end
-            if stop == until and until < moment + change.length:
-                return place, pace[1], rise[1], bend[1]
+            stop = min(self._end_time(number), target_time)
+            advance, pace, rise, curvature = (
+                row.tolist() for row in change.at(np.array([time - moment, stop - moment]))
+            )
+            place += advance[1] - advance[0]
+            time = stop
+            pace_now = change.end
+            if stop == target_time and target_time < moment + change.length:
+                return place, pace[1], rise[1], curvature[1]
 
-        return place + steady * (until - at), steady, 0.0, 0.0
+        return place + pace_now * (target_time - time), pace_now, 0.0, 0.0

@@ -20,9 +20,9 @@ from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.world.world import World
 
 METHODS = ("scaled", "clipped")
-LEAST_SINGULAR = 0.05  # of the Jacobian [m or 1]; below it rates are damped
+DAMPED_BELOW = 0.05  # of the Jacobian [m or 1]; below it rates are damped
 STEP = 1e-3  # [rad] or [m] of difference quotients; distances come in single precision
-HARDLY = 0.03  # [rad] or [m] that joints may move until the slope of the volume is found anew
+SLOPE_VALID_WITHIN = 0.03  # [rad] or [m] that joints may move until the slope of the volume is found anew
 SHARES = np.array([0.5, 0.25, 0.1])  # of a step, the first that is proven free is taken
 REACTION_SECONDS = 0.1  # in which a joint comes to rest before its limit
 
@@ -81,21 +81,24 @@ class Servo:
         self._robot = world.robot
         self._method = one_of(METHODS, method, "method of a servo")
         self._tasks = Secondary(not_negative(centring, "centring"), not_negative(manipulability, "manipulability"))
-        self._near = positive(near, "near")
-        self._kept = not_negative(kept, "kept")
-        if self._kept >= self._near:
-            raise InputError(f"kept must be less than near, got {self._kept:g} and {self._near:g} m")
+        self._slowdown_distance = positive(near, "near")
+        self._min_distance = not_negative(kept, "kept")
+        if self._min_distance >= self._slowdown_distance:
+            raise InputError(
+                f"kept must be less than near, got {self._min_distance:g} and {self._slowdown_distance:g} m"
+            )
         require(slide, bool, "slide")
         self._slide = slide
 
         self._data = working_memory(self._robot.model)
         self._tip = self._robot.model.getFrameId(self._robot.tip)
-        self._speed = np.where(np.isfinite(self._robot.velocity), self._robot.velocity, 1.0)
+        self._max_rates = np.where(np.isfinite(self._robot.velocity), self._robot.velocity, 1.0)
         low = self._robot.lower
         high = self._robot.upper
-        self._middle = np.where(np.isfinite(low + high), 0.5 * (low + high), np.nan)
-        self._ramp = np.eye(self._robot.dof) * STEP  # one joint moved a row
-        self._slope: tuple[Vector, Vector] | None = None  # of the volume, and where
+        self._mid_range = np.where(np.isfinite(low + high), 0.5 * (low + high), np.nan)
+        self._joint_steps = np.eye(self._robot.dof) * STEP  # for difference quotients: one joint moved in each row
+        # Configuration and slope of the volume there, as it was found last; None before that.
+        self._volume_slope_at: tuple[Vector, Vector] | None = None
 
     def step(self, q: ArrayLike, twist: ArrayLike, dt: float) -> Vector:
         """Joint rates, shape (dof,) [rad/s or m/s], to be held for a time step.
@@ -108,103 +111,122 @@ class Servo:
         Raises:
             InputError: If one of them is not finite, or has another shape.
         """
-        here = finite_array(q, (self._robot.dof,), "configuration of a servo")
-        wanted = finite_array(twist, (6,), "twist of a servo")
+        configuration = finite_array(q, (self._robot.dof,), "configuration of a servo")
+        tip_velocity = finite_array(twist, (6,), "twist of a servo")
         seconds = positive(dt, "time step of a servo")
 
-        rates = self._apart(here, *self._for_twist(here, wanted), seconds)
-        return self._proven(here, self._within_limits(here, rates, seconds), seconds)
+        rates = self._damped_approach(configuration, *self._rates_for_twist(configuration, tip_velocity), seconds)
+        return self._proven_free(configuration, self._within_limits(configuration, rates, seconds), seconds)
 
-    def _for_twist(self, q: Vector, twist: Vector) -> tuple[Vector, Vector]:
-        """Rates that move the tip, and those of the secondary tasks that leave it where it is, shape (dof,) each."""
-        left, sizes, right = np.linalg.svd(self._jacobian(q), full_matrices=False)
-        low = float(sizes[-1])
-        damping = (1.0 - (low / LEAST_SINGULAR) ** 2) * LEAST_SINGULAR**2 if low < LEAST_SINGULAR else 0.0
+    def _rates_for_twist(self, q: Vector, twist: Vector) -> tuple[Vector, Vector]:
+        """Damped least squares: rates that move the tip, and those of the secondary tasks in the Jacobian's null space.
+
+        Both of shape (dof,); the second ones leave the tip where it is.
+        """
+        U, singular_values, Vt = np.linalg.svd(self._jacobian(q), full_matrices=False)
+        smallest = float(singular_values[-1])
+        damping = (1.0 - (smallest / DAMPED_BELOW) ** 2) * DAMPED_BELOW**2 if smallest < DAMPED_BELOW else 0.0
         # 1e-18, so that nothing is divided by 0 where the Jacobian vanishes
-        rates = right.T @ ((sizes / (sizes**2 + damping + 1e-18)) * (left.T @ twist))
+        rates = Vt.T @ ((singular_values / (singular_values**2 + damping + 1e-18)) * (U.T @ twist))
 
-        wish = self._wish(q)
-        return rates, wish - right.T @ (right @ wish)
+        secondary = self._secondary_rates(q)
+        return rates, secondary - Vt.T @ (Vt @ secondary)
 
     def _jacobian(self, q: Vector) -> Matrix:
         robot = self._robot
         pin.computeJointJacobians(robot.model, self._data, robot.pinocchio_configuration(q)[0])
-        full = pin.getFrameJacobian(robot.model, self._data, self._tip, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        found: Matrix = full @ robot.chain.gain
-        return found
+        model_jacobian = pin.getFrameJacobian(
+            robot.model, self._data, self._tip, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        jacobian: Matrix = model_jacobian @ robot.chain.gain
+        return jacobian
 
-    def _wish(self, q: Vector) -> Vector:
+    def _secondary_rates(self, q: Vector) -> Vector:
         """Rates of the secondary tasks, shape (dof,)."""
         centring = self._tasks.centring
-        volume = self._tasks.manipulability
-        if centring == 0.0 and volume == 0.0:
+        manipulability = self._tasks.manipulability
+        if centring == 0.0 and manipulability == 0.0:
             return np.zeros_like(q)
 
-        wish: Vector = np.nan_to_num(centring * (self._middle - q), nan=0.0)
-        if volume > 0.0:
-            wish = wish + volume * self._volume_slope(q)
-        return wish
+        rates: Vector = np.nan_to_num(centring * (self._mid_range - q), nan=0.0)
+        if manipulability > 0.0:
+            rates = rates + manipulability * self._volume_slope(q)
+        return rates
 
     def _volume_slope(self, q: Vector) -> Vector:
         """How the volume grows with each joint, shape (dof,); kept while the arm has hardly moved."""
-        if self._slope is None or np.abs(q - self._slope[0]).max() > HARDLY:
-            slope = (np.array([self._volume(q + step) for step in self._ramp]) - self._volume(q)) / STEP
-            self._slope = (q.copy(), slope)
-        return self._slope[1]
+        if self._volume_slope_at is None or np.abs(q - self._volume_slope_at[0]).max() > SLOPE_VALID_WITHIN:
+            slope = (np.array([self._volume(q + step) for step in self._joint_steps]) - self._volume(q)) / STEP
+            self._volume_slope_at = (q.copy(), slope)
+        return self._volume_slope_at[1]
 
     def _volume(self, q: Vector) -> float:
         jacobian = self._jacobian(q)
-        rows = jacobian @ jacobian.T if len(self._ramp) >= 6 else jacobian.T @ jacobian
+        rows = jacobian @ jacobian.T if len(self._joint_steps) >= 6 else jacobian.T @ jacobian
         return float(np.sqrt(max(np.linalg.det(rows), 0.0)))
 
-    def _apart(self, q: Vector, rates: Vector, wish: Vector, seconds: float) -> Vector:
-        """Rates whose approach to the nearest body falls with the distance; the distance is a lower bound of it."""
+    def _damped_approach(self, q: Vector, rates: Vector, secondary: Vector, seconds: float) -> Vector:
+        """Velocity damper: rates whose approach to the nearest body falls with the distance, shape (dof,).
+
+        Args:
+            q: The configuration, shape (dof,).
+            rates: Those that move the tip, shape (dof,).
+            secondary: Those of the secondary tasks, shape (dof,).
+            seconds: The time step [s].
+
+        The distance is a lower bound. Its rate is negative where the arm approaches something.
+        """
         fast = self._world.fast
-        whole = rates + wish
-        if fast is None or not whole.any():
-            return whole
+        combined = rates + secondary
+        if fast is None or not combined.any():
+            return combined
 
-        rows = np.vstack([q, q + self._ramp])
-        lower = fast.clearance(self._robot.joint_values(rows)).lower
-        here = float(lower[0])
-        if not here < self._near or not np.isfinite(lower).all():
-            return whole
+        rows = np.vstack([q, q + self._joint_steps])
+        lower_bounds = fast.clearance(self._robot.joint_values(rows)).lower
+        distance = float(lower_bounds[0])
+        if not distance < self._slowdown_distance or not np.isfinite(lower_bounds).all():
+            return combined
 
-        slope = (lower[1:] - here) / STEP
-        share = max(here - self._kept, 0.0) / (self._near - self._kept)
-        if slope @ wish < 0.0:  # the secondary task fades out in the outer half, and leaves the inner one to the tip
-            whole = rates + max(2.0 * share - 1.0, 0.0) * wish
+        gradient = (lower_bounds[1:] - distance) / STEP
+        speed_share = max(distance - self._min_distance, 0.0) / (self._slowdown_distance - self._min_distance)
+        if gradient @ secondary < 0.0:
+            # The secondary task fades out in the outer half, and leaves the inner one to the tip.
+            combined = rates + max(2.0 * speed_share - 1.0, 0.0) * secondary
 
-        allowed = -min(share * self._tip_speed(whole), 0.5 * max(here - self._kept, 0.0) / seconds)
-        approach = float(slope @ whole)
-        if approach >= allowed:
-            return whole
+        half_way_a_step = 0.5 * max(distance - self._min_distance, 0.0) / seconds
+        min_distance_rate = -min(speed_share * self._tip_speed(combined), half_way_a_step)
+        distance_rate = float(gradient @ combined)
+        if distance_rate >= min_distance_rate:
+            return combined
 
         if self._slide:
-            whole = whole + slope * ((allowed - approach) / max(float(slope @ slope), 1e-12))
+            combined = combined + gradient * (
+                (min_distance_rate - distance_rate) / max(float(gradient @ gradient), 1e-12)
+            )
         else:
-            whole = whole * (allowed / approach)
-        found: Vector = whole
-        return found
+            combined = combined * (min_distance_rate / distance_rate)
+        limited: Vector = combined
+        return limited
 
     def _tip_speed(self, rates: Vector) -> float:
+        """A bound of the speed of any point of the arm [m/s]."""
         return float(np.abs(rates) @ self._world.weights)
 
     def _within_limits(self, q: Vector, rates: Vector, seconds: float) -> Vector:
         """Rates within velocity limits, and such that no joint passes its range."""
         robot = self._robot
-        brake = max(REACTION_SECONDS, seconds)
-        most = np.minimum(self._speed, np.maximum(robot.upper - q, 0.0) / brake)
-        least = np.maximum(-self._speed, np.minimum(robot.lower - q, 0.0) / brake)
+        braking_seconds = max(REACTION_SECONDS, seconds)
+        upper = np.minimum(self._max_rates, np.maximum(robot.upper - q, 0.0) / braking_seconds)
+        lower = np.maximum(-self._max_rates, np.minimum(robot.lower - q, 0.0) / braking_seconds)
 
         if self._method == "clipped":
-            return np.clip(rates, least, most)
-        bound = np.where(rates > 0.0, most, -least)
-        share = np.min(np.divide(bound, np.abs(rates), out=np.ones_like(rates), where=np.abs(rates) > bound))
-        scaled: Vector = rates * share
+            return np.clip(rates, lower, upper)
+        bound = np.where(rates > 0.0, upper, -lower)
+        scale = np.min(np.divide(bound, np.abs(rates), out=np.ones_like(rates), where=np.abs(rates) > bound))
+        scaled: Vector = rates * scale
         return scaled
 
-    def _proven(self, q: Vector, rates: Vector, seconds: float) -> Vector:
+    def _proven_free(self, q: Vector, rates: Vector, seconds: float) -> Vector:
         """The rates, or the largest share of them with which the step is proven free; 0 if none is."""
         if not rates.any():
             return rates
@@ -212,5 +234,5 @@ class Servo:
             return rates
 
         ends = q + seconds * np.outer(SHARES, rates)
-        proven = self._world.motions_proven(np.broadcast_to(q, ends.shape), ends)
-        return rates * float(SHARES[proven.argmax()]) if proven.any() else np.zeros_like(rates)
+        is_proven = self._world.motions_proven(np.broadcast_to(q, ends.shape), ends)
+        return rates * float(SHARES[is_proven.argmax()]) if is_proven.any() else np.zeros_like(rates)

@@ -63,14 +63,14 @@ def interaction_matrix(points: ArrayLike, depths: ArrayLike) -> Matrix:
         >>> interaction_matrix([[0.0, 0.0]], [2.0])[0].tolist()
         [-0.5, 0.0, 0.0, 0.0, -1.0, 0.0]
     """
-    seen = finite_array(points, (None, 2), "points")
-    z = finite_array(depths, (len(seen),), "depths")
+    image_points = finite_array(points, (None, 2), "points")
+    z = finite_array(depths, (len(image_points),), "depths")
     if (z <= 0.0).any():
         raise InputError(f"depths must be above 0, got {z.min():g}")
-    x, y = seen.T
-    none = np.zeros(len(seen))
-    across = np.stack([-1.0 / z, none, x / z, x * y, -(1.0 + x * x), y], axis=1)
-    down = np.stack([none, -1.0 / z, y / z, 1.0 + y * y, -x * y, -x], axis=1)
+    x, y = image_points.T
+    zeros = np.zeros(len(image_points))
+    across = np.stack([-1.0 / z, zeros, x / z, x * y, -(1.0 + x * x), y], axis=1)
+    down = np.stack([zeros, -1.0 / z, y / z, 1.0 + y * y, -x * y, -x], axis=1)
     return np.stack([across, down], axis=1).reshape(-1, 6)
 
 
@@ -130,8 +130,8 @@ class VisualServo:
         self.aligned = np.deg2rad(0.1)  # [rad], within which the tip is there
         self.jump = 0.03  # [m] from one sighting to the next: more is taken for an error
 
-        self._goal: pin.SE3 | None = None
-        self._unseen = 0.0
+        self._goal: pin.SE3 | None = None  # where the target was seen last
+        self._unseen = 0.0  # [s] since then
 
     def go_on_with(self, servo: Servo) -> None:
         """Take another servo for the same target, where the world has changed; what was seen is not forgotten."""
@@ -149,33 +149,33 @@ class VisualServo:
         Raises:
             InputError: If one of them is none.
         """
-        here = self._robot.configuration(q, "configuration")
+        configuration = self._robot.configuration(q, "configuration")
         seconds = positive(dt, "time step")
-        state = self._look(None if seen is None else rigid(seen, "where the tip shall be"), seconds)
-        tip = self._robot.fk(here)
+        state = self._take_sighting(None if seen is None else rigid(seen, "where the tip shall be"), seconds)
+        tip = self._robot.fk(configuration)
         goal = self._goal
-        still = np.zeros(self._robot.dof)
+        no_rates = np.zeros(self._robot.dof)
 
         if goal is None:
-            return ServoStep(still, "lost", np.inf, np.inf)
+            return ServoStep(no_rates, "lost", np.inf, np.inf)
         away, turned = apart(tip, goal)
         if state != "moving":
-            return ServoStep(still, state, away, turned)
+            return ServoStep(no_rates, state, away, turned)
         if away <= self.near and turned <= self.aligned:
-            return ServoStep(still, "done", away, turned)
+            return ServoStep(no_rates, "done", away, turned)
 
-        rates = self._servo.step(here, self._slowed(self._twist(tip, goal)), seconds)
+        rates = self._servo.step(configuration, self._within_speeds(self._twist(tip, goal)), seconds)
         return ServoStep(rates, "moving" if np.abs(rates).max() > STILL else "blocked", away, turned)
 
-    def _look(self, seen: pin.SE3 | None, seconds: float) -> ServoState:
-        """Take a sighting; whether the target is still known."""
+    def _take_sighting(self, seen: pin.SE3 | None, seconds: float) -> ServoState:
+        """Take in a sighting, or that there is none; "moving" while the target is known, or why the arm must stand."""
         if seen is None:
             self._unseen += seconds
             return "moving" if self._unseen <= self._patience else "lost"
 
-        before = self._goal
+        last_goal = self._goal
         self._unseen = 0.0
-        if before is not None and np.linalg.norm(seen.translation - before.translation) > self.jump:
+        if last_goal is not None and np.linalg.norm(seen.translation - last_goal.translation) > self.jump:
             return "jumped"
         self._goal = seen
         return "moving"
@@ -187,18 +187,23 @@ class VisualServo:
             return self._gain * np.concatenate([goal.translation - tip.translation, turning])
 
         camera = self._camera
-        now, wanted = (_square(camera.actInv(T)) for T in (tip, goal))
-        if min(now[:, 2].min(), wanted[:, 2].min()) < MIN_DEPTH:
+        tip_corners, goal_corners = (_square(camera.actInv(T)) for T in (tip, goal))
+        if min(tip_corners[:, 2].min(), goal_corners[:, 2].min()) < MIN_DEPTH:
             return np.zeros(6)
-        error = (now[:, :2] / now[:, 2:] - wanted[:, :2] / wanted[:, 2:]).ravel()
-        here, there = (interaction_matrix(each[:, :2] / each[:, 2:], each[:, 2]) for each in (now, wanted))
-        moved = self._gain * np.linalg.lstsq(0.5 * (here + there), error, rcond=None)[0]  # of the gripper: - L moves it
+        error = (tip_corners[:, :2] / tip_corners[:, 2:] - goal_corners[:, :2] / goal_corners[:, 2:]).ravel()
+        matrix_at_tip, matrix_at_goal = (
+            interaction_matrix(corners[:, :2] / corners[:, 2:], corners[:, 2])
+            for corners in (tip_corners, goal_corners)
+        )
+        camera_twist = (
+            self._gain * np.linalg.lstsq(0.5 * (matrix_at_tip + matrix_at_goal), error, rcond=None)[0]
+        )  # of the gripper: - L moves it
 
-        spin = moved[3:]
-        velocity = moved[:3] + np.cross(spin, camera.actInv(tip).translation)
-        return np.concatenate([camera.rotation @ velocity, camera.rotation @ spin])
+        angular = camera_twist[3:]
+        velocity = camera_twist[:3] + np.cross(angular, camera.actInv(tip).translation)
+        return np.concatenate([camera.rotation @ velocity, camera.rotation @ angular])
 
-    def _slowed(self, twist: Vector) -> Vector:
+    def _within_speeds(self, twist: Vector) -> Vector:
         """The same direction, within the speeds of the tip."""
         linear = float(np.linalg.norm(twist[:3])) / self._speed
         angular = float(np.linalg.norm(twist[3:])) / self._turn

@@ -39,31 +39,31 @@ def blended(
 
     None where no such motion is faster than ``slowest`` [s], or none is free.
     """
-    kept = spaced(corners, MERGED_SHARE * blend)
-    merged = len(kept) < len(corners)
-    rows = vertices(corners[kept]) if merged else corners
+    chosen = spaced(corners, MERGED_SHARE * blend)
+    merged = len(chosen) < len(corners)
+    rows = vertices(corners[chosen]) if merged else corners
     if len(rows) < 2:  # the whole path is shorter than what is merged
         return None
-    along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
+    vertex_places = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
     radii = first_radii(rows, blend)
-    room = (DEVIATION_SHARE - MERGED_SHARE) * blend
+    max_deviation = (DEVIATION_SHARE - MERGED_SHARE) * blend
 
     for _ in range(MAX_ROUNDS):
-        parts = runs(rows, radii, limits, room=room, more=more)
+        parts = runs(rows, radii, limits, max_deviation=max_deviation, more=more)
         motion = within(joined([run.pieces for run in parts], path), limits)
         if motion.duration >= slowest:
             return None
 
-        columns = zip(*((run.places, run.apart, run.on_path) for run in parts), strict=True)
-        places, apart, on_path = (np.concatenate(column) for column in columns)
-        bad = places[apart > room]
-        if len(bad) == 0:
+        columns = zip(*((run.places, run.deviations, run.on_path) for run in parts), strict=True)
+        places, deviations, on_path = (np.concatenate(column) for column in columns)
+        bad_places = places[deviations > max_deviation]
+        if len(bad_places) == 0:
             off_path = np.ones_like(on_path) if merged else ~on_path  # what was proven is the path with all corners
-            bad = places[faults(motion, off_path)]
+            bad_places = places[faults(motion, off_path)]
 
-        if len(bad) == 0:
+        if len(bad_places) == 0:
             return motion
-        radii = _narrower(radii, along[1:-1], bad, LEAST_RADIUS * blend)
+        radii = _with_narrower_corners(radii, vertex_places[1:-1], bad_places, LEAST_RADIUS * blend)
     return None
 
 
@@ -78,16 +78,16 @@ def within(motion: Trajectory, limits: RateLimits, rounds: int = 10) -> Trajecto
     return motion
 
 
-def _narrower(radii: Vector, along: Vector, bad: Vector, least: float) -> Vector:
-    """Half the radius of the corners near bad places; 0 where that is less than the least."""
-    bad = np.unique(bad)
-    blamed = (np.abs(along - bad[_nearest(bad, along)]) <= radii) & (radii > 0.0)
+def _with_narrower_corners(radii: Vector, vertex_places: Vector, bad_places: Vector, min_radius: float) -> Vector:
+    """Half the radius of the corners near bad places; 0 where that is less than ``min_radius``."""
+    bad_places = np.unique(bad_places)
+    is_blamed = (np.abs(vertex_places - bad_places[_nearest(bad_places, vertex_places)]) <= radii) & (radii > 0.0)
     rounded = np.flatnonzero(radii > 0.0)
-    if not blamed.any() and len(rounded):
-        blamed[rounded[_nearest(along[rounded], bad)]] = True
+    if not is_blamed.any() and len(rounded):
+        is_blamed[rounded[_nearest(vertex_places[rounded], bad_places)]] = True
 
-    halved: Vector = np.where(blamed, 0.5 * radii, radii)
-    halved[halved < least] = 0.0
+    halved: Vector = np.where(is_blamed, 0.5 * radii, radii)
+    halved[halved < min_radius] = 0.0
     return halved
 
 
@@ -109,8 +109,8 @@ def fault_finder(path: JointPath, world: World, clearance: float | None) -> Faul
 
     What lies on the path is proven with it.
     """
-    kept = next(provable_clearances(world, path.waypoints, clearance), None)
-    if kept is None:
+    proven_clearance = next(provable_clearances(world, path.waypoints, clearance), None)
+    if proven_clearance is None:
         return lambda motion, _: np.searchsorted(motion.times, bad_moments(motion, world), side="right") - 1
 
     def unproven(motion: Trajectory, off_path: Mask) -> NDArray[np.int64]:
@@ -120,7 +120,7 @@ def fault_finder(path: JointPath, world: World, clearance: float | None) -> Faul
             [
                 first + gap.motion
                 for first, end in stretches
-                for gap in proof_of_pieces(motion, world, kept, first, end).unproven
+                for gap in proof_of_pieces(motion, world, proven_clearance, first, end).unproven
             ],
             dtype=np.int64,
         )

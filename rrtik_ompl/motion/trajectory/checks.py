@@ -27,19 +27,19 @@ def faults_of(motion: Trajectory, world: World) -> list[tuple[float, str]]:
 def bad_moments(motion: Trajectory, world: World) -> Vector:
     """Times of the first fault of every piece that has one; see :meth:`Trajectory.faults`."""
     h = np.diff(motion.times)
-    ways = h * (greatest_speeds(motion) @ world.weights)
-    counts = np.ceil(ways * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
+    travel = h * (greatest_speeds(motion) @ world.weights)
+    counts = np.ceil(travel * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
     pieces, shares = even_parts(counts)
     clock = np.append(motion.times[pieces] + shares * h[pieces], motion.duration)
 
-    bad = np.flatnonzero(~world.checks.certified(motion(clock).positions))
-    touching, where = np.unique(np.append(pieces, len(h) - 1)[bad], return_index=True)
-    moments = np.asarray(clock[bad[where]])
+    bad_rows = np.flatnonzero(~world.checks.certified(motion(clock).positions))
+    bad_pieces, first_rows = np.unique(np.append(pieces, len(h) - 1)[bad_rows], return_index=True)
+    moments = np.asarray(clock[bad_rows[first_rows]])
 
     if world.settings.proving is None:
         return moments
     gaps = proof_of_pieces(motion, world, world.settings.proving, 0, len(h)).unproven
-    unproven = np.setdiff1d([gap.motion for gap in gaps], touching).astype(np.int64)
+    unproven = np.setdiff1d([gap.motion for gap in gaps], bad_pieces).astype(np.int64)
     return np.sort(np.concatenate([moments, motion.times[unproven]]))
 
 
@@ -47,8 +47,8 @@ def greatest_speeds(motion: Trajectory) -> Matrix:
     """Bounds of the rates of all joints on each piece, shape (m, n) [rad/s or m/s]."""
     h = np.diff(motion.times)[:, None]
     peak = np.abs(motion.velocities)
-    found: Matrix = np.maximum(peak[1:], peak[:-1]) + h * np.abs(motion.jerks * h) / 8.0
-    return found
+    speeds: Matrix = np.maximum(peak[1:], peak[:-1]) + h * np.abs(motion.jerks * h) / 8.0
+    return speeds
 
 
 def proof_of_pieces(motion: Trajectory, world: World, clearance: float, first: int, end: int) -> Proof:

@@ -76,20 +76,20 @@ def proof_by_chords(
     slack = SLACKS[finer]
     chords = chords_of(h, pushes, slack)
     clock = times[chords.pieces] + chords.shares * h[chords.pieces]
-    found = chords.joined(world.prover.route(places(np.append(clock, times[-1])), clearance=clearance, slack=slack))
-    if found.proven or finer + 1 == len(SLACKS):
-        return found
+    proof = chords.joined(world.prover.route(places(np.append(clock, times[-1])), clearance=clearance, slack=slack))
+    if proof.proven or finer + 1 == len(SLACKS):
+        return proof
 
-    unproven = np.array([gap.motion for gap in found.unproven])
-    q = places(times[unproven] + np.nan_to_num([gap.share for gap in found.unproven]) * h[unproven])
-    hopeful = world.prover.proven(q, q, clearance=clearance)  # where the motion itself is as near, no chord helps
-    gaps = [gap for gap, hope in zip(found.unproven, hopeful, strict=True) if not hope]
-    near = unproven[hopeful]
+    unproven = np.array([gap.motion for gap in proof.unproven])
+    q = places(times[unproven] + np.nan_to_num([gap.share for gap in proof.unproven]) * h[unproven])
+    is_hopeful = world.prover.proven(q, q, clearance=clearance)  # where the motion itself is as near, no chord helps
+    gaps = [gap for gap, hope in zip(proof.unproven, is_hopeful, strict=True) if not hope]
+    to_refine = unproven[is_hopeful]
 
-    for stretch in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else ():
+    for stretch in np.split(to_refine, np.flatnonzero(np.diff(to_refine) > 1) + 1) if len(to_refine) else ():
         first = int(stretch[0])
         end = int(stretch[-1]) + 1
-        again = proof_by_chords(times[first : end + 1], pushes[first:end], places, world, clearance, finer + 1)
-        gaps += [replace(gap, motion=first + gap.motion) for gap in again.unproven]
+        finer_proof = proof_by_chords(times[first : end + 1], pushes[first:end], places, world, clearance, finer + 1)
+        gaps += [replace(gap, motion=first + gap.motion) for gap in finer_proof.unproven]
 
-    return replace(found, unproven=tuple(sorted(gaps, key=lambda gap: gap.motion)))
+    return replace(proof, unproven=tuple(sorted(gaps, key=lambda gap: gap.motion)))

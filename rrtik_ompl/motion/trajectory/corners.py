@@ -13,7 +13,7 @@ COINCIDENCE = 1e-10  # [rad] or [m]; waypoints closer to the last one, or to a s
 MIN_CORNER_COSINE = -0.98  # between the directions before and after; a corner with a smaller one is a stop
 MERGED_SHARE = 0.02  # of the blend: waypoints nearer to the last one are merged with it
 ROUNDED_SHARE = 0.14  # of the blend: by which the rounding of a corner alone may leave the path
-LOOKED_AT = 64  # waypoints at once, for the next one that is kept
+SEARCH_CHUNK = 64  # waypoints at once, for the next one that is kept
 
 
 def vertices(waypoints: Matrix) -> Matrix:
@@ -22,74 +22,79 @@ def vertices(waypoints: Matrix) -> Matrix:
     if len(rows) < 3:
         return rows
 
-    kept = np.ones(len(rows), dtype=bool)
-    kept[1:-1] = ~_between(rows[:-2], rows[1:-1], rows[2:])
+    is_vertex = np.ones(len(rows), dtype=bool)
+    is_vertex[1:-1] = ~_between(rows[:-2], rows[1:-1], rows[2:])
 
-    ends = np.flatnonzero(kept)
-    for a, b in pairwise(ends):
+    first_vertices = np.flatnonzero(is_vertex)
+    for a, b in pairwise(first_vertices):
         if b > a + 1:
-            kept[a + 1 : b] = _bends(rows[a : b + 1])
-    return rows[kept]
+            is_vertex[a + 1 : b] = _bends(rows[a : b + 1])
+    return rows[is_vertex]
 
 
-def spaced(rows: Matrix, apart: float) -> NDArray[np.int64]:
-    """Numbers of the rows that are farther than ``apart`` from the last one kept; the last row always, shape (m,)."""
+def spaced(rows: Matrix, min_distance: float) -> NDArray[np.int64]:
+    """Numbers of the rows that are farther than ``min_distance`` from the last one chosen, and of the last row.
+
+    Shape (m,).
+    """
     steps = np.linalg.norm(rows[1:] - rows[:-1], axis=1)
-    if (steps > apart).all():
+    if (steps > min_distance).all():
         return np.arange(len(rows))
 
-    kept = [0]
-    at = 1
-    while at < len(rows):
-        ahead = np.linalg.norm(rows[at : at + LOOKED_AT] - rows[kept[-1]], axis=1) > apart
-        if ahead.any():
-            at += int(ahead.argmax())
-            kept.append(at)
-            at += 1
+    chosen = [0]
+    row = 1
+    while row < len(rows):
+        is_far_enough = np.linalg.norm(rows[row : row + SEARCH_CHUNK] - rows[chosen[-1]], axis=1) > min_distance
+        if is_far_enough.any():
+            row += int(is_far_enough.argmax())
+            chosen.append(row)
+            row += 1
         else:
-            at += LOOKED_AT
+            row += SEARCH_CHUNK
 
     last = len(rows) - 1
-    if len(kept) > 1 or np.linalg.norm(rows[-1] - rows[0]) > apart:
-        if len(kept) > 1 and kept[-1] != last:  # too near to the last row, which takes its place
-            kept.pop()
-        kept.append(last)
-    return np.unique(kept)
+    if len(chosen) > 1 or np.linalg.norm(rows[-1] - rows[0]) > min_distance:
+        if len(chosen) > 1 and chosen[-1] != last:  # too near to the last row, which takes its place
+            chosen.pop()
+        chosen.append(last)
+    return np.unique(chosen)
 
 
 def _between(a: Matrix, b: Matrix, c: Matrix) -> NDArray[np.bool_]:
     """Whether each point b lies on the line from a to c, between them; shape (m, n) each."""
     chord = c - a
-    ahead = b - a
+    offset = b - a
     length = np.linalg.norm(chord, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = (ahead * chord).sum(axis=1) / length**2
-        apart = np.linalg.norm(ahead - share[:, None] * chord, axis=1)
-    found: NDArray[np.bool_] = (length > COINCIDENCE) & (apart <= COINCIDENCE) & (share > 0.0) & (share < 1.0)
-    return found
+        fraction = (offset * chord).sum(axis=1) / length**2
+        line_distance = np.linalg.norm(offset - fraction[:, None] * chord, axis=1)
+    is_between: NDArray[np.bool_] = (
+        (length > COINCIDENCE) & (line_distance <= COINCIDENCE) & (fraction > 0.0) & (fraction < 1.0)
+    )
+    return is_between
 
 
 def _bends(rows: Matrix) -> NDArray[np.bool_]:
     """Which inner rows are vertices, shape (k - 2,): halves at the farthest row until all lie on lines."""
-    kept = np.zeros(len(rows), dtype=bool)
-    open_parts = [(0, len(rows) - 1)]
-    while open_parts:
-        a, b = open_parts.pop()
+    is_vertex = np.zeros(len(rows), dtype=bool)
+    unfinished = [(0, len(rows) - 1)]
+    while unfinished:
+        a, b = unfinished.pop()
         if b <= a + 1:
             continue
 
         chord = rows[b] - rows[a]
-        ahead = rows[a + 1 : b] - rows[a]
+        offsets = rows[a + 1 : b] - rows[a]
         length = float(np.linalg.norm(chord))
-        share = ahead @ chord / length**2
-        apart = np.linalg.norm(ahead - share[:, None] * chord, axis=1)
-        if apart.max() > COINCIDENCE or not (np.diff(share, prepend=0.0, append=1.0) > 0.0).all():
-            middle = a + 1 + int(apart.argmax())
-            kept[middle] = True
-            open_parts += [(a, middle), (middle, b)]
+        fractions = offsets @ chord / length**2
+        line_distances = np.linalg.norm(offsets - fractions[:, None] * chord, axis=1)
+        if line_distances.max() > COINCIDENCE or not (np.diff(fractions, prepend=0.0, append=1.0) > 0.0).all():
+            middle = a + 1 + int(line_distances.argmax())
+            is_vertex[middle] = True
+            unfinished += [(a, middle), (middle, b)]
 
-    inner: NDArray[np.bool_] = kept[1:-1]
-    return inner
+    inner_vertices: NDArray[np.bool_] = is_vertex[1:-1]
+    return inner_vertices
 
 
 def first_radii(corners: Matrix, blend: float) -> Vector:

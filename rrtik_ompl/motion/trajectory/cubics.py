@@ -62,22 +62,22 @@ def cubic_peaks(times: Vector, velocities: Matrix, accelerations: Matrix) -> tup
     v, a, j = (np.ascontiguousarray(rows.T) for rows in (velocities, accelerations, jerks))
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        turn = -a[:, :-1] / j
-        between = np.where((turn > 0.0) & (turn < h), v[:, :-1] + 0.5 * turn * a[:, :-1], 0.0)
-    velocity = np.maximum(np.abs(v).max(axis=1), np.abs(between).max(axis=1))
+        turn_time = -a[:, :-1] / j
+        turning_velocity = np.where((turn_time > 0.0) & (turn_time < h), v[:, :-1] + 0.5 * turn_time * a[:, :-1], 0.0)
+    velocity = np.maximum(np.abs(v).max(axis=1), np.abs(turning_velocity).max(axis=1))
 
     ends = a[:, :-1] + h * j
-    apart = np.abs(ends - a[:, 1:])
+    jump_sizes = np.abs(ends - a[:, 1:])
     # what rounding of times and velocities does to the acceleration at the end of a piece
-    noise = 8.0 * np.finfo(np.float64).eps * (np.abs(v).max() + times[-1] * np.abs(a).max()) / h
-    smooth = apart <= noise
+    rounding = 8.0 * np.finfo(np.float64).eps * (np.abs(v).max() + times[-1] * np.abs(a).max()) / h
+    smooth = jump_sizes <= rounding
     acceleration = np.maximum(np.abs(a).max(axis=1), np.abs(np.where(smooth, 0.0, ends)).max(axis=1))
 
     jump = JUMP_SHARE * acceleration.max()
-    rest = np.abs(a[:, [0, -1]]) <= jump  # before its beginning and after its end the arm does not move
-    smooth |= apart <= jump
-    steady = smooth.all(axis=1) & rest.all(axis=1)
-    jerk = np.where(steady, np.abs((a[:, 1:] - a[:, :-1]) / h).max(axis=1), np.inf)
+    at_rest = np.abs(a[:, [0, -1]]) <= jump  # before its beginning and after its end the arm does not move
+    smooth |= jump_sizes <= jump
+    is_smooth = smooth.all(axis=1) & at_rest.all(axis=1)
+    jerk = np.where(is_smooth, np.abs((a[:, 1:] - a[:, :-1]) / h).max(axis=1), np.inf)
 
     return velocity, acceleration, jerk
 

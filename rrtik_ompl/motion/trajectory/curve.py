@@ -110,33 +110,35 @@ class Curve:
     def path_at(self, places: Vector) -> Matrix:
         """The path itself, not rounded, at places, shape (m, n)."""
         edge = self.edges(places)
-        ahead: Vector = (places - self.along[edge])[:, None]
-        return self.vertices[edge] + ahead * self.directions[edge]
+        from_vertex: Vector = (places - self.along[edge])[:, None]
+        return self.vertices[edge] + from_vertex * self.directions[edge]
 
     def tightest(self, places: Vector) -> Vector:
         """The smallest radius, a sixth less at most, of the corners within which places lie; inf for none."""
-        at = self.along[1:-1]
+        corner_places = self.along[1:-1]
         radii = self.radii[1:-1]
         # in steps of a quarter of an octave, so that there are few radii to search for
         steps = np.floor(4.0 * np.log2(np.maximum(radii, 1e-300)))
-        found = np.full(len(places), np.inf)
+        tightest = np.full(len(places), np.inf)
 
         for step in np.unique(steps)[::-1]:
-            alike = steps == step
+            in_step = steps == step
             radius = np.exp2(0.25 * step)
-            starts = np.sort(at[alike] - radii[alike])
-            ends = np.sort(at[alike] + radii[alike])
-            found[np.searchsorted(starts, places) > np.searchsorted(ends, places)] = radius
-        return found
+            starts = np.sort(corner_places[in_step] - radii[in_step])
+            ends = np.sort(corner_places[in_step] + radii[in_step])
+            tightest[np.searchsorted(starts, places) > np.searchsorted(ends, places)] = radius
+        return tightest
 
     def grid(self) -> tuple[Vector, Vector]:
         """Places from the beginning to the end, close where the curve bends: wherever its third derivative jumps.
 
         Also the smallest radius, about, of the corners within which each lies; see :meth:`tightest`.
         """
-        at = self.along[1:-1]
+        corner_places = self.along[1:-1]
         radii = self.radii[1:-1]
-        knots = np.unique(np.concatenate([at - radii, at, at + radii, self.along[[0, -1]]]))
+        knots = np.unique(
+            np.concatenate([corner_places - radii, corner_places, corner_places + radii, self.along[[0, -1]]])
+        )
         knots = knots[np.concatenate([[True], knots[1:] - knots[:-1] > SAME_PLACE * self.length])]
         knots[-1] = self.length
 

@@ -69,11 +69,11 @@ class PathTiming:
         """Where the motion is at times, shape (k,); at its ends before and after."""
         t = np.clip(clock, 0.0, self.duration)
         k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
-        ahead = t - self.times[k]
+        elapsed = t - self.times[k]
         speeds = np.sqrt(self.squares)
-        push = (self.squares[k + 1] - self.squares[k]) / (2.0 * (self.grid[k + 1] - self.grid[k]))
-        found = self.grid[k] + ahead * (speeds[k] + 0.5 * ahead * push)
-        return np.maximum.accumulate(np.clip(found, self.grid[0], self.grid[-1]))
+        acceleration = (self.squares[k + 1] - self.squares[k]) / (2.0 * (self.grid[k + 1] - self.grid[k]))
+        places = self.grid[k] + elapsed * (speeds[k] + 0.5 * elapsed * acceleration)
+        return np.maximum.accumulate(np.clip(places, self.grid[0], self.grid[-1]))
 
     def cruising(self, seconds: float) -> Vector:
         """Path speeds at the grid, shape (m,), cut where they are higher for less than a time, or a third of it all."""
@@ -84,11 +84,11 @@ class PathTiming:
 
         # the least speed of each window, then the largest of these: peaks narrower than a window are cut off
         width = 1 + int(seconds * count / self.duration)
-        rest = np.zeros(width)
-        least = sliding_window_view(np.concatenate([rest, speeds, rest]), width).min(axis=1)
-        cut = sliding_window_view(least, width).max(axis=1)[1 : count + 1]
-        found: Vector = np.interp(self.grid, 0.5 * (places[1:] + places[:-1]), cut)
-        return found
+        zeros = np.zeros(width)
+        window_minima = sliding_window_view(np.concatenate([zeros, speeds, zeros]), width).min(axis=1)
+        capped = sliding_window_view(window_minima, width).max(axis=1)[1 : count + 1]
+        cruise_speeds: Vector = np.interp(self.grid, 0.5 * (places[1:] + places[:-1]), capped)
+        return cruise_speeds
 
 
 def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) -> PathTiming:

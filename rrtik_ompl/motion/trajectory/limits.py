@@ -137,8 +137,8 @@ class RateLimits:
             if peak is not None or name != "jerk":
                 row = number_rows(np.nan if peak is None else peak, f"peaks of {name}").reshape(-1)
                 self._fits(len(row))
-                kept = finite_array(np.where(np.isfinite(limit), row, 0.0), (None,), f"peaks of {name}")
-                shares.append((kept / limit).max(initial=0.0))
+                limited_peaks = finite_array(np.where(np.isfinite(limit), row, 0.0), (None,), f"peaks of {name}")
+                shares.append((limited_peaks / limit).max(initial=0.0))
 
         factors = [float(share) ** (1.0 / power) for power, share in enumerate(shares, start=1)]
         return 1.0 if max(shares) <= 1.0 else max(factors) * ROUNDING_MARGIN

@@ -59,8 +59,8 @@ def from_yaml(text: str) -> dict[str, Any]:
     try:
         document = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = "" if mark is None else f"line {mark.line + 1}: "
+        problem_mark = getattr(error, "problem_mark", None)
+        where = "" if problem_mark is None else f"line {problem_mark.line + 1}: "
         raise InputError(f"{where}not YAML; is this a trajectory file?") from None
     except (RecursionError, ValueError):
         raise InputError("not YAML that can be read; is this a trajectory file?") from None

@@ -118,11 +118,11 @@ class Trajectory:
             bends = hermite_accelerations(clock, rows, rates)
         else:
             bends = finite_array(accelerations, rows.shape, "trajectory accelerations")
-            apart = np.abs(ends_of(clock, rows, rates, bends) - rows[1:])
-            if apart.max() > FIT_TOLERANCE * max(1.0, np.abs(rates).max()):
-                point = int(apart.max(axis=1).argmax()) + 2
+            end_errors = np.abs(ends_of(clock, rows, rates, bends) - rows[1:])
+            if end_errors.max() > FIT_TOLERANCE * max(1.0, np.abs(rates).max()):
+                point = int(end_errors.max(axis=1).argmax()) + 2
                 raise InputError(
-                    f"trajectory: point {point} is {apart.max():.2g} away from where the point "
+                    f"trajectory: point {point} is {end_errors.max():.2g} away from where the point "
                     "before it leads; leave the accelerations out to have positions and velocities decide"
                 )
 
@@ -157,12 +157,12 @@ class Trajectory:
         x = (clock - self.times[piece])[:, None]
         q, v, a = (rows[piece] for rows in (self.positions, self.velocities, self.accelerations))
         j = jerks_of(self.times, self.velocities, self.accelerations, piece)
-        found = [q + x * (v + x * (a / 2.0 + x * j / 6.0)), v + x * (a + x * j / 2.0), a + x * j]
+        values = [q + x * (v + x * (a / 2.0 + x * j / 6.0)), v + x * (a + x * j / 2.0), a + x * j]
 
-        found[0][clock == self.duration] = self.positions[-1]  # to the bit
+        values[0][clock == self.duration] = self.positions[-1]  # to the bit
         outside = np.atleast_1d(wanted) != clock
-        found[1][outside] = found[2][outside] = 0.0
-        return State(*found) if many else State(*(rows[0] for rows in found))
+        values[1][outside] = values[2][outside] = 0.0
+        return State(*values) if many else State(*(rows[0] for rows in values))
 
     @property
     def jerks(self) -> Matrix:
@@ -237,8 +237,8 @@ class Trajectory:
         """
         require(world, World, "world of a trajectory's proof")
         require_joints(world.robot, self.joint_names, "trajectory")
-        kept = world.settings.kept if clearance is None else not_negative(clearance, "clearance")
-        return proof_of_pieces(self, world, kept, 0, len(self.times) - 1)
+        kept_clearance = world.settings.kept if clearance is None else not_negative(clearance, "clearance")
+        return proof_of_pieces(self, world, kept_clearance, 0, len(self.times) - 1)
 
     def played(self, world: World | None) -> Played:
         """The motion as a picture plays it, and what is said of it there: by :meth:`prove` and :meth:`faults`.
@@ -262,8 +262,8 @@ class Trajectory:
         ends = a[:-1] + np.diff(self.times)[:, None] * self.jerks
         before = np.vstack([np.zeros_like(a[:1]), ends])
         after = np.vstack([a[:-1], np.zeros_like(a[:1])])
-        found: Matrix = np.abs(after - before)
-        return found
+        jump_sizes: Matrix = np.abs(after - before)
+        return jump_sizes
 
     def sampled(self, rate: float) -> tuple[Vector, State]:
         """Times at a control rate [1/s] from 0 to the end, shape (k,), and the states then; the end is the last one.

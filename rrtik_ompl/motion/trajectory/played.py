@@ -41,23 +41,26 @@ def _judged_motion(motion: Trajectory, world: World) -> tuple[Vector, Judged]:
     Everything that is looked at is drawn too: a motion of some tenths of a second is not lost between two pictures.
     """
     course = _course_of(world, motion)
-    found, faults = judged_course(world, course, partial(_faults_of_motion, world, motion))
+    judgement, faults = judged_course(world, course, partial(_faults_of_motion, world, motion))
 
-    doubtful = found.verdict.unproven
+    doubtful = judgement.verdict.unproven
     doubt = f"not proven free in {len(doubtful)} of {len(motion.times) - 1} pieces" if doubtful else ""
     text = "" if doubtful else "the whole motion is proven free"
 
-    seen = course if found.curve is None else found.curve
-    touched = [end for contact in found.contacts for end in (contact.begin, contact.end)]
-    clock = _frames_of(motion, np.append(_clock(motion, seen.motions, seen.shares), _times(motion, np.array(touched))))
-    where = [f"after {_clock(motion, np.array([k]), np.array([x]))[0]:.3f} s: {why}" for k, x, why in faults or ()]
+    shown_course = course if judgement.curve is None else judgement.curve
+    touched = [end for contact in judgement.contacts for end in (contact.begin, contact.end)]
+    judged_times = _clock(motion, shown_course.motions, shown_course.shares)
+    clock = _frames_of(motion, np.append(judged_times, _times(motion, np.array(touched))))
+    fault_lines = [
+        f"after {_clock(motion, np.array([k]), np.array([x]))[0]:.3f} s: {why}" for k, x, why in faults or ()
+    ]
 
     drawn = _drawn_moves(motion, doubtful, clock)
-    said = Verdict(not doubtful, text, drawn, doubt)
-    verdict = with_reason(said, world, where, checked=faults is not None)
+    proof_verdict = Verdict(not doubtful, text, drawn, doubt)
+    verdict = with_reason(proof_verdict, world, fault_lines, checked=faults is not None)
 
-    curve = None if found.curve is None else _on_frames(motion, found.curve, clock, drawn)
-    contacts = tuple(_contact_on_frames(motion, each, clock) for each in found.contacts)
+    curve = None if judgement.curve is None else _on_frames(motion, judgement.curve, clock, drawn)
+    contacts = tuple(_contact_on_frames(motion, each, clock) for each in judgement.contacts)
     return clock, Judged(verdict, curve, contacts)
 
 
@@ -65,8 +68,8 @@ def _course_of(world: World, motion: Trajectory) -> Course:
     """A timed motion as a course: its places are spread over how far the arm moves, and at its knots."""
     h = np.diff(motion.times)
     speed = greatest_speeds(motion)
-    ways = np.append(0.0, np.cumsum(h * np.maximum(speed @ world.weights, 1e-12)))
-    clock = np.interp(np.linspace(0.0, ways[-1], PLACES + 1), ways, motion.times)
+    travelled = np.append(0.0, np.cumsum(h * np.maximum(speed @ world.weights, 1e-12)))
+    clock = np.interp(np.linspace(0.0, travelled[-1], PLACES + 1), travelled, motion.times)
 
     if len(motion.times) <= MOST_KNOTS:
         clock = np.unique(np.append(clock, motion.times))
@@ -79,9 +82,9 @@ def _course_of(world: World, motion: Trajectory) -> Course:
 
 def _faults_of_motion(world: World, motion: Trajectory) -> list[Fault]:
     """The first fault of each piece of a timed motion."""
-    found = faults_of(motion, world)
-    pieces, shares = _places_at(motion.times, np.array([moment for moment, _ in found]))
-    return [(k, x, reason) for k, x, (_, reason) in zip(pieces.tolist(), shares.tolist(), found, strict=True)]
+    faults = faults_of(motion, world)
+    pieces, shares = _places_at(motion.times, np.array([moment for moment, _ in faults]))
+    return [(k, x, reason) for k, x, (_, reason) in zip(pieces.tolist(), shares.tolist(), faults, strict=True)]
 
 
 def _places_at(times: Vector, clock: Vector) -> tuple[NDArray[np.int64], Vector]:
@@ -113,8 +116,8 @@ def _drawn_moves(motion: Trajectory, pieces: tuple[int, ...], clock: Vector) -> 
     """Numbers of the moves between drawn times that lie on some pieces, at least in part."""
     first = np.searchsorted(clock, motion.times[list(pieces)] + 10.0**-TIME_DIGITS, side="right") - 1
     end = np.searchsorted(clock, motion.times[[k + 1 for k in pieces]] - 10.0**-TIME_DIGITS, side="left")
-    found = {k for a, b in zip(first.tolist(), end.tolist(), strict=True) for k in range(a, max(b, a + 1))}
-    return tuple(sorted(k for k in found if k < len(clock) - 1))
+    moves = {k for a, b in zip(first.tolist(), end.tolist(), strict=True) for k in range(a, max(b, a + 1))}
+    return tuple(sorted(k for k in moves if k < len(clock) - 1))
 
 
 def _on_frames(motion: Trajectory, curve: ClearanceCurve, clock: Vector, unproven: tuple[int, ...]) -> ClearanceCurve:

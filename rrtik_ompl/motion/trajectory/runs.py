@@ -48,13 +48,13 @@ class Run:
     Attributes:
         pieces: Its cubics, m of them.
         places: Where on the path each begins, from the beginning of the path, shape (m,).
-        apart: How far from there the motion is, shape (m,) [rad or m].
+        deviations: How far from there the motion is, shape (m,) [rad or m].
         on_path: Which of them do not leave the path, shape (m,).
     """
 
     pieces: Pieces
     places: Vector
-    apart: Vector
+    deviations: Vector
     on_path: Mask
 
     @property
@@ -64,7 +64,12 @@ class Run:
 
 
 def runs(
-    corners: Matrix, radii: Vector, limits: RateLimits, *, room: float = np.inf, more: DynamicLimits | None = None
+    corners: Matrix,
+    radii: Vector,
+    limits: RateLimits,
+    *,
+    max_deviation: float = np.inf,
+    more: DynamicLimits | None = None,
 ) -> list[Run]:
     """The motions from stop to stop, each as fast as the limits allow.
 
@@ -72,21 +77,23 @@ def runs(
         corners: The vertices, shape (k, n).
         radii: How far from each inner one its rounding begins, shape (k - 2,); 0 for a stop.
         limits: Of n joints.
-        room: How far from the path the motion may be, if that can be.
+        max_deviation: How far from the path the motion may be, if that can be.
         more: Limits of the tip or of torques.
     """
     stops = [0, *(np.flatnonzero(radii == 0.0) + 1).tolist(), len(corners) - 1]
-    along = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    vertex_places = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     lines = along_lines(corners, limits) if more is None and (len(stops) > 2 or len(corners) == 2) else []
 
-    found = []
+    motions = []
     for first, last in pairwise(stops):
         if last == first + 1 and more is None:
-            found.append(_straight(lines[first], corners[first], along[first]))
+            motions.append(_straight(lines[first], corners[first], vertex_places[first]))
         else:
             curve = Curve.of(corners[first : last + 1], radii[first : last - 1])
-            found.append(along_curve(curve, limits, room=room, more=more, begin=along[first]))
-    return found
+            motions.append(
+                along_curve(curve, limits, max_deviation=max_deviation, more=more, begin=vertex_places[first])
+            )
+    return motions
 
 
 def _straight(pieces: Pieces, start: Vector, begin: float) -> Run:
@@ -98,7 +105,7 @@ def along_curve(
     curve: Curve,
     limits: RateLimits,
     *,
-    room: float = np.inf,
+    max_deviation: float = np.inf,
     more: DynamicLimits | None = None,
     begin: float = 0.0,
 ) -> Run:
@@ -107,7 +114,7 @@ def along_curve(
     Args:
         curve: From rest to rest.
         limits: Of its joints.
-        room: How far from the path the motion may be; kept where one of the windows does.
+        max_deviation: How far from the path the motion may be; kept where one of the windows does.
         more: Limits of the tip or of torques.
         begin: Where on the whole path the curve begins.
 
@@ -115,14 +122,14 @@ def along_curve(
         InputError: If numbers do not suffice.
     """
     grid, tightest = curve.grid()
-    shape = curve.at(grid)
-    extra = None if more is None else more.bounds(shape)
-    bends = _lengths(shape.bends)
-    slow = SMOOTHED_SHARE * tightest / np.maximum(bends, 1e-300)
+    samples = curve.at(grid)
+    extra = None if more is None else more.bounds(samples)
+    bends = _lengths(samples.bends)
+    max_squares = SMOOTHED_SHARE * tightest / np.maximum(bends, 1e-300)
 
-    splines = (_smooth(curve, (grid, shape, extra), slow, limits, attempt) for attempt in _attempts(limits))
-    tried = [_along(curve, spline if more is None else _slowed(spline, more), begin) for spline in splines]
-    return min(tried, key=lambda run: (run.apart.max() > room, run.duration))
+    splines = (_smooth(curve, (grid, samples, extra), max_squares, limits, attempt) for attempt in _attempts(limits))
+    motions = [_along(curve, spline if more is None else _slowed(spline, more), begin) for spline in splines]
+    return min(motions, key=lambda run: (run.deviations.max() > max_deviation, run.duration))
 
 
 def _attempts(limits: RateLimits) -> tuple[Attempt, ...]:
@@ -131,18 +138,23 @@ def _attempts(limits: RateLimits) -> tuple[Attempt, ...]:
 
 
 def _smooth(
-    curve: Curve, samples: tuple[Vector, Samples, Bounds | None], slow: Vector, limits: RateLimits, attempt: Attempt
+    curve: Curve,
+    grid_samples: tuple[Vector, Samples, Bounds | None],
+    max_squares: Vector,
+    limits: RateLimits,
+    attempt: Attempt,
 ) -> Spline:
     """The fastest motion that the windows of an attempt leave near the curve.
 
-    That is where the path speed squared, times a twenty-fourth of the window squared, is at most ``slow``, shape (m,).
+    That is where the path speed squared, times a twenty-fourth of the window squared, is at most ``max_squares``, of
+    shape (m,).
     """
     window = attempt.window * widest_window(limits)
-    grid, shape, extra = samples
+    grid, samples, extra = grid_samples
 
-    bounds = Bounds.capped(2.0 * slow / (window**2 / 12.0 + PERIOD**2 / 3.0))
+    bounds = Bounds.capped(2.0 * max_squares / (window**2 / 12.0 + PERIOD**2 / 3.0))
     bounds = bounds if extra is None else bounds.and_also(extra)
-    timing = fastest(grid, shape, limits, bounds)
+    timing = fastest(grid, samples, limits, bounds)
     if not np.isfinite(timing.duration) or timing.duration <= 0.0:
         raise InputError(
             f"no motion along {curve.length:.3g} rad or m could be calculated; choose limits of an ordinary size"
@@ -150,11 +162,11 @@ def _smooth(
 
     if attempt.cruises:
         cap = np.square((1.0 + CRUISE_SLACK) * timing.cruising(window))
-        timing = fastest(grid, shape, limits, bounds.and_also(Bounds.capped(cap)))
+        timing = fastest(grid, samples, limits, bounds.and_also(Bounds.capped(cap)))
 
-    step, count, most = steps_for(timing.duration, window, PERIOD)
+    step, count, window_steps = steps_for(timing.duration, window, PERIOD)
     places = timing.places(np.linspace(0.0, timing.duration, count + 1))
-    return smoothed(np.column_stack([curve.at(places).positions, places]), step, most, limits)
+    return smoothed(np.column_stack([curve.at(places).positions, places]), step, window_steps, limits)
 
 
 def _slowed(spline: Spline, more: DynamicLimits) -> Spline:
@@ -170,23 +182,24 @@ def _slowed(spline: Spline, more: DynamicLimits) -> Spline:
 
 def _along(curve: Curve, spline: Spline, begin: float) -> Run:
     """A spline in joints and place as the run that it is."""
-    knots, velocities, accelerations = (rows[:-1] for rows in spline.knots())
+    positions, velocities, accelerations = (rows[:-1] for rows in spline.knots())
     n = curve.vertices.shape[1]
-    apart = _lengths(knots[:, :n] - curve.path_at(knots[:, n]))
+    deviations = _lengths(positions[:, :n] - curve.path_at(positions[:, n]))
 
     # a piece lies among its four control points: on an edge, if all of them lie on it
     controls = spline.controls[:, :n]
-    at = spline.controls[:, n]
-    near = _lengths(controls - curve.path_at(at)) <= COINCIDENCE
-    edge = curve.edges(at)
-    count = len(knots)
-    on_path = (edge[:count] == edge[3 : 3 + count]) & np.logical_and.reduce([near[k : k + count] for k in range(4)])
+    control_places = spline.controls[:, n]
+    on_path_controls = _lengths(controls - curve.path_at(control_places)) <= COINCIDENCE
+    edge_of_control = curve.edges(control_places)
+    count = len(positions)
+    one_edge = edge_of_control[:count] == edge_of_control[3 : 3 + count]
+    on_path = one_edge & np.logical_and.reduce([on_path_controls[k : k + count] for k in range(4)])
 
-    pieces = Pieces(np.full(count, spline.step), knots[:, :n], velocities[:, :n], accelerations[:, :n])
-    return Run(pieces, begin + knots[:, n], apart, on_path)
+    pieces = Pieces(np.full(count, spline.step), positions[:, :n], velocities[:, :n], accelerations[:, :n])
+    return Run(pieces, begin + positions[:, n], deviations, on_path)
 
 
 def _lengths(rows: Matrix) -> Vector:
     """Of each row, shape (m,)."""
-    found: Vector = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    return found
+    lengths: Vector = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    return lengths

@@ -55,8 +55,8 @@ class Spline:
             (fourth - first + 5.0 * (third - second)) / (8.0 * self.step),
             (first - second - third + fourth) / (2.0 * self.step**2),
         )
-        found = [np.vstack(pair) for pair in zip(self.knots(), between, strict=True)]
-        return found[0], found[1], found[2]
+        rows = [np.vstack(pair) for pair in zip(self.knots(), between, strict=True)]
+        return rows[0], rows[1], rows[2]
 
     def slowed(self, factor: float) -> Spline:
         """The same, ``factor`` times as long."""
@@ -65,12 +65,12 @@ class Spline:
     def peaks(self) -> tuple[Vector, Vector, Vector]:
         """Bounds of velocity, acceleration and jerk of each coordinate, shape (n,) each; exact but for the first."""
         # joints in rows: numpy looks for the largest number along a row much faster than down a column
-        found = []
+        bounds = []
         rows = np.ascontiguousarray(self.controls.T)
         for power in (1, 2, 3):
             rows = rows[:, 1:] - rows[:, :-1]
-            found.append(np.maximum(rows.max(axis=1), -rows.min(axis=1)) / self.step**power)
-        return found[0], found[1], found[2]
+            bounds.append(np.maximum(rows.max(axis=1), -rows.min(axis=1)) / self.step**power)
+        return bounds[0], bounds[1], bounds[2]
 
 
 def widest_window(limits: RateLimits) -> float:
@@ -86,23 +86,23 @@ def steps_for(duration: float, window: float, period: float) -> tuple[float, int
         window: The widest one [s].
         period: The least step [s].
     """
-    least = max(period, window / MOST_STEPS, duration / MOST_PIECES)
-    count = max(int(duration / least), LEAST_PIECES)
+    min_step = max(period, window / MOST_STEPS, duration / MOST_PIECES)
+    count = max(int(duration / min_step), LEAST_PIECES)
     step = max(duration / count, period)
     return step, count, max(1, min(int(np.ceil(window / step)), MOST_STEPS))
 
 
-def smoothed(rows: Matrix, step: float, most: int, limits: RateLimits) -> Spline:
-    """The shortest spline that keeps the limits, over some windows of up to ``most`` steps.
+def smoothed(rows: Matrix, step: float, max_steps: int, limits: RateLimits) -> Spline:
+    """The shortest spline that keeps the limits, over some windows of up to ``max_steps`` steps.
 
     Args:
         rows: The motion at even steps from rest to rest, shape (m, k): coordinates of joints, then any others.
         step: Between two rows [s].
-        most: The widest window, 1 or more.
+        max_steps: The widest window, 1 or more.
         limits: Of the joints, the first columns.
     """
     n = len(limits.velocity)
-    widths = {int(np.ceil(share * most)) for share in WIDTHS}
+    widths = {int(np.ceil(share * max_steps)) for share in WIDTHS}
     splines = (Spline(controls, step) for controls in _means(rows, widths))
     timed = (spline.slowed(slowing(Spline(spline.controls[:, :n], step), limits)) for spline in splines)
     return min(timed, key=lambda spline: spline.duration)
@@ -112,21 +112,21 @@ def slowing(spline: Spline, limits: RateLimits) -> float:
     """Factor by which a spline must be slowed to keep the limits, 1 or more."""
     bounds = (limits.velocity, limits.acceleration, limits.jerk)
     shares = [float((peak / bound).max()) for peak, bound in zip(spline.peaks(), bounds, strict=True)]
-    most: float = max(share ** (1.0 / power) for power, share in enumerate(shares, start=1))
-    return max(1.0, most * ROUNDING_MARGIN)
+    factor: float = max(share ** (1.0 / power) for power, share in enumerate(shares, start=1))
+    return max(1.0, factor * ROUNDING_MARGIN)
 
 
 def _means(rows: Matrix, widths: set[int]) -> Iterator[Matrix]:
     """Control points: means over windows of so many rows, with as many more at both ends as the spline needs."""
     first = rows[:1]
-    gaps = rows - first
+    offsets = rows - first
     total = np.zeros((len(rows) - 1, rows.shape[1]))
 
     # sums over windows of ever more rows, each from those before
     for width in range(1, max(widths) + 1):
-        rest = np.broadcast_to((width - 1) * gaps[-1], (1, rows.shape[1]))
-        total = np.vstack([total, rest])
-        total[width - 1 :] += gaps
+        last_rows = np.broadcast_to((width - 1) * offsets[-1], (1, rows.shape[1]))
+        total = np.vstack([total, last_rows])
+        total[width - 1 :] += offsets
         if width in widths:
             mean = first + total / width
             yield np.vstack([mean[[0, 0]], mean, mean[[-1, -1]]])

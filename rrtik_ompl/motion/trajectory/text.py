@@ -43,8 +43,13 @@ def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Seque
 
 
 def _header(names: Iterable[str]) -> list[str]:
-    own = list(names)
-    return ["time", *own, *(f"{name} velocity" for name in own), *(f"{name} acceleration" for name in own)]
+    joint_names = list(names)
+    return [
+        "time",
+        *joint_names,
+        *(f"{name} velocity" for name in joint_names),
+        *(f"{name} acceleration" for name in joint_names),
+    ]
 
 
 def written_ending(file: str | os.PathLike[str]) -> str:
