@@ -47,14 +47,14 @@ RobotOption: TypeAlias = (
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
 FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
 PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
-OF_CALLERS = ("trust_xacro", "xacro_limits")  # which no file may give
-OF_ALL: Mapping[str, Callable[..., Robot]] = {  # options of any robot
+CALLER_OPTIONS = ("trust_xacro", "xacro_limits")  # which no file may give
+COMMON_OPTIONS: Mapping[str, Callable[..., Robot]] = {  # of any robot, each with what applies it
     "scale": scaled,
     "padding": padded,
     "joint_ranges": narrowed,
     "joint_weights": weighted,
 }
-MOUNTING = ("base_pose", "tip", *OF_ALL)  # keys that stand beside that group
+MOUNTING = ("base_pose", "tip", *COMMON_OPTIONS)  # keys that stand beside that group
 
 _cache = RobotCache()
 
@@ -171,25 +171,26 @@ def load_robot(
     """
     recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
     for option in options:
-        if option not in (*recipe.options, *OF_ALL):
-            takes = ", ".join(sorted((*recipe.options, *OF_ALL)))
+        if option not in (*recipe.options, *COMMON_OPTIONS):
+            takes = ", ".join(sorted((*recipe.options, *COMMON_OPTIONS)))
             raise InputError(f"robot '{os.fspath(name)}' takes no option '{option}'; it takes {takes}")
 
-    given = {key: _absolute(key, value) for key, value in options.items() if value is not None}
-    if "base_pose" in given:
-        given["base_pose"] = base_pose(given["base_pose"], f"robot '{os.fspath(name)}': base_pose")
+    values = {key: _absolute(key, value) for key, value in options.items() if value is not None}
+    if "base_pose" in values:
+        values["base_pose"] = base_pose(values["base_pose"], f"robot '{os.fspath(name)}': base_pose")
 
-    key = json.dumps([recipe.target, plain(given)], sort_keys=True, default=repr)
-    cached = _cache.get(key)
-    if cached is None:
+    key = json.dumps([recipe.target, plain(values)], sort_keys=True, default=repr)
+    loaded = _cache.get(key)
+    if loaded is None:
         with expanding(trusted=trust_xacro, limits=xacro_limits):
-            robot = recipe.make(**{option: value for option, value in given.items() if option not in OF_ALL})
-        for option, of_all in OF_ALL.items():
-            robot = of_all(robot, given[option]) if option in given else robot
-        files = [recipe.target, *recipe.beside, *_paths(given), *_paths(robot.source)]
-        cached = _cache.put(key, replace(robot, source=recipe.source(given)), files)
+            robot = recipe.make(**{option: value for option, value in values.items() if option not in COMMON_OPTIONS})
+        for option, apply_option in COMMON_OPTIONS.items():
+            if option in values:
+                robot = apply_option(robot, values[option])
+        files = [recipe.target, *recipe.further_files, *_option_files(values), *_option_files(robot.source)]
+        loaded = _cache.put(key, replace(robot, source=recipe.source(values)), files)
 
-    return cached
+    return loaded
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,14 +201,14 @@ class _Recipe:
     target: str
     make: Callable[..., Robot]
     options: tuple[str, ...]
-    beside: tuple[str, ...] = ()  # files that say how to make it, besides the target and the options
+    further_files: tuple[str, ...] = ()  # files that say how to make it, besides the target and the options
 
-    def source(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        options = source_entry(given)
+    def source(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        options = source_entry(values)
         if self.target not in PARAMETRIC:
             return {self.kind: self.target} | options
-        beside = {key: options.pop(key) for key in MOUNTING if key in options}
-        return {self.target: options} | beside
+        mounting = {key: options.pop(key) for key in MOUNTING if key in options}
+        return {self.target: options} | mounting
 
 
 def _recipe(name: str | os.PathLike[str]) -> _Recipe:
@@ -236,8 +237,10 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
         from rrtik_ompl.description.moveit_config import CHOOSING_FILES, CONFIG_OPTIONS, robot_from_moveit
 
         target = path.resolve()
-        beside = tuple(str(target / file) for file in CHOOSING_FILES)
-        return _Recipe("moveit", str(target), lambda **given: robot_from_moveit(path, **given), CONFIG_OPTIONS, beside)
+        choosing_files = tuple(str(target / file) for file in CHOOSING_FILES)
+        return _Recipe(
+            "moveit", str(target), lambda **given: robot_from_moveit(path, **given), CONFIG_OPTIONS, choosing_files
+        )
 
     if path.parent != Path() or os.path.exists(path):  # which takes a name of any length
         raise InputError(f"{text}: not a robot file; expected a URDF (.urdf, .xacro), a DH table (.yaml) or a folder")
@@ -251,11 +254,11 @@ def _absolute(key: str, value: object) -> object:
     if key == "packages" and isinstance(value, (str, os.PathLike)):
         return [Path(value).absolute()]
     if key == "packages" and isinstance(value, Iterable):
-        return [Path(item).absolute() for item in value]
+        return [Path(folder).absolute() for folder in value]
     return value
 
 
-def _paths(options: Mapping[str, Any]) -> list[str]:
+def _option_files(options: Mapping[str, Any]) -> list[str]:
     return [os.fspath(options[key]) for key in FILE_OPTIONS if isinstance(options.get(key), (str, os.PathLike))]
 
 
@@ -280,16 +283,20 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
         InputError: If the entry has another form, or the robot cannot be loaded.
     """
     if isinstance(entry, str):
-        return load_robot(_beside(entry, folder) if Path(entry).suffix.lower() in FILE_KINDS else entry)
+        return load_robot(_in_folder(entry, folder) if Path(entry).suffix.lower() in FILE_KINDS else entry)
 
     kinds = ("name", "moveit", "mjcf", "urdf", "dh", *PARAMETRIC)
     if not isinstance(entry, Mapping):
         raise InputError(f"robot: expected a name or one of the keys {', '.join(kinds)}")
-    _refuse_words_of_callers(entry)
-    found = [key for key in kinds if key in entry and not (key == "urdf" and "moveit" in entry)]
-    if len(found) != 1:
-        raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {', '.join(found) or 'none'}")
-    kind = found[0]
+    _refuse_caller_options(entry)
+
+    present = [key for key in kinds if key in entry]
+    if "moveit" in present and "urdf" in present:
+        present.remove("urdf")  # there it is an option: the URDF that is read in place of the folder's
+    if len(present) != 1:
+        listed = ", ".join(present) or "none"
+        raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {listed}")
+    kind = present[0]
     options: dict[str, Any] = {key: _resolved(key, value, folder) for key, value in entry.items() if key != kind}
 
     if kind in PARAMETRIC:
@@ -300,26 +307,27 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
     target = entry[kind]
     if not isinstance(target, str):
         raise InputError(f"robot: {kind}: expected text, found {target!r}")
-    return load_robot(target if kind == "name" else _beside(target, folder), **options)
+    return load_robot(target if kind == "name" else _in_folder(target, folder), **options)
 
 
-def _refuse_words_of_callers(entry: Mapping[str, object]) -> None:
-    for key in OF_CALLERS:
+def _refuse_caller_options(entry: Mapping[str, object]) -> None:
+    """Refuse options in a file that only whoever opens it may give: a file must not say that it is to be trusted."""
+    for key in CALLER_OPTIONS:
         if key in entry:
             raise InputError(f"robot: {key} is for whoever opens the file to give, not for the file; take it out")
 
 
 def _resolved(key: str, value: object, folder: str | os.PathLike[str]) -> object:
     if key in FILE_OPTIONS and isinstance(value, str):
-        return _beside(value, folder)
+        return _in_folder(value, folder)
     if key == "packages" and isinstance(value, str):
-        return [_beside(value, folder)]
+        return [_in_folder(value, folder)]
     if key == "packages" and isinstance(value, Iterable) and not isinstance(value, Mapping):
-        return [_beside(str(item), folder) for item in value]
+        return [_in_folder(str(item), folder) for item in value]
     return value
 
 
-def _beside(path: str, folder: str | os.PathLike[str]) -> Path:
+def _in_folder(path: str, folder: str | os.PathLike[str]) -> Path:
     return Path(folder) / path
 
 

@@ -35,17 +35,17 @@ def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> di
         InputError: If the file cannot be read, or a name, key or value in it makes no sense; with its line.
     """
     document = read_yaml(path)
-    known = tuple(joints)
-    top, found = parameters(document, "robot_description_planning")
-    table = found.get("joint_limits")
+    joint_names = tuple(joints)
+    top, section = parameters(document, "robot_description_planning")
+    table = section.get("joint_limits")
     if not isinstance(table, Mapping):
         raise document.error((*top, "joint_limits"), "expected 'joint_limits:' with one group of keys per joint")
 
     limits = {}
     for joint, values in table.items():
         location: Location = (*top, "joint_limits", joint)
-        if joint not in known:
-            raise UnknownNameError("joint", joint, known, where=document.place(location))
+        if joint not in joint_names:
+            raise UnknownNameError("joint", joint, joint_names, where=document.place(location))
         if not isinstance(values, Mapping):
             raise document.error(location, f"expected keys such as max_velocity, found {describe(values)}")
         limits[joint] = _joint(document, location, values)
@@ -62,19 +62,19 @@ def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]
         if key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False:  # else MoveIt writes 0
             _number(document, (*location, key), value, positive=not key.endswith("position"))
 
-    found: dict[str, float | None] = {}
+    limits: dict[str, float | None] = {}
     for rate in RATES:
-        has = values.get(f"has_{rate}_limits")
-        found[rate] = np.inf if has is False else values.get(f"max_{rate}")
+        flag = values.get(f"has_{rate}_limits")
+        limits[rate] = np.inf if flag is False else values.get(f"max_{rate}")
     if values.get("has_position_limits") is not False:
-        found |= {"lower": values.get("min_position"), "upper": values.get("max_position")}
+        limits |= {"lower": values.get("min_position"), "upper": values.get("max_position")}
 
-    low = found.get("lower")
-    high = found.get("upper")
-    if low is not None and high is not None and low >= high:
-        raise document.error((*location, "min_position"), f"{low:g} is not below max_position {high:g}; swap them")
+    lower = limits.get("lower")
+    upper = limits.get("upper")
+    if lower is not None and upper is not None and lower >= upper:
+        raise document.error((*location, "min_position"), f"{lower:g} is not below max_position {upper:g}; swap them")
 
-    return JointLimits(**{key: None if value is None else float(value) for key, value in found.items()})
+    return JointLimits(**{key: None if value is None else float(value) for key, value in limits.items()})
 
 
 def _number(document: YamlDocument, location: Location, value: object, *, positive: bool) -> None:
@@ -86,10 +86,10 @@ def _number(document: YamlDocument, location: Location, value: object, *, positi
 
 def unread_limits(path: str | os.PathLike[str]) -> list[str]:
     """What a file that :func:`read_joint_limits` takes says about limits and is not read: "max_deceleration of 'a'"."""
-    _, found = parameters(read_yaml(path), "robot_description_planning")
-    named: dict[str, list[str]] = {}
-    for joint, values in found["joint_limits"].items():
+    _, section = parameters(read_yaml(path), "robot_description_planning")
+    joints_of_key: dict[str, list[str]] = {}
+    for joint, values in section["joint_limits"].items():
         for key, flag in _NARROWING.items():
             if values.get(key) is not None and values.get(f"has_{flag}_limits") is not False:
-                named.setdefault(key, []).append(f"'{joint}'")
-    return [f"{key} of {few(joints, 3)}" for key, joints in named.items()]
+                joints_of_key.setdefault(key, []).append(f"'{joint}'")
+    return [f"{key} of {few(joints, 3)}" for key, joints in joints_of_key.items()]

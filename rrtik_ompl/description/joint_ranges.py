@@ -34,25 +34,25 @@ def narrowed(robot: Robot, ranges: Mapping[str, Sequence[float]]) -> Robot:
 
     lower = robot.lower.copy()
     upper = robot.upper.copy()
-    kept: dict[str, list[float]] = {}
-    for joint, given in ranges.items():
+    applied: dict[str, list[float]] = {}
+    for joint, bounds in ranges.items():
         if joint not in robot.joint_names:
             raise UnknownNameError(f"actuated joint of robot '{robot.name}'", joint, robot.joint_names)
-        what = f"joint_ranges of robot '{robot.name}': {joint}"
-        low, high = finite_array(given, (2,), what)
+        subject = f"joint_ranges of robot '{robot.name}': {joint}"
+        wanted_low, wanted_high = finite_array(bounds, (2,), subject)
         k = robot.joint_names.index(joint)
         if robot.continuous[k]:
-            raise InputError(f"{what}: it turns without limits; give it limits in the robot's description")
+            raise InputError(f"{subject}: it turns without limits; give it limits in the robot's description")
 
-        first = max(low, lower[k])
-        last = min(high, upper[k])
-        if not first < last:
+        new_lower = max(wanted_low, lower[k])
+        new_upper = min(wanted_high, upper[k])
+        if not new_lower < new_upper:
             limits = f"its limits are {lower[k]:g} to {upper[k]:g}"
-            raise InputError(f"{what}: {low:g} to {high:g} leaves it no room, {limits}")
+            raise InputError(f"{subject}: {wanted_low:g} to {wanted_high:g} leaves it no room, {limits}")
 
-        lower[k] = first
-        upper[k] = last
-        kept[joint] = [float(low), float(high)]
+        lower[k] = new_lower
+        upper[k] = new_upper
+        applied[joint] = [float(wanted_low), float(wanted_high)]
 
-    source = dict(robot.source) | {"joint_ranges": dict(robot.source.get("joint_ranges", {})) | kept}
+    source = dict(robot.source) | {"joint_ranges": dict(robot.source.get("joint_ranges", {})) | applied}
     return replace(robot, lower=frozen(lower), upper=frozen(upper), source=MappingProxyType(source))

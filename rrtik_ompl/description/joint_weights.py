@@ -31,8 +31,8 @@ def weights_as_costs(robot: Robot) -> dict[str, list[float]]:
 
 def weighted_difference(robot: Robot, Q: Matrix, q: Vector) -> Matrix:
     """``Q - q`` per joint, the short way round, multiplied by the weights. Shape of Q, (..., dof)."""
-    away = joint_difference(robot, Q, q)
-    return away * weights_of(robot) if robot.joint_weights else away
+    difference = joint_difference(robot, Q, q)
+    return difference * weights_of(robot) if robot.joint_weights else difference
 
 
 @lru_cache(maxsize=64)
@@ -72,10 +72,10 @@ def weighted(robot: Robot, weights: Mapping[str, float]) -> Robot:
     require(robot, Robot, "robot to weight", "use load_robot(name or file)")
     require(weights, Mapping, f"joint weights of robot '{robot.name}'", "use {name of a joint: weight}")
 
-    given = by_name(robot, "joint_weights", "joint", robot.joint_names, weights, _in_range)
-    source = dict(robot.source) | {"joint_weights": dict(given)}
-    kept = {joint: weight for joint, weight in given.items() if weight != 1.0}
-    return replace(robot, joint_weights=MappingProxyType(kept), source=MappingProxyType(source))
+    weight_of_joint = by_name(robot, "joint_weights", "joint", robot.joint_names, weights, _in_range)
+    source = dict(robot.source) | {"joint_weights": dict(weight_of_joint)}
+    not_one = {joint: weight for joint, weight in weight_of_joint.items() if weight != 1.0}
+    return replace(robot, joint_weights=MappingProxyType(not_one), source=MappingProxyType(source))
 
 
 def _in_range(weight: float, what: str) -> float:

@@ -41,8 +41,8 @@ def robot_from_moveit(folder: FilePath, **options: Any) -> Robot:
     Raises:
         InputError: If a file is missing or cannot be used; one line names it and the remedy.
     """
-    found = {**options, **config_files(folder, options)}
-    return robot_from_urdf(found.pop("urdf"), **found)
+    values = {**options, **config_files(folder, options)}
+    return robot_from_urdf(values.pop("urdf"), **values)
 
 
 def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -59,25 +59,25 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
         raise InputError(f"{folder}: no such folder; give a MoveIt configuration folder")
 
     packages = package_roots(given.get("packages", ()))
-    named = _assistant(home, config)
-    srdf = given.get("srdf") or _srdf(home, config, named)
-    urdf = Path(given.get("urdf") or _urdf(home, config, named, packages))
+    assistant = _assistant(home, config)
+    srdf = given.get("srdf") or _srdf(home, config, assistant)
+    urdf = Path(given.get("urdf") or _urdf(home, config, assistant, packages))
 
-    found: dict[str, Any] = {"urdf": urdf, "srdf": Path(srdf)}
+    files: dict[str, Any] = {"urdf": urdf, "srdf": Path(srdf)}
     arguments = dict(given.get("xacro_args") or {})
     if is_xacro(urdf) and not given.get("urdf"):
-        arguments = _xacro_args(home, named) | arguments
+        arguments = _xacro_args(home, assistant) | arguments
     if arguments:
-        found["xacro_args"] = arguments
+        files["xacro_args"] = arguments
 
     limits = given.get("joint_limits") or config / "joint_limits.yaml"
     if given.get("joint_limits") or os.path.isfile(limits):
-        found["joint_limits"] = Path(limits)
+        files["joint_limits"] = Path(limits)
 
     if given.get("group") is None and given.get("joints") is None:
-        found["group"] = _group(home, config, found, packages)
+        files["group"] = _group(home, config, files, packages)
 
-    return found
+    return files
 
 
 def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
@@ -93,8 +93,8 @@ def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
     return {str(key).lower(): value for key, value in top.items() if isinstance(value, Mapping)}
 
 
-def _srdf(home: Path, config: Path, named: Mapping[str, Any]) -> Path:
-    relative = named.get("srdf", {}).get("relative_path")
+def _srdf(home: Path, config: Path, assistant: Mapping[str, Any]) -> Path:
+    relative = assistant.get("srdf", {}).get("relative_path")
     if isinstance(relative, str) and os.path.isfile(home / relative):
         return home / relative
     return _only(config, ("*.srdf", "*.srdf.xacro"), "SRDF", "srdf") or _missing(config, "SRDF", "srdf")
@@ -103,13 +103,15 @@ def _srdf(home: Path, config: Path, named: Mapping[str, Any]) -> Path:
 def _only(config: Path, patterns: Iterable[str], kind: str, option: str) -> Path | None:
     """The only file of the first pattern that any file has; None if none has. Those for Gazebo must be asked for."""
     for pattern in patterns:
-        asked_for = pattern.startswith(SIMULATED)
-        found = sorted(file for file in config.glob(pattern) if asked_for or not file.name.startswith(SIMULATED))
-        if len(found) > 1:
-            names = ", ".join(each.name for each in found)
-            raise InputError(f"{config}: {len(found)} files are an {kind}: {names}; choose one by {option}=FILE")
-        if found:
-            return found[0]
+        includes_simulated = pattern.startswith(SIMULATED)
+        files = sorted(
+            file for file in config.glob(pattern) if includes_simulated or not file.name.startswith(SIMULATED)
+        )
+        if len(files) > 1:
+            names = ", ".join(each.name for each in files)
+            raise InputError(f"{config}: {len(files)} files are an {kind}: {names}; choose one by {option}=FILE")
+        if files:
+            return files[0]
     return None
 
 
@@ -117,41 +119,41 @@ def _missing(config: Path, kind: str, option: str) -> Path:
     raise InputError(f"{config}: no {kind} in this folder; is it of MoveIt? give {option}=FILE")
 
 
-def _urdf(home: Path, config: Path, named: Mapping[str, Any], packages: Iterable[Path]) -> Path:
-    own = _only(config, ("*.urdf",), "URDF", "urdf")
-    if own is not None:
-        return own
+def _urdf(home: Path, config: Path, assistant: Mapping[str, Any], packages: Iterable[Path]) -> Path:
+    urdf = _only(config, ("*.urdf",), "URDF", "urdf")
+    if urdf is not None:
+        return urdf
 
-    package, relative = (named.get("urdf", {}).get(key) for key in ("package", "relative_path"))
-    where = package_folder(package, home.resolve(), packages) if isinstance(package, str) else None
-    if where is not None and isinstance(relative, str) and os.path.isfile(where / relative):
-        return where / relative
+    package, relative = (assistant.get("urdf", {}).get(key) for key in ("package", "relative_path"))
+    package_home = package_folder(package, home.resolve(), packages) if isinstance(package, str) else None
+    if package_home is not None and isinstance(relative, str) and os.path.isfile(package_home / relative):
+        return package_home / relative
 
-    own = _only(config, ("*.urdf.xacro",), "URDF", "urdf") or _only(config, (f"{SIMULATED}*.urdf",), "URDF", "urdf")
-    if own is None and isinstance(package, str):
+    urdf = _only(config, ("*.urdf.xacro",), "URDF", "urdf") or _only(config, (f"{SIMULATED}*.urdf",), "URDF", "urdf")
+    if urdf is None and isinstance(package, str):
         raise InputError(
             f"{home / ASSISTANT}: the URDF {relative} of package '{package}' is not found; "
             f"give packages=[the folder that holds '{package}'], or urdf=FILE"
         )
-    return own or _missing(config, "URDF", "urdf")
+    return urdf or _missing(config, "URDF", "urdf")
 
 
-def _xacro_args(home: Path, named: Mapping[str, Any]) -> dict[str, str]:
+def _xacro_args(home: Path, assistant: Mapping[str, Any]) -> dict[str, str]:
     """Arguments with which the setup assistant has expanded the URDF, as behind the command xacro.
 
     One text, or a list of words; words such as ``--inorder`` are switches of the command and not for the macros.
     """
-    given = named.get("urdf", {}).get("xacro_args") or ""
-    texts = given if isinstance(given, list) else [given]
-    found = {}
+    written = assistant.get("urdf", {}).get("xacro_args") or ""
+    texts = written if isinstance(written, list) else [written]
+    arguments = {}
     for word in (word for text in texts for word in str(text).split()):
         name, assigned, value = word.partition(":=")
         if assigned and name:
-            found[name] = value
+            arguments[name] = value
         elif not name.startswith("-"):
             raise InputError(f"{home / ASSISTANT}: xacro_args: expected words such as name:=value, found '{word}'")
 
-    return found
+    return arguments
 
 
 def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Path]) -> str:
@@ -163,11 +165,11 @@ def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Pa
 
     sizes = {name: _size(semantics, name, tree) for name in semantics.groups}
     moving = [name for name, size in sizes.items() if size > 0]
-    solved = _solved(config, semantics)
-    grippers = _grippers(semantics, sizes, solved)
+    with_solver = _solved(config, semantics)
+    grippers = _grippers(semantics, sizes, with_solver)
     arms = [name for name in moving if name not in grippers] or moving
 
-    for names in ([name for name in arms if name in solved], arms):
+    for names in ([name for name in arms if name in with_solver], arms):
         if len(names) == 1:
             return names[0]
 
@@ -189,11 +191,11 @@ def _solved(config: Path, semantics: Srdf) -> set[str]:
     if not os.path.isfile(file):
         return set()
     document = read_yaml(file)
-    top, found = parameters(document, "robot_description_kinematics")
-    for name in found:
+    top, section = parameters(document, "robot_description_kinematics")
+    for name in section:
         if name not in semantics.groups:
             raise UnknownNameError("group", name, semantics.groups, where=document.place((*top, name)))
-    return set(found)
+    return set(section)
 
 
 def _grippers(semantics: Srdf, sizes: Mapping[str, int], solved: set[str]) -> set[str]:
@@ -201,10 +203,10 @@ def _grippers(semantics: Srdf, sizes: Mapping[str, int], solved: set[str]) -> se
 
     Where another one has as many, a solver tells.
     """
-    found = set()
+    grippers = set()
     for end in semantics.end_effectors:
         if end.group in sizes and end.group != end.parent_group:
-            most = max((size for name, size in sizes.items() if name != end.group), default=0)
-            if (sizes[end.group], end.group in solved) <= (most, False):
-                found.add(end.group)
-    return found
+            most_joints = max((size for name, size in sizes.items() if name != end.group), default=0)
+            if (sizes[end.group], end.group in solved) <= (most_joints, False):
+                grippers.add(end.group)
+    return grippers

@@ -100,34 +100,36 @@ def build_robot(
     Raises:
         InputError: If a joint, frame or limit does not make sense; the message names it.
     """
-    ties = {m.joint: m for m in mimics}
+    mimic_of = {m.joint: m for m in mimics}
     movable = {joint.name: joint for joint in tree.walk() if joint.moves}
-    actuated = tuple(joints) if joints is not None else tuple(n for n in movable if n not in ties)
-    _check_joints(name, tuple(movable), actuated, ties, locked or {})
+    actuated = tuple(joints) if joints is not None else tuple(n for n in movable if n not in mimic_of)
+    _check_joints(name, tuple(movable), actuated, mimic_of, locked or {})
 
-    for tie in ties.values():
+    for tie in mimic_of.values():
         if movable[tie.joint].slides and movable[tie.source].endless:
             raise InputError(
                 f"robot '{name}': prismatic joint '{tie.joint}' mimics '{tie.source}', which turns without end; "
                 "give that one limits"
             )
 
-    limited = _followed(name, movable, actuated, ties, limits or {})
-    held = _held_values(name, limited, actuated, ties, locked or {})
-    model, collision, looks = build_models(tree.hold(held), checked_base(base_pose, f"robot '{name}': base_pose"))
+    limits_of_joint = _followed(name, movable, actuated, mimic_of, limits or {})
+    held_values = _held_values(name, limits_of_joint, actuated, mimic_of, locked or {})
+    model, collision, visual = build_models(
+        tree.hold(held_values), checked_base(base_pose, f"robot '{name}': base_pose")
+    )
 
     tip_name = _last_link(name, tree, actuated) if tip is None else name_of(tip, f"the tip of robot '{name}'")
     if not model.existFrame(tip_name):
         raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
 
-    chain = _chain(model, actuated, ties)
-    whole = chain.whole_turns()
+    chain = _chain(model, actuated, mimic_of)
+    whole_turns_alike = chain.whole_turns()
     moving = [movable[joint] for joint in actuated]
-    limited |= _periods(name, moving, limited, ties, whole)
-    bounds = _limits(name, moving, limited)
+    limits_of_joint |= _periods(name, moving, limits_of_joint, mimic_of, whole_turns_alike)
+    bounds = _limits(name, moving, limits_of_joint)
 
-    named = {
-        key: frozen(_turned_inside(np.array([values[j] for j in actuated]), bounds, whole))
+    named_postures = {
+        key: frozen(_turned_inside(np.array([values[j] for j in actuated]), bounds, whole_turns_alike))
         for key, values in (postures or {}).items()
         if all(j in values for j in actuated)
     }
@@ -137,13 +139,13 @@ def build_robot(
         joint_names=actuated,
         movable=frozenset(movable),
         tip=tip_name,
-        postures=MappingProxyType(named),
+        postures=MappingProxyType(named_postures),
         allowed_collisions=_pairs(allowed_collisions),
         checked_collisions=_pairs(checked_collisions),
         unchecked_solids=_pairs(unchecked_solids),
         model=model,
         collision=collision,
-        looks=looks,
+        looks=visual,
         chain=chain,
         self_collision=self_collision,
         closed_form=closed_form,
@@ -178,7 +180,7 @@ def _followed(
     name: str,
     movable: Mapping[str, Joint],
     actuated: tuple[str, ...],
-    ties: Mapping[str, Mimic],
+    mimic_of: Mapping[str, Mimic],
     given: Mapping[str, JointLimits],
 ) -> dict[str, dict[str, float]]:
     """The limits of all movable joints, each cut so that what follows the joint stays within its own.
@@ -186,22 +188,22 @@ def _followed(
     Raises:
         InputError: If no value of an actuated joint is within its limits and those of one that follows it.
     """
-    own = {joint.name: _own_limits(joint, given.get(joint.name)) for joint in movable.values()}
-    found = dict(own)
+    own_limits = {joint.name: _own_limits(joint, given.get(joint.name)) for joint in movable.values()}
+    limits = dict(own_limits)
 
-    for tie in ties.values():
-        leader = found[tie.source]
-        follower = own[tie.joint]
-        cut = _cut(leader, follower, tie)
-        if cut["lower"] < cut["upper"]:
-            found[tie.source] = cut
+    for tie in mimic_of.values():
+        leader = limits[tie.source]
+        follower = own_limits[tie.joint]
+        narrowed = _limits_kept_by_follower(leader, follower, tie)
+        if narrowed["lower"] < narrowed["upper"]:
+            limits[tie.source] = narrowed
         elif tie.source in actuated and leader["lower"] < leader["upper"]:
             raise InputError(
                 f"robot '{name}': no value of joint '{tie.source}' within {leader['lower']:g} .. {leader['upper']:g} "
                 f"keeps joint '{tie.joint}', which follows it as {tie.multiplier:g} x + {tie.offset:g}, within its "
                 f"limits {follower['lower']:g} .. {follower['upper']:g}; correct the limits, or how it follows"
             )
-    return found
+    return limits
 
 
 def _own_limits(joint: Joint, given: JointLimits | None) -> dict[str, float]:
@@ -216,35 +218,43 @@ def _own_limits(joint: Joint, given: JointLimits | None) -> dict[str, float]:
     return limits | {key: value for key in limits if (value := getattr(given, key, None)) is not None}
 
 
-def _cut(leader: Mapping[str, float], follower: Mapping[str, float], tie: Mimic) -> dict[str, float]:
+def _limits_kept_by_follower(
+    leader: Mapping[str, float], follower: Mapping[str, float], tie: Mimic
+) -> dict[str, float]:
     """Limits of a joint that are kept where what follows it keeps its own. Torques are not compared: none is known."""
     if tie.multiplier == 0.0:  # it stands still
-        inside = follower["lower"] - LIMIT_TOLERANCE <= tie.offset <= follower["upper"] + LIMIT_TOLERANCE
-        return dict(leader) if inside else {**leader, "lower": np.inf}
+        is_kept = follower["lower"] - LIMIT_TOLERANCE <= tie.offset <= follower["upper"] + LIMIT_TOLERANCE
+        return dict(leader) if is_kept else {**leader, "lower": np.inf}
 
-    ends = [(follower[key] - tie.offset) / tie.multiplier for key in ("lower", "upper")]
+    values_at_limits = [(follower[key] - tie.offset) / tie.multiplier for key in ("lower", "upper")]
     rates = {key: min(leader[key], follower[key] / abs(tie.multiplier)) for key in RATES}
-    return {"lower": max(leader["lower"], min(ends)), "upper": min(leader["upper"], max(ends)), **rates}
+    return {
+        "lower": max(leader["lower"], min(values_at_limits)),
+        "upper": min(leader["upper"], max(values_at_limits)),
+        **rates,
+    }
 
 
 def _held_values(
     name: str,
     limits: Mapping[str, Mapping[str, float]],
     actuated: tuple[str, ...],
-    ties: Mapping[str, Mimic],
+    mimic_of: Mapping[str, Mimic],
     locked: Mapping[str, float],
 ) -> dict[str, float]:
     """Value of every joint that is neither actuated nor follows an actuated one."""
     values: dict[str, float] = {}
-    for joint, own in limits.items():
-        given = locked.get(joint, min(max(0.0, own["lower"]), own["upper"]))
-        values[joint] = float(bounded_array(given, (), f"robot '{name}': locked value of joint '{joint}'"))
+    for joint, joint_limits in limits.items():
+        value = locked.get(joint, min(max(0.0, joint_limits["lower"]), joint_limits["upper"]))
+        values[joint] = float(bounded_array(value, (), f"robot '{name}': locked value of joint '{joint}'"))
 
-    for tie in ties.values():
+    for tie in mimic_of.values():
         if tie.joint not in locked:
             values[tie.joint] = tie.multiplier * values[tie.source] + tie.offset
 
-    moving = {joint for joint in limits if joint in actuated or (joint in ties and ties[joint].source in actuated)}
+    moving = {
+        joint for joint in limits if joint in actuated or (joint in mimic_of and mimic_of[joint].source in actuated)
+    }
     return {joint: value for joint, value in values.items() if joint not in moving}
 
 
@@ -260,19 +270,19 @@ def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
         return sum(joint.name in actuated for joint in above), sum(joint.moves for joint in above)
 
     leaves = [link.name for link in tree.links if link.name not in parents]
-    found = max(reversed(leaves), key=rank)
-    others = [leaf for leaf in leaves if leaf != found and rank(leaf)[0]]
+    tip = max(reversed(leaves), key=rank)
+    others = [leaf for leaf in leaves if leaf != tip and rank(leaf)[0]]
 
     if others:
-        some = ", ".join(others[:4]) + (", ..." if len(others) > 4 else "")
-        message = f"robot '{name}': the tip is taken to be '{found}'; tip= names another link, such as {some}"
+        examples = ", ".join(others[:4]) + (", ..." if len(others) > 4 else "")
+        message = f"robot '{name}': the tip is taken to be '{tip}'; tip= names another link, such as {examples}"
         warnings.warn(TipWarning(message), stacklevel=2)
-    return found
+    return tip
 
 
-def _chain(model: pin.Model, actuated: tuple[str, ...], ties: Mapping[str, Mimic]) -> Chain:
+def _chain(model: pin.Model, actuated: tuple[str, ...], mimic_of: Mapping[str, Mimic]) -> Chain:
     count = model.njoints - 1
-    place = {name: number for number, name in enumerate(actuated)}
+    column_of = {name: number for number, name in enumerate(actuated)}
     axis = np.zeros((count, 3))
     prismatic = np.zeros(count, dtype=bool)
     gain = np.zeros((count, len(actuated)))
@@ -282,16 +292,16 @@ def _chain(model: pin.Model, actuated: tuple[str, ...], ties: Mapping[str, Mimic
     joints = model.joints
 
     for k in range(count):
-        own = joints[k + 1].createData()  # of this joint alone: all joints' data are looked up by copying them
-        joints[k + 1].calc(own, neutral)
-        subspace = np.asarray(own.S).reshape(-1)  # (linear; angular)
+        joint_data = joints[k + 1].createData()  # of this joint alone: all joints' data are looked up by copying them
+        joints[k + 1].calc(joint_data, neutral)
+        subspace = np.asarray(joint_data.S).reshape(-1)  # (linear; angular)
         prismatic[k] = np.linalg.norm(subspace[:3]) > 0.5
         axis[k] = subspace[:3] if prismatic[k] else subspace[3:]
-        tie = ties.get(names[k])
+        tie = mimic_of.get(names[k])
         if tie is None:
-            gain[k, place[names[k]]] = 1.0
+            gain[k, column_of[names[k]]] = 1.0
         else:
-            gain[k, place[tie.source]] = tie.multiplier
+            gain[k, column_of[tie.source]] = tie.multiplier
             offset[k] = tie.offset
 
     return Chain(
@@ -309,22 +319,22 @@ def _periods(
     joints: Iterable[Joint],
     limits: Mapping[str, Mapping[str, float]],
     ties: Mapping[str, Mimic],
-    whole: Mask,
+    whole_turns_alike: Mask,
 ) -> dict[str, dict[str, float]]:
     """Limits of actuated joints that have none but whose whole turns are other postures: another follows at a fraction.
 
     They may turn to either side until all that follows has made whole turns too; a warning says so.
     """
-    found = {}
-    for joint, turns_alike in zip(joints, whole, strict=True):
-        own = limits[joint.name]
-        limited = np.isfinite(own["lower"]) or np.isfinite(own["upper"])
-        if turns_alike or limited or joint.slides:
+    limits_with_period = {}
+    for joint, turns_alike in zip(joints, whole_turns_alike, strict=True):
+        joint_limits = limits[joint.name]
+        has_limits = np.isfinite(joint_limits["lower"]) or np.isfinite(joint_limits["upper"])
+        if turns_alike or has_limits or joint.slides:
             continue
 
         following = {tie.joint: tie.multiplier for tie in ties.values() if tie.source == joint.name}
         turns = _turns_of(following.values())
-        found[joint.name] = {**own, "lower": -turns * TAU, "upper": turns * TAU}
+        limits_with_period[joint.name] = {**joint_limits, "lower": -turns * TAU, "upper": turns * TAU}
         fraction = next(each for each, gain in following.items() if gain != round(gain))
         message = (
             f"robot '{name}': joint '{joint.name}' turns without end, but '{fraction}' follows it as "
@@ -332,32 +342,32 @@ def _periods(
             f"{'turn' if turns == 1 else 'turns'} to either side; joint_limits=FILE can say otherwise"
         )
         warnings.warn(DescriptionWarning(message), stacklevel=3)
-    return found
+    return limits_with_period
 
 
 def _turns_of(gains: Iterable[float]) -> int:
     """The least number of turns that is whole turns, to a part in a thousand, of all that follows by these factors."""
     factors = np.array([abs(gain) for gain in gains if gain != 0.0])
     for count in range(1, MOST_TURNS):
-        made = count * factors
-        if (np.abs(made - np.rint(made)) <= 1e-3 * made).all():
+        turns = count * factors
+        if (np.abs(turns - np.rint(turns)) <= 1e-3 * turns).all():
             return count
     return MOST_TURNS
 
 
-def _limits(name: str, joints: Iterable[Joint], found: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+def _limits(name: str, joints: Iterable[Joint], limits_of_joint: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
     rows = []
     for joint in joints:
-        limits = found[joint.name]
-        low = limits["lower"]
-        high = limits["upper"]
+        limits = limits_of_joint[joint.name]
+        lower = limits["lower"]
+        upper = limits["upper"]
 
-        if not low < high:
+        if not lower < upper:
             raise InputError(
-                f"robot '{name}': joint '{joint.name}' has limits {low:g} .. {high:g}; "
+                f"robot '{name}': joint '{joint.name}' has limits {lower:g} .. {upper:g}; "
                 "lower must be below upper: correct the limits, or leave the joint out of joints=[...]"
             )
-        if joint.slides and not max(abs(low), abs(high)) <= LARGEST:
+        if joint.slides and not max(abs(lower), abs(upper)) <= LARGEST:
             raise InputError(
                 f"robot '{name}': prismatic joint '{joint.name}' needs finite limits, in metres, up to {LARGEST:g}; "
                 "give them in the file or by joint_limits=FILE, or leave the joint out of joints=[...]"
@@ -370,8 +380,8 @@ def _limits(name: str, joints: Iterable[Joint], found: Mapping[str, Mapping[str,
                     f"robot '{name}': joint '{joint.name}' has {what} limit {rate:g}; it must be greater than 0"
                 )
 
-        endless = joint.endless and bool(np.isinf(low) and np.isinf(high))
-        rows.append((low, high, *rates, endless, joint.slides))
+        endless = joint.endless and bool(np.isinf(lower) and np.isinf(upper))
+        rows.append((lower, upper, *rates, endless, joint.slides))
 
     columns = list(zip(*rows, strict=True))
     keys = ("lower", "upper", *RATES)
@@ -379,13 +389,13 @@ def _limits(name: str, joints: Iterable[Joint], found: Mapping[str, Mapping[str,
     return bounds | {"continuous": frozen(columns[5], bool), "prismatic": frozen(columns[6], bool)}
 
 
-def _turned_inside(q: Vector, bounds: Mapping[str, Any], whole: Mask) -> Vector:
+def _turned_inside(q: Vector, bounds: Mapping[str, Any], whole_turns_alike: Mask) -> Vector:
     """The same posture with joints that lie outside their limits turned by a full turn, if that brings them inside."""
-    for turn in (TAU, -TAU):
-        other = q + turn
+    for full_turn in (TAU, -TAU):
+        turned = q + full_turn
         outside = (q < bounds["lower"]) | (q > bounds["upper"])
-        fits = (other >= bounds["lower"]) & (other <= bounds["upper"]) & whole
-        q = np.where(outside & fits, other, q)
+        fits = (turned >= bounds["lower"]) & (turned <= bounds["upper"]) & whole_turns_alike
+        q = np.where(outside & fits, turned, q)
     return q
 
 

@@ -98,31 +98,32 @@ class Srdf:
 
     def unknown_names(self, tree: Tree) -> list[str]:
         """A line for each name that neither the robot nor the file has, with its place and the nearest name."""
-        known = {
+        known_names = {
             "link": {link.name for link in tree.links},
             "joint": {joint.name for joint in tree.joints} | self.virtual,
             "group": set(self.groups),
         }
 
-        first: dict[tuple[str, str], Mention] = {}
+        first_mention: dict[tuple[str, str], Mention] = {}
         for mention in self.mentions:
-            if mention.name not in known[mention.kind]:
-                first.setdefault((mention.kind, mention.name), mention)
+            if mention.name not in known_names[mention.kind]:
+                first_mention.setdefault((mention.kind, mention.name), mention)
 
-        return [
-            f"{each.place}: <{each.tag}>: no {each.kind} '{each.name}'{nearest_name(each.name, known[each.kind])}"
-            for each in first.values()
-        ]
+        lines = []
+        for mention in first_mention.values():
+            nearest = nearest_name(mention.name, known_names[mention.kind])
+            lines.append(f"{mention.place}: <{mention.tag}>: no {mention.kind} '{mention.name}'{nearest}")
+        return lines
 
     def short_states(self, group: str | None, joints: Iterable[str]) -> list[str]:
         """A line for each state of a group that lacks a value of one of some joints, and is thus no posture."""
-        found = []
+        lines = []
         for (owner, state), values in self.states.items():
             lacking = [joint for joint in joints if joint not in values]
             if owner == group and lacking:
                 place = self.places[owner, state]
-                found.append(f"{place}: group_state '{state}' has no value of joint '{lacking[0]}' and is left out")
-        return found
+                lines.append(f"{place}: group_state '{state}' has no value of joint '{lacking[0]}' and is left out")
+        return lines
 
     def of_another(self, name: str, where: str) -> list[str]:
         """A line if the file is of a robot of another name than the one that a URDF describes."""
@@ -134,10 +135,10 @@ class Srdf:
         """A line for each of some joints, which move, that has no motor."""
         moving = set(joints)
         return [
-            f"{each.place}: <{each.tag}>: joint '{each.name}' has no motor and is moved like the others; "
+            f"{mention.place}: <{mention.tag}>: joint '{mention.name}' has no motor and is moved like the others; "
             "choose by group= or joints="
-            for each in self.mentions
-            if each.tag == "passive_joint" and each.name in moving
+            for mention in self.mentions
+            if mention.tag == "passive_joint" and mention.name in moving
         ]
 
     def place_of(self, state: str, group: str | None) -> str:
@@ -162,19 +163,19 @@ class Srdf:
         Raises:
             InputError: If the group does not exist, or names a joint or link that the robot does not have.
         """
-        wanted = self._members(group, tree, ()) - self.passive
-        return tuple(joint.name for joint in tree.walk() if joint.name in wanted and joint.moves)
+        members = self._members(group, tree, ()) - self.passive
+        return tuple(joint.name for joint in tree.walk() if joint.name in members and joint.moves)
 
-    def _members(self, name: str, tree: Tree, above: tuple[str, ...]) -> set[str]:
+    def _members(self, name: str, tree: Tree, enclosing: tuple[str, ...]) -> set[str]:
         if name not in self.groups:
             raise UnknownNameError("group", name, self.groups, where=self.where)
-        if name in above:
+        if name in enclosing:
             raise InputError(f"{self.where}: group '{name}' contains itself; take it out")
 
         group = self.groups[name]
         where = f"{self.where}: group '{name}'"
         joints = [joint.name for joint in tree.joints]
-        above_link = {joint.child: joint.name for joint in tree.joints}
+        joint_above = {joint.child: joint.name for joint in tree.joints}
         members = set()
 
         for joint in group.joints:
@@ -182,20 +183,20 @@ class Srdf:
                 raise UnknownNameError("joint", joint, joints, where=where)
             members.add(joint)
         for link in group.links:
-            if link not in above_link and link != tree.root.name:
+            if link not in joint_above and link != tree.root.name:
                 raise UnknownNameError("link", link, [x.name for x in tree.links], where=where)
-            members |= {above_link[link]} if link in above_link else set()
+            members |= {joint_above[link]} if link in joint_above else set()
         for base, tip in group.chains:
             members |= {joint.name for joint in tree.chain(tip, base)}
         for subgroup in group.subgroups:
-            members |= self._members(subgroup, tree, (*above, name))
+            members |= self._members(subgroup, tree, (*enclosing, name))
 
         return members
 
     def allowed_pairs(self, tree: Tree) -> frozenset[frozenset[str]]:
         """Pairs of links of a robot that are never checked against each other."""
-        everything = {frozenset((link, other.name)) for link in self.never for other in tree.links}
-        return self.allowed | frozenset(pair for pair in everything - self.checked if len(pair) == 2)
+        never_checked = {frozenset((link, other.name)) for link in self.never for other in tree.links}
+        return self.allowed | frozenset(pair for pair in never_checked - self.checked if len(pair) == 2)
 
     def group_tip(self, group: str, tree: Tree) -> str:
         """Link at the end of a group: its chain's, else its end effector's, else the child of its last joint."""
@@ -243,7 +244,7 @@ def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
         if element.get(key)
     )
 
-    ends = tuple(
+    end_effectors = tuple(
         EndEffector(*(element.get(key, "") for key in ("name", "parent_link", "group", "parent_group")))
         for element in robot.findall("end_effector")
     )
@@ -256,7 +257,7 @@ def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
         allowed=_pairs(robot, "disable_collisions"),
         never=frozenset(e.get("link", "") for e in robot.findall("disable_default_collisions")),
         checked=_pairs(robot, "enable_collisions"),
-        end_effectors=ends,
+        end_effectors=end_effectors,
         passive=frozenset(e.get("name", "") for e in robot.findall("passive_joint")),
         virtual=frozenset(e.get("name", "") for e in robot.findall("virtual_joint")),
         mentions=mentions,

@@ -187,15 +187,15 @@ class Tree:
 
     def walk(self) -> Iterator[Joint]:
         """All joints, parents before children, each branch to its end before the next one begins."""
-        below: dict[str, list[Joint]] = {link.name: [] for link in self.links}
+        child_joints: dict[str, list[Joint]] = {link.name: [] for link in self.links}
         for joint in self.joints:
-            below[joint.parent].append(joint)
+            child_joints[joint.parent].append(joint)
 
-        stack = below[self.root.name][::-1]
+        stack = child_joints[self.root.name][::-1]
         while stack:
             joint = stack.pop()
             yield joint
-            stack += below[joint.child][::-1]
+            stack += child_joints[joint.child][::-1]
 
     def chain(self, tip: str, base: str | None = None) -> tuple[Joint, ...]:
         """Joints from ``base`` (the root if None) to the link ``tip``, in that order.
@@ -205,7 +205,7 @@ class Tree:
             InputError: If ``tip`` does not hang on ``base``.
         """
         names = [link.name for link in self.links]
-        above = {joint.child: joint for joint in self.joints}
+        joint_above = {joint.child: joint for joint in self.joints}
 
         for link in (tip, base):
             if link is not None and link not in names:
@@ -213,9 +213,9 @@ class Tree:
 
         joints: list[Joint] = []
         link = tip
-        while link != base and link in above:
-            joints.append(above[link])
-            link = above[link].parent
+        while link != base and link in joint_above:
+            joints.append(joint_above[link])
+            link = joint_above[link].parent
 
         if base is not None and link != base:
             raise InputError(f"{self.where}: link '{tip}' does not hang on link '{base}'; swap them or choose others")
@@ -223,11 +223,11 @@ class Tree:
 
     def hold(self, values: Mapping[str, float]) -> Tree:
         """The same tree with the named joints fixed at the given values [rad or m]."""
-        joints = [_held(joint, values[joint.name]) if joint.name in values else joint for joint in self.joints]
+        joints = [_fixed_at(joint, values[joint.name]) if joint.name in values else joint for joint in self.joints]
         return Tree(self.where, self.links, joints)
 
 
-def _held(joint: Joint, value: float) -> Joint:
+def _fixed_at(joint: Joint, value: float) -> Joint:
     axis = np.array(joint.axis)
     motion = pin.SE3(np.eye(3), value * axis) if joint.slides else pin.SE3(pin.exp3(value * axis), np.zeros(3))
     return Joint(joint.name, "fixed", joint.parent, joint.child, joint.T_parent_joint * motion, axis)
@@ -237,17 +237,17 @@ def _check_names(tree: Tree) -> None:
     if not tree.links:
         raise InputError(f"{tree.where}: no link; a robot needs at least one")
     for what, names in (("link", [x.name for x in tree.links]), ("joint", [x.name for x in tree.joints])):
-        twice = [name for name, count in Counter(names).items() if count > 1]
-        if twice:
-            raise InputError(f"{tree.where}: {what} name '{twice[0]}' stands there twice; rename one")
+        duplicates = [name for name, count in Counter(names).items() if count > 1]
+        if duplicates:
+            raise InputError(f"{tree.where}: {what} name '{duplicates[0]}' stands there twice; rename one")
         for name in names:
             name_of(name, f"a {what} of {tree.where}")
 
-    known = {link.name for link in tree.links}
+    link_names = {link.name for link in tree.links}
     for joint in tree.joints:
         for role, link in (("parent", joint.parent), ("child", joint.child)):
-            if link not in known:
-                raise UnknownNameError(f"{role} link", link, known, where=f"{tree.where}: joint '{joint.name}'")
+            if link not in link_names:
+                raise UnknownNameError(f"{role} link", link, link_names, where=f"{tree.where}: joint '{joint.name}'")
 
 
 def _check_connected(tree: Tree) -> None:

@@ -100,10 +100,10 @@ def element_lines(root: Element, text: str, where: str) -> dict[Element, str]:
         parser.StartElementHandler = lambda *_: lines.append(parser.CurrentLineNumber)
         parser.Parse(text.strip(), True)
 
-    above = text[: len(text) - len(text.lstrip())].count("\n")
+    skipped_lines = text[: len(text) - len(text.lstrip())].count("\n")
     elements = list(root.iter())
-    places = [f"{where}:{line + above}" for line in lines] or [where] * len(elements)
-    return dict(zip(elements, places, strict=True))
+    locations = [f"{where}:{line + skipped_lines}" for line in lines] or [where] * len(elements)
+    return dict(zip(elements, locations, strict=True))
 
 
 def numbers(element: Element, key: str, count: int, default: Sequence[float] | None, where: str) -> list[float]:
@@ -206,8 +206,8 @@ class _Reader:
                 raise InputError(f"{where}: mesh '{uri}' has a scale of 0; every axis needs another number")
             return MeshFile(resolve_mesh(uri, self.folder, self.packages, where), (x, y, z))
 
-        known = (key for key, kind in SHAPES.items() if kind.in_urdf)
-        raise UnknownNameError("shape", element.tag, (*known, "mesh"), where=where)
+        in_urdf = (key for key, kind in SHAPES.items() if kind.in_urdf)
+        raise UnknownNameError("shape", element.tag, (*in_urdf, "mesh"), where=where)
 
     def colour(self, material: Element | None, where: str) -> Colour | None:
         if material is None:
@@ -256,10 +256,10 @@ def _limits(limit: Element | None, kind: str, where: str) -> dict[str, float]:
     """Limits of position, velocity and effort; infinite where the kind of joint has none, or the file says none."""
     moves = JOINT_KINDS[kind].moves
     endless = JOINT_KINDS[kind].endless
-    bounded = moves and not endless
+    has_range = moves and not endless
     bounds = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}
 
-    if limit is None and bounded:
+    if limit is None and has_range:
         raise InputError(
             f'{where}: a {kind} joint needs <limit lower=".." upper=".." velocity=".." effort=".."/>; add it'
             + (', or make the type "continuous"' if not JOINT_KINDS[kind].slides else "")
@@ -271,7 +271,7 @@ def _limits(limit: Element | None, kind: str, where: str) -> dict[str, float]:
     if velocity < 0.0:
         raise InputError(f"{where}: velocity limit {velocity:g} is negative; give its size")
 
-    if bounded:
+    if has_range:
         lower, upper = (numbers(limit, key, 1, (0.0,), where)[0] for key in ("lower", "upper"))
         if lower > upper:
             raise InputError(f"{where}: lower limit {lower:g} is above upper limit {upper:g}; swap them")
@@ -298,39 +298,39 @@ def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
     xx, xy, xz, yy, yz, zz = (numbers(tensor, key, 1, (0.0,), where)[0] for key in _TENSOR)
     placement = _origin(inertial, where)
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    turned = placement.rotation @ matrix @ placement.rotation.T
+    in_link = placement.rotation @ matrix @ placement.rotation.T
 
-    weight = numbers(mass, "value", 1, None, where)[0]
-    if weight < 0.0 or np.linalg.eigvalsh(turned)[0] < 0.0:
+    mass_value = numbers(mass, "value", 1, None, where)[0]
+    if mass_value < 0.0 or np.linalg.eigvalsh(in_link)[0] < 0.0:
         return None  # impossible, but common in the files of real robots, and without effect on planning
-    return pin.Inertia(weight, placement.translation, turned)
+    return pin.Inertia(mass_value, placement.translation, in_link)
 
 
 def flattened(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> tuple[Mimic, ...]:
     """Make every follower follow a joint that follows nothing."""
-    ties = {tie.joint: tie for tie in mimics}
+    mimic_of = {tie.joint: tie for tie in mimics}
     movable = [joint.name for joint in joints if joint.moves]
-    flat = []
+    resolved = []
 
     for tie in mimics:
         source = tie.source
         multiplier = tie.multiplier
         offset = tie.offset
-        seen = {tie.joint}
+        visited = {tie.joint}
         while True:
             if source not in movable:
                 raise UnknownNameError("movable joint to mimic", source, movable, where=f"{where}: joint '{tie.joint}'")
-            if source in seen:
+            if source in visited:
                 raise InputError(f"{where}: joint '{tie.joint}' mimics itself by way of '{source}'; break the ring")
-            if source not in ties:
+            if source not in mimic_of:
                 break
 
             # What follows a follower: m (m' x + o') + o.
-            above = ties[source]
-            seen.add(source)
-            source = above.source
-            offset = multiplier * above.offset + offset
-            multiplier = multiplier * above.multiplier
+            leader = mimic_of[source]
+            visited.add(source)
+            source = leader.source
+            offset = multiplier * leader.offset + offset
+            multiplier = multiplier * leader.multiplier
 
-        flat.append(Mimic(tie.joint, source, multiplier, offset))
-    return tuple(flat)
+        resolved.append(Mimic(tie.joint, source, multiplier, offset))
+    return tuple(resolved)

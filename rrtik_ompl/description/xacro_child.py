@@ -32,16 +32,18 @@ class Places:
     """Which files macros may read, where packages are, and where in the files an expression stands."""
 
     def __init__(self, file: str, packages: Iterable[str]) -> None:
-        real = Path(file).resolve()
-        own = _package_of(real)
-        self.folder = real.parent
-        self.packages = [Path(each) for each in packages]
-        self.roots = [*self.packages] if own is None else [own, *self.packages]
-        self.beside = [self.folder, Path(file).absolute().parent]
+        resolved = Path(file).resolve()
+        own_package = _package_of(resolved)
+        self.folder = resolved.parent
+        self.packages = [Path(folder) for folder in packages]
+        self.roots = [*self.packages] if own_package is None else [own_package, *self.packages]
+        self.folders_of_file = [self.folder, Path(file).absolute().parent]
 
-        home = own or self.folder
-        users = Path.home()  # neither all that the user has nor the whole disk is a robot's
-        self.near = [folder for folder in (home, *list(home.parents)[:2]) if not users.is_relative_to(folder)]
+        home = own_package or self.folder
+        home_folder = Path.home()  # neither all that the user has nor the whole disk is a robot's
+        self.folders_above = [
+            folder for folder in (home, *list(home.parents)[:2]) if not home_folder.is_relative_to(folder)
+        ]
         self.read: list[str] = []
 
     def find(self, name: str, usual: Callable[[str], Any]) -> str:
@@ -65,39 +67,41 @@ class Places:
         """Refuse a file outside the folders in play; one that does not exist is not the matter here."""
         from rrtik_ompl.description.xacro_expression import Refused
 
-        if not os.path.exists(path) or self._in_play(path):
+        if not os.path.exists(path) or self._is_readable(path):
             return
         raise Refused(f"'{path}' is outside the folders of the robot; give packages=[its package], or {TRUST}")
 
-    def _in_play(self, path: str) -> bool:
-        real = Path(path).resolve()
-        if any(real.is_relative_to(root.resolve()) for root in self.roots):
+    def _is_readable(self, path: str) -> bool:
+        resolved = Path(path).resolve()
+        if any(resolved.is_relative_to(root.resolve()) for root in self.roots):
             return True
-        if any(_shows(real, folder) for folder in self.beside):
+        if any(_visible_below(resolved, folder) for folder in self.folders_of_file):
             return True
-        if real.suffix.lower() in READABLE and any(_shows(real, folder) for folder in self.near):
+        if resolved.suffix.lower() in READABLE and any(
+            _visible_below(resolved, folder) for folder in self.folders_above
+        ):
             return True
 
         # installed packages of ROS may be links to their sources, which are packages as well
-        named = Path(os.path.abspath(path))
-        linked = any(named.is_relative_to(root.absolute()) for root in [*self.roots, *self.beside])
-        return linked and _package_of(real) is not None
+        written = Path(os.path.abspath(path))
+        in_written_root = any(written.is_relative_to(root.absolute()) for root in [*self.roots, *self.folders_of_file])
+        return in_written_root and _package_of(resolved) is not None
 
     def line_of(self, text: str, files: Iterable[str | None]) -> str:
         """``FILE:LINE`` of a text in the first of the files that holds it; the first file if none does."""
         pattern = re.compile(r"\s+".join(re.escape(word) for word in text.split()))
-        known = [file for file in dict.fromkeys([*files, *self.read]) if file]
-        for file in known:
+        candidates = [file for file in dict.fromkeys([*files, *self.read]) if file]
+        for file in candidates:
             try:
                 content = html.unescape(Path(file).read_text("utf-8", "replace"))
             except OSError:
                 continue
             if text.strip() and (found := pattern.search(content)):
                 return f"{file}:{content.count(chr(10), 0, found.start()) + 1}"
-        return known[0] if known else ""
+        return candidates[0] if candidates else ""
 
 
-def _shows(file: Path, folder: Path) -> bool:
+def _visible_below(file: Path, folder: Path) -> bool:
     """Whether a file lies below a folder, and nothing on the way is hidden."""
     if not file.is_relative_to(folder):
         return False
@@ -124,7 +128,7 @@ def expand(job: Mapping[str, Any]) -> dict[str, Any]:
     try:
         text = xacro.process_file(job["file"], mappings=dict(job["arguments"])).toxml()
     except (Exception, SystemExit) as error:  # of anything that a macro may do
-        return _told(error, job)
+        return _error_answer(error, job)
 
     if len(text) > job["longest"]:
         return {"error": f"expands to more than {job['longest'] // 2**20} MiB"}
@@ -140,7 +144,9 @@ def _restrict(xacro: Package, substitution_args: Package, places: Places) -> Non
         for name in names:
             dict.__setitem__(space, name, FUNCTIONS[name])
 
-    own = [space[name] for space in (symbols, symbols["xacro"]) for name in MACRO_FUNCTIONS if name in space]
+    allowed_functions = [
+        space[name] for space in (symbols, symbols["xacro"]) for name in MACRO_FUNCTIONS if name in space
+    ]
 
     def argument(name: str) -> Value:
         given = xacro.substitution_args_context["arg"]
@@ -148,8 +154,8 @@ def _restrict(xacro: Package, substitution_args: Package, places: Places) -> Non
 
     words = {name: substitution_args._eval_dict[name] for name in ("env", "optenv", "find", "true", "false")}
     words |= {"arg": argument, **MATHEMATICS}
-    own += [word for word in words.values() if callable(word)]
-    evaluator = Evaluator(own, spaces=(xacro.NameSpace,), records=(xacro.YamlDictWrapper,))
+    allowed_functions += [word for word in words.values() if callable(word)]
+    evaluator = Evaluator(allowed_functions, spaces=(xacro.NameSpace,), records=(xacro.YamlDictWrapper,))
 
     def evaluated(expression: str, symbols: Value, local: object = None) -> Value:
         return evaluator.value(expression, symbols.__getitem__)
@@ -210,7 +216,7 @@ def _note_places(xacro: Package, places: Places) -> None:
     xacro.process_include = noting(xacro.process_include, lambda element: element.getAttribute("filename"))
 
 
-def _told(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any]:
+def _error_answer(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any]:
     """What is said of an error: by the innermost one, and where that happened."""
     from rrtik_ompl.description.xacro_expression import Refused, shown
 
@@ -218,23 +224,23 @@ def _told(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any]:
     while (inner := getattr(chain[-1], "exc", None)) is not None and inner not in chain:
         chain.append(inner)
 
-    placed = [each for each in chain if hasattr(each, "place")]
-    where = placed[-1].place if placed else ""
-    last = chain[-1]
+    placed_errors = [raised for raised in chain if hasattr(raised, "place")]
+    location = placed_errors[-1].place if placed_errors else ""
+    innermost = chain[-1]
 
-    if isinstance(last, MemoryError):
-        return {"where": where, "error": f"needs more than {job['bytes'] / 1e9:g} GB of memory; {job['more']}"}
-    if isinstance(last, RecursionError):
-        return {"where": where, "error": "macros or expressions are nested too deeply; does one call itself?"}
-    if isinstance(last, Refused):
-        said = str(last)
-        if "trust_xacro" not in said:
-            expression = placed[-1].expression  # type: ignore[attr-defined]
-            said = f"expression '{shown(expression)}': {said}; write it otherwise, or {TRUST}"
-        return {"where": where, "error": said}
+    if isinstance(innermost, MemoryError):
+        return {"where": location, "error": f"needs more than {job['bytes'] / 1e9:g} GB of memory; {job['more']}"}
+    if isinstance(innermost, RecursionError):
+        return {"where": location, "error": "macros or expressions are nested too deeply; does one call itself?"}
+    if isinstance(innermost, Refused):
+        message = str(innermost)
+        if "trust_xacro" not in message:
+            expression = placed_errors[-1].expression  # type: ignore[attr-defined]
+            message = f"expression '{shown(expression)}': {message}; write it otherwise, or {TRUST}"
+        return {"where": location, "error": message}
 
-    said = " ".join(str(error).split()) or type(error).__name__
-    return {"where": where, "error": said.removeprefix("<class 'LookupError'>: ")}  # how xacro passes that on
+    message = " ".join(str(error).split()) or type(error).__name__
+    return {"where": location, "error": message.removeprefix("<class 'LookupError'>: ")}  # how xacro passes that on
 
 
 def _limit(seconds: float, memory: float) -> None:
@@ -244,12 +250,16 @@ def _limit(seconds: float, memory: float) -> None:
     except ImportError:
         return
 
-    whole = int(seconds) + 1
-    for kind, most in ((resource.RLIMIT_CPU, whole), (resource.RLIMIT_AS, int(memory)), (resource.RLIMIT_CORE, 0)):
+    whole_seconds = int(seconds) + 1
+    for kind, wanted in (
+        (resource.RLIMIT_CPU, whole_seconds),
+        (resource.RLIMIT_AS, int(memory)),
+        (resource.RLIMIT_CORE, 0),
+    ):
         _, highest = resource.getrlimit(kind)
-        least = most if highest == resource.RLIM_INFINITY else min(most, highest)
+        granted = wanted if highest == resource.RLIM_INFINITY else min(wanted, highest)
         try:
-            resource.setrlimit(kind, (least, highest))
+            resource.setrlimit(kind, (granted, highest))
         except (OSError, ValueError):  # macOS takes none of memory
             continue
 

@@ -129,8 +129,10 @@ class Evaluator:
         spaces: tuple[type, ...] = (),
         records: tuple[type, ...] = (),
     ) -> None:
-        known = [*FUNCTIONS.values(), *(each for each in MATHEMATICS.values() if callable(each)), *functions]
-        self._known = {id(function): function for function in known}  # kept, so that no other gets the number
+        callables = [*FUNCTIONS.values(), *(value for value in MATHEMATICS.values() if callable(value)), *functions]
+        self._callable_by_id = {
+            id(function): function for function in callables
+        }  # kept, so that no other gets the number
         self._spaces = spaces
         self._records = records
 
@@ -145,18 +147,18 @@ class Evaluator:
             Refused: If it holds something that is not on the list.
             Exception: Whatever the operations raise: NameError, SyntaxError, ZeroDivisionError, ..
         """
-        return self._of(ast.parse(expression.strip(), "<expression>", "eval").body, lookup)
+        return self._evaluate(ast.parse(expression.strip(), "<expression>", "eval").body, lookup)
 
-    def _of(self, node: ast.expr, lookup: Lookup) -> Value:
+    def _evaluate(self, node: ast.expr, lookup: Lookup) -> Value:
         evaluate = getattr(self, f"_{type(node).__name__}", None)
         if evaluate is None:
             raise Refused(f"{_named(node)} is not on the list")
-        found = evaluate(node, lookup)
-        if callable(found) and not self._may_be_called(found):
+        value = evaluate(node, lookup)
+        if callable(value) and not self._may_be_called(value):
             raise Refused(f"'{ast.unparse(node)}' is not one of the functions on the list")
-        if isinstance(found, (str, list, tuple)):
-            _check_size(len(found))
-        return found
+        if isinstance(value, (str, list, tuple)):
+            _check_size(len(value))
+        return value
 
     def _may_be_called(self, function: Value) -> bool:
         if isinstance(function, partial):
@@ -166,7 +168,7 @@ class Evaluator:
             if kind is not None:
                 called: str = function.__name__
                 return called in METHODS[kind]
-        return id(function) in self._known
+        return id(function) in self._callable_by_id
 
     # --- one method for each kind of node; there are no others --------------------------------------------------
 
@@ -184,7 +186,7 @@ class Evaluator:
 
     def _Attribute(self, node: ast.Attribute, lookup: Lookup) -> Value:
         _check_name(node.attr)
-        holder: Any = self._of(node.value, lookup)
+        holder: Any = self._evaluate(node.value, lookup)
         if type(holder) in self._spaces:
             try:
                 return holder[node.attr]
@@ -201,21 +203,23 @@ class Evaluator:
         raise Refused(f"'.{node.attr}' of a {type(holder).__name__} is not on the list")
 
     def _Subscript(self, node: ast.Subscript, lookup: Lookup) -> Value:
-        holder = self._of(node.value, lookup)
-        return holder[self._of(node.slice, lookup)]
+        holder = self._evaluate(node.value, lookup)
+        return holder[self._evaluate(node.slice, lookup)]
 
     def _Slice(self, node: ast.Slice, lookup: Lookup) -> Value:
-        return slice(*(None if end is None else self._of(end, lookup) for end in (node.lower, node.upper, node.step)))
+        return slice(
+            *(None if end is None else self._evaluate(end, lookup) for end in (node.lower, node.upper, node.step))
+        )
 
     def _UnaryOp(self, node: ast.UnaryOp, lookup: Lookup) -> Value:
-        return SIGNS[type(node.op)](self._of(node.operand, lookup))
+        return SIGNS[type(node.op)](self._evaluate(node.operand, lookup))
 
     def _BinOp(self, node: ast.BinOp, lookup: Lookup) -> Value:
         operation = ARITHMETIC.get(type(node.op))
         if operation is None:
             raise Refused(f"{_named(node.op)} is not on the list")
-        left = self._of(node.left, lookup)
-        right = self._of(node.right, lookup)
+        left = self._evaluate(node.left, lookup)
+        right = self._evaluate(node.right, lookup)
         _check_growth(node.op, left, right)
         return operation(left, right)
 
@@ -223,16 +227,16 @@ class Evaluator:
         decides = isinstance(node.op, ast.Or)
         value = decides
         for each in node.values:
-            value = self._of(each, lookup)
+            value = self._evaluate(each, lookup)
             if bool(value) is decides:
                 break
         return value
 
     def _Compare(self, node: ast.Compare, lookup: Lookup) -> Value:
-        left = self._of(node.left, lookup)
+        left = self._evaluate(node.left, lookup)
         answer: Any = True
         for comparison, other in zip(node.ops, node.comparators, strict=True):
-            right = self._of(other, lookup)
+            right = self._evaluate(other, lookup)
             answer = COMPARISONS[type(comparison)](left, right)
             if not answer:
                 break
@@ -240,7 +244,7 @@ class Evaluator:
         return answer
 
     def _IfExp(self, node: ast.IfExp, lookup: Lookup) -> Value:
-        return self._of(node.body if self._of(node.test, lookup) else node.orelse, lookup)
+        return self._evaluate(node.body if self._evaluate(node.test, lookup) else node.orelse, lookup)
 
     def _List(self, node: ast.List, lookup: Lookup) -> list[Any]:
         return self._items(node.elts, lookup)
@@ -255,33 +259,33 @@ class Evaluator:
         pairs: dict[Any, Any] = {}
         for key, value in zip(node.keys, node.values, strict=True):
             if key is None:
-                pairs.update(self._of(value, lookup))
+                pairs.update(self._evaluate(value, lookup))
             else:
-                pairs[self._of(key, lookup)] = self._of(value, lookup)
+                pairs[self._evaluate(key, lookup)] = self._evaluate(value, lookup)
         return pairs
 
     def _Call(self, node: ast.Call, lookup: Lookup) -> Value:
-        function = self._of(node.func, lookup)
+        function = self._evaluate(node.func, lookup)
         arguments = self._items(node.args, lookup)
-        named: dict[str, Any] = {}
+        keyword_arguments: dict[str, Any] = {}
         for keyword in node.keywords:
             _check_name(keyword.arg or "")
-            value = self._of(keyword.value, lookup)
-            named.update(value if keyword.arg is None else {keyword.arg: value})
-        return function(*arguments, **named)
+            value = self._evaluate(keyword.value, lookup)
+            keyword_arguments.update(value if keyword.arg is None else {keyword.arg: value})
+        return function(*arguments, **keyword_arguments)
 
     def _ListComp(self, node: ast.ListComp, lookup: Lookup) -> list[Any]:
-        return [self._of(node.elt, scope) for scope in self._scopes(node.generators, lookup)]
+        return [self._evaluate(node.elt, scope) for scope in self._scopes(node.generators, lookup)]
 
     def _SetComp(self, node: ast.SetComp, lookup: Lookup) -> set[Any]:
-        return {self._of(node.elt, scope) for scope in self._scopes(node.generators, lookup)}
+        return {self._evaluate(node.elt, scope) for scope in self._scopes(node.generators, lookup)}
 
     def _GeneratorExp(self, node: ast.GeneratorExp, lookup: Lookup) -> Value:
-        return iter([self._of(node.elt, scope) for scope in self._scopes(node.generators, lookup)])
+        return iter([self._evaluate(node.elt, scope) for scope in self._scopes(node.generators, lookup)])
 
     def _DictComp(self, node: ast.DictComp, lookup: Lookup) -> dict[Any, Any]:
         scopes = self._scopes(node.generators, lookup)
-        return {self._of(node.key, scope): self._of(node.value, scope) for scope in scopes}
+        return {self._evaluate(node.key, scope): self._evaluate(node.value, scope) for scope in scopes}
 
     def _scopes(self, loops: list[ast.comprehension], lookup: Lookup) -> Iterable[Lookup]:
         """The names at each turn of the loops of a comprehension."""
@@ -289,19 +293,19 @@ class Evaluator:
             yield lookup
             return
         loop = loops[0]
-        for item in self._of(loop.iter, lookup):
+        for item in self._evaluate(loop.iter, lookup):
             names = dict(_bound(loop.target, item))
             inner = _inner(names, lookup)
-            if all(self._of(condition, inner) for condition in loop.ifs):
+            if all(self._evaluate(condition, inner) for condition in loop.ifs):
                 yield from self._scopes(loops[1:], inner)
 
     def _items(self, nodes: list[ast.expr], lookup: Lookup) -> list[Any]:
         items: list[Any] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
-                items.extend(self._of(node.value, lookup))
+                items.extend(self._evaluate(node.value, lookup))
             else:
-                items.append(self._of(node, lookup))
+                items.append(self._evaluate(node, lookup))
         return items
 
 

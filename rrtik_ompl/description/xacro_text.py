@@ -23,7 +23,7 @@ from rrtik_ompl.files.text import MAX_BYTES, read_text
 
 CHILD = Path(__file__).with_name("xacro_child.py")
 MORE = 'give xacro_limits={"seconds": .., "gigabytes": ..}'
-MOST_KEPT = 32  # expanded texts
+MAX_CACHED = 32  # expanded texts
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Expansion:
 
 
 @dataclass(frozen=True, slots=True)
-class _Kept:
+class _CachedText:
     """An expanded text, and the files that it came from with their times and sizes."""
 
     text: str
@@ -52,7 +52,7 @@ class _Kept:
 
 _expansion: ContextVar[Expansion] = ContextVar("expansion", default=Expansion())  # noqa: B039 - it is frozen
 _lock = threading.Lock()
-_kept: OrderedDict[str, _Kept] = OrderedDict()
+_cached_texts: OrderedDict[str, _CachedText] = OrderedDict()
 
 
 @contextmanager
@@ -72,13 +72,13 @@ def expanding(*, trusted: bool = False, limits: Mapping[str, float] | None = Non
     if not isinstance(trusted, bool):
         raise InputError(f"trust_xacro: expected True or False, got {trusted!r}")
 
-    own = {"seconds": outer.seconds, "gigabytes": outer.gigabytes}
+    limits_read = {"seconds": outer.seconds, "gigabytes": outer.gigabytes}
     for key, value in (limits or {}).items():
-        if key not in own:
-            raise UnknownNameError("key", key, own, where="xacro_limits")
-        own[key] = positive(value, f"xacro_limits: {key}")
+        if key not in limits_read:
+            raise UnknownNameError("key", key, limits_read, where="xacro_limits")
+        limits_read[key] = positive(value, f"xacro_limits: {key}")
 
-    token = _expansion.set(Expansion(trusted or outer.trusted, **own))
+    token = _expansion.set(Expansion(trusted or outer.trusted, **limits_read))
     try:
         yield
     finally:
@@ -113,13 +113,13 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
 
     read_text(path)  # which says what is wrong with the file itself
 
-    words = {str(key): str(value) for key, value in (arguments or {}).items()}
+    argument_texts = {str(key): str(value) for key, value in (arguments or {}).items()}
     roots = [str(each) for each in packages]
-    key = json.dumps([str(path), os.getcwd(), roots, words, dict(os.environ)], sort_keys=True)
+    key = json.dumps([str(path), os.getcwd(), roots, argument_texts, dict(os.environ)], sort_keys=True)
     with _lock:
-        kept = _kept.get(key)
-    if kept is not None and kept.stamps == _stamps(kept.files):
-        return kept.text
+        cached = _cached_texts.get(key)
+    if cached is not None and cached.stamps == _stamps(cached.files):
+        return cached.text
 
     if find_spec("xacro") is None:
         expanded = f"{path.stem.removesuffix('.urdf')}.urdf"  # by this ending it is read
@@ -128,23 +128,25 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
             f"or expand it by hand: xacro {path.name} > {expanded}"
         )
 
-    answer = _expanded(path, roots, words, _expansion.get())
+    answer = _expand_in_child(path, roots, argument_texts, _expansion.get())
     files = tuple(dict.fromkeys(answer["files"]))
     with _lock:
-        _kept[key] = _Kept(answer["text"], files, _stamps(files))
-        if len(_kept) > MOST_KEPT:
-            _kept.popitem(last=False)
+        _cached_texts[key] = _CachedText(answer["text"], files, _stamps(files))
+        if len(_cached_texts) > MAX_CACHED:
+            _cached_texts.popitem(last=False)
 
     return str(answer["text"])
 
 
-def _expanded(path: Path, packages: list[str], words: Mapping[str, str], expansion: Expansion) -> dict[str, Any]:
+def _expand_in_child(
+    path: Path, packages: list[str], argument_texts: Mapping[str, str], expansion: Expansion
+) -> dict[str, Any]:
     """What the process answers that expands the macros: ``{"text": .., "files": [..]}``."""
     job = {
         "path": [*filter(None, sys.path), str(Path(__file__).parents[2])],
         "file": str(path),
         "packages": packages,
-        "arguments": words,
+        "arguments": argument_texts,
         "trust": expansion.trusted,
         "seconds": expansion.seconds,
         "bytes": expansion.gigabytes * 1e9,
@@ -153,10 +155,10 @@ def _expanded(path: Path, packages: list[str], words: Mapping[str, str], expansi
     }
 
     environment = os.environ | {"PYTHONHASHSEED": "0"}  # sets are in the same order each time
-    slow = f"{path}: xacro: takes more than {expansion.seconds:g} s; does a macro call itself? else {MORE}"
+    too_slow = f"{path}: xacro: takes more than {expansion.seconds:g} s; does a macro call itself? else {MORE}"
 
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, str(CHILD)],
             input=json.dumps(job).encode(),
             stdout=subprocess.PIPE,
@@ -166,16 +168,18 @@ def _expanded(path: Path, packages: list[str], words: Mapping[str, str], expansi
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise InputError(slow) from None
+        raise InputError(too_slow) from None
     except OSError as error:
         raise InputError(f"{path}: no process could be started to expand it: {error.strerror or error}") from None
 
-    if done.returncode == -getattr(signal, "SIGXCPU", 0):
-        raise InputError(slow)
+    if process.returncode == -getattr(signal, "SIGXCPU", 0):
+        raise InputError(too_slow)
     try:
-        answer: dict[str, Any] = json.loads(done.stdout)
+        answer: dict[str, Any] = json.loads(process.stdout)
     except ValueError:
-        raise InputError(f"{path}: xacro: its process ended with code {done.returncode}; expand it by hand") from None
+        raise InputError(
+            f"{path}: xacro: its process ended with code {process.returncode}; expand it by hand"
+        ) from None
 
     if "error" in answer:
         raise InputError(f"{answer.get('where') or path}: xacro: {answer['error']}")

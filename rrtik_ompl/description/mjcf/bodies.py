@@ -32,10 +32,10 @@ def solids_apart(masks: Mapping[str, Sequence[Mask]]) -> frozenset[frozenset[str
         masks: Of the solids of each body, in their order.
     """
     return frozenset(
-        frozenset((f"{one}_{i}", f"{other}_{j}"))
-        for (one, own), (other, others) in combinations(masks.items(), 2)
-        for (i, first), (j, second) in product(enumerate(own), enumerate(others))
-        if not meet(first, second)
+        frozenset((f"{first_body}_{i}", f"{second_body}_{j}"))
+        for (first_body, first_masks), (second_body, second_masks) in combinations(masks.items(), 2)
+        for (i, first_mask), (j, second_mask) in product(enumerate(first_masks), enumerate(second_masks))
+        if not meet(first_mask, second_mask)
     )
 
 
@@ -44,17 +44,17 @@ def joined_bodies(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
 
     Here each of several joints has a link of its own behind it, and what is welded to a link is another link.
     """
-    rigid: dict[str, list[str]] = {}
+    rigid_parts: dict[str, list[str]] = {}
     for name in bodies:
-        rigid.setdefault(_carrier(name, bodies), []).append(name)
-    moving = [name for name, body in bodies.items() if _moving(body)]
-    found = {
+        rigid_parts.setdefault(_carrier(name, bodies), []).append(name)
+    moving = [name for name, body in bodies.items() if _moving_joint_kinds(body)]
+    pairs = {
         frozenset(pair)
         for name in moving
-        for pair in product(rigid[name], rigid[_carrier(bodies[name].parent, bodies)])
+        for pair in product(rigid_parts[name], rigid_parts[_carrier(bodies[name].parent, bodies)])
     }
 
-    return frozenset(found) - touchable(bodies)
+    return frozenset(pairs) - touchable(bodies)
 
 
 def touchable(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
@@ -62,22 +62,26 @@ def touchable(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
 
     Bodies that are welded to the world are no neighbours of others to MuJoCo. What is rigidly part of a free body is.
     """
-    still = [name for name in bodies if _carrier(name, bodies) == WORLD]
-    found = set()
+    standing = [name for name in bodies if _carrier(name, bodies) == WORLD]
+    pairs = set()
     for name in bodies:
         base = bodies[_carrier(name, bodies)].parent
-        if base in still:
-            own = _welded(base, bodies)
-            found |= {frozenset((name, other)) for other in still if own == WORLD or _welded(other, bodies) != own}
-    return frozenset(found)
+        if base in standing:
+            base_anchor = _welded(base, bodies)
+            pairs |= {
+                frozenset((name, other))
+                for other in standing
+                if base_anchor == WORLD or _welded(other, bodies) != base_anchor
+            }
+    return frozenset(pairs)
 
 
-def _moving(body: Body) -> tuple[str, ...]:
+def _moving_joint_kinds(body: Body) -> tuple[str, ...]:
     """Kinds of the joints that move a body against the one that it hangs on."""
     return tuple(kind for kind in body.joints if kind not in HELD)
 
 
-def _upwards(name: str, bodies: Mapping[str, Body]) -> Iterator[str]:
+def _ancestry(name: str, bodies: Mapping[str, Body]) -> Iterator[str]:
     """A body, the one that it hangs on, and so on to the world."""
     while name:
         yield name
@@ -86,9 +90,9 @@ def _upwards(name: str, bodies: Mapping[str, Body]) -> Iterator[str]:
 
 def _carrier(name: str, bodies: Mapping[str, Body]) -> str:
     """The nearest body towards the world, itself among them, that a joint moves; the world if there is none."""
-    return next((each for each in _upwards(name, bodies) if _moving(bodies[each])), WORLD)
+    return next((ancestor for ancestor in _ancestry(name, bodies) if _moving_joint_kinds(bodies[ancestor])), WORLD)
 
 
 def _welded(name: str, bodies: Mapping[str, Body]) -> str:
     """As `_carrier`, where a free joint counts as one that moves."""
-    return next((each for each in _upwards(name, bodies) if bodies[each].joints), WORLD)
+    return next((ancestor for ancestor in _ancestry(name, bodies) if bodies[ancestor].joints), WORLD)

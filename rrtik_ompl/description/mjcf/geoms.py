@@ -56,26 +56,26 @@ def solid_of(geom: Element, settings: Settings, meshes: Mapping[str, tuple[MeshF
     length = None
     if geom.get("fromto") is not None and kind in ("capsule", "cylinder", "box"):
         ends = np.array(numbers(geom, "fromto", 6, None, where)).reshape(2, 3)
-        way = ends[1] - ends[0]
-        length = float(np.linalg.norm(way))
+        direction = ends[1] - ends[0]
+        length = float(np.linalg.norm(direction))
         if length == 0.0:
             raise InputError(f"{where}: <geom fromto> is from a point to itself; give two points")
-        place = pin.SE3(turned_z(way / length), ends.mean(axis=0))
+        place = pin.SE3(turned_z(direction / length), ends.mean(axis=0))
     return Solid(_shape(kind, geom, length, where), place, rgba)
 
 
 def _shape(kind: str, geom: Element, length: float | None, where: str) -> Shape:
     # `fromto` gives the length in the place of a size; a box between two points has one width for both other axes.
     count = _COUNTS[kind] - (length is not None) - (length is not None and kind == "box")
-    words = (geom.get("size") or "").split()
-    size = numbers(Element("geom", {"size": " ".join(words[:count])}), "size", count, None, where)  # more are unused
+    written = (geom.get("size") or "").split()
+    size = numbers(Element("geom", {"size": " ".join(written[:count])}), "size", count, None, where)  # more are unused
 
     if kind == "sphere":
         return Sphere(size[0])
     if kind == "box":
         return Box([2.0 * size[0], 2.0 * size[0], length] if length is not None else 2.0 * np.array(size))
-    whole = 2.0 * size[1] if length is None else length
-    return Capsule(size[0], whole) if kind == "capsule" else Cylinder(size[0], whole)
+    full_length = 2.0 * size[1] if length is None else length
+    return Capsule(size[0], full_length) if kind == "capsule" else Cylinder(size[0], full_length)
 
 
 def meshes_of(root: Element, settings: Settings, folder: Path, where: str) -> dict[str, tuple[MeshFile, Any]]:
@@ -84,7 +84,7 @@ def meshes_of(root: Element, settings: Settings, folder: Path, where: str) -> di
     Raises:
         InputError: If one cannot be read; a file is looked for only if a geom may use it.
     """
-    found = {}
+    meshes = {}
     for element in root.findall("asset/mesh"):
         mesh = settings.filled(element, MAIN, where)
         if mesh.get("file") is None:
@@ -100,6 +100,6 @@ def meshes_of(root: Element, settings: Settings, folder: Path, where: str) -> di
             raise MissingFileError(f"{where}: mesh file '{path}' does not exist; check meshdir and the name")
 
         reference = Element("mesh", {"pos": mesh.get("refpos", "0 0 0"), "quat": mesh.get("refquat", "1 0 0 0")})
-        back = settings.placement(reference, where).inverse()
-        found[mesh.get("name") or path.stem] = MeshFile(path.resolve(), (x, y, z)), back
-    return found
+        mesh_in_geom = settings.placement(reference, where).inverse()
+        meshes[mesh.get("name") or path.stem] = MeshFile(path.resolve(), (x, y, z)), mesh_in_geom
+    return meshes

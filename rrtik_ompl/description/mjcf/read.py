@@ -80,7 +80,7 @@ def read_mjcf(path: Path) -> Mjcf:
         sites=sites,
         mimics=flattened(where, reader.joints, _followers(root, reader)),
         excluded=excluded,
-        apart=_apart(reader),
+        apart=_never_colliding_solids(reader),
         touchable=touchable(reader.bodies),
         unread=tuple(unread),
         postures=_keys(root, reader),
@@ -148,10 +148,10 @@ class _Reader:
                 continue
             with located(place):
                 solid = solid_of(geom, self.settings, self.meshes, place)
-                mask = masks(geom, place)
-            self.solids[link][not any(mask)].append(solid)
-            if any(mask):
-                self.masks.setdefault(link, []).append(mask)
+                geom_masks = masks(geom, place)
+            self.solids[link][not any(geom_masks)].append(solid)
+            if any(geom_masks):
+                self.masks.setdefault(link, []).append(geom_masks)
 
         for item in element.findall("site"):
             site = self.settings.filled(item, style, place)
@@ -173,14 +173,14 @@ class _Reader:
 
         for number, item in enumerate([*body.findall("joint"), *body.findall("freejoint")]):
             joint = self.settings.filled(item, style, place)
-            called = joint.get("name") or f"{name}/joint{number + 1}"
+            joint_name = joint.get("name") or f"{name}/joint{number + 1}"
             kind = joint.get("type", "hinge") if joint.tag == "joint" else "free"
             if kind not in SIZES or kind == "ball":
                 raise UnknownNameError("usable type of joint", kind, ("hinge", "slide", "free"), where=place)
-            self.moving.append((called, kind))
+            self.moving.append((joint_name, kind))
             kinds.append(kind)
             if kind != "free":
-                link, offset = self.turned(joint, kind, called, link, offset)
+                link, offset = self.turned(joint, kind, joint_name, link, offset)
 
         self.bodies[name] = Body(parent, tuple(kinds))
         self.solids[name] = [], []
@@ -189,28 +189,28 @@ class _Reader:
     def turned(self, joint: Element, kind: str, name: str, link: str, offset: pin.SE3) -> tuple[str, pin.SE3]:
         """Add a joint; the link behind it, and where the body is in that one."""
         place = f"{self.where}: joint '{name}'"
-        at = pin.SE3(np.eye(3), np.array(numbers(joint, "pos", 3, (0.0, 0.0, 0.0), place)))
+        joint_placement = pin.SE3(np.eye(3), np.array(numbers(joint, "pos", 3, (0.0, 0.0, 0.0), place)))
         axis = np.array(numbers(joint, "axis", 3, (0.0, 0.0, 1.0), place))
 
         slides = kind == "slide"
         unit = 1.0 if slides else self.settings.angle(1.0)
         low, high = (unit * value for value in numbers(joint, "range", 2, (0.0, 0.0), place))
 
-        usual = "true" if self.settings.limited and joint.get("range") is not None else "false"
-        limited = joint.get("limited", "auto").replace("auto", usual) == "true"
-        known = "prismatic" if slides else "revolute" if limited else "continuous"
+        automatic = "true" if self.settings.limited and joint.get("range") is not None else "false"
+        limited = joint.get("limited", "auto").replace("auto", automatic) == "true"
+        joint_kind = "prismatic" if slides else "revolute" if limited else "continuous"
         bounds = {"lower": low, "upper": high} if limited else {"lower": -np.inf, "upper": np.inf}
 
         child = f"{name}/link"
         with located(place):
-            self.joints.append(Joint(name, known, link, child, offset * at, axis, **bounds))
+            self.joints.append(Joint(name, joint_kind, link, child, offset * joint_placement, axis, **bounds))
         self.solids[child] = [], []
 
         zero = unit * numbers(joint, "ref", 1, (0.0,), place)[0]
         self.zeros[name] = zero
-        way = -zero * self.joints[-1].axis
-        back = pin.SE3(np.eye(3), way) if slides else pin.SE3(pin.exp3(way), np.zeros(3))
-        return child, back * at.inverse()
+        motion_to_zero = -zero * self.joints[-1].axis
+        from_zero = pin.SE3(np.eye(3), motion_to_zero) if slides else pin.SE3(pin.exp3(motion_to_zero), np.zeros(3))
+        return child, from_zero * joint_placement.inverse()
 
     def fix(self, parent: str, child: str, placement: pin.SE3) -> None:
         """A link that is fixed to another one."""
@@ -223,56 +223,62 @@ class _Reader:
 
 def _below(body: Element, name: str, style: str) -> list[tuple[Element, str, str, str]]:
     """The bodies in a body, the last one first: element, parent, name, class of defaults."""
-    found = [
-        (each, name, each.get("name") or f"{name}/body{number + 1}", each.get("childclass", style))
-        for number, each in enumerate(body.findall("body"))
+    children = [
+        (element, name, element.get("name") or f"{name}/body{number + 1}", element.get("childclass", style))
+        for number, element in enumerate(body.findall("body"))
     ]
-    return found[::-1]
+    return children[::-1]
 
 
 def _followers(root: Element, reader: _Reader) -> tuple[Mimic, ...]:
     """Joints that follow others: by how much from where the file draws them."""
     where = reader.where
-    found = []
+    mimics = []
 
     for tie in root.findall("equality/joint"):
         if tie.get("joint2") is None or tie.get("active", "true") != "true":
             continue
         name, source = (attribute(tie, "joint", key, f"{where}: equality") for key in ("joint1", "joint2"))
-        words = [float(number) for number in numbers(tie, "polycoef", 5, (0.0, 1.0, 0.0, 0.0, 0.0), where)]
-        if any(words[2:]):
+        coefficients = [float(number) for number in numbers(tie, "polycoef", 5, (0.0, 1.0, 0.0, 0.0, 0.0), where)]
+        if any(coefficients[2:]):
             raise InputError(f"{where}: joint '{name}' follows '{source}' by a curve; only straight lines can be read")
-        zeros = [reader.zeros.get(joint, 0.0) for joint in (name, source)]
-        found.append(Mimic(name, source, words[1], words[0] + zeros[0] - words[1] * zeros[1]))
-    return tuple(found)
+        values_at_zero = [reader.zeros.get(joint, 0.0) for joint in (name, source)]
+        mimics.append(
+            Mimic(
+                name, source, coefficients[1], coefficients[0] + values_at_zero[0] - coefficients[1] * values_at_zero[1]
+            )
+        )
+    return tuple(mimics)
 
 
 def _excluded(root: Element, reader: _Reader) -> frozenset[frozenset[str]]:
     """Pairs that ``<exclude>`` names, and those of which no two geoms have masks that meet."""
     pairs = {frozenset((item.get("body1", ""), item.get("body2", ""))) for item in root.findall("contact/exclude")}
-    for (one, own), (other, others) in combinations(reader.masks.items(), 2):
-        if not any(meet(a, b) for a in own for b in others):
-            pairs.add(frozenset((one, other)))
+    for (first, first_masks), (second, second_masks) in combinations(reader.masks.items(), 2):
+        if not any(meet(a, b) for a in first_masks for b in second_masks):
+            pairs.add(frozenset((first, second)))
     return frozenset(pair for pair in pairs if len(pair) == 2)
 
 
-def _apart(reader: _Reader) -> frozenset[frozenset[str]]:
+def _never_colliding_solids(reader: _Reader) -> frozenset[frozenset[str]]:
     """Pairs of solids that never collide: by their masks, or as neighbours."""
-    found = set(solids_apart(reader.masks))
-    for one, other in joined_bodies(reader.bodies):
-        numbered = ([f"{name}_{k}" for k in range(len(reader.masks.get(name, ())))] for name in (one, other))
-        found |= {frozenset(pair) for pair in product(*numbered)}
-    return frozenset(found)
+    pairs = set(solids_apart(reader.masks))
+    for first, second in joined_bodies(reader.bodies):
+        solid_names = ([f"{name}_{k}" for k in range(len(reader.masks.get(name, ())))] for name in (first, second))
+        pairs |= {frozenset(pair) for pair in product(*solid_names)}
+    return frozenset(pairs)
 
 
 def _keys(root: Element, reader: _Reader) -> dict[str, dict[str, float]]:
-    found = {}
+    postures = {}
     sizes = [SIZES[kind] for _, kind in reader.moving]
     starts = np.cumsum([0, *sizes]).tolist()
     for number, key in enumerate(root.findall("keyframe/key")):
         if key.get("qpos") is None:
             continue
         values = numbers(key, "qpos", sum(sizes), None, f"{reader.where}: key '{key.get('name', number)}'")
-        own = {name: values[at] for (name, kind), at in zip(reader.moving, starts, strict=False) if kind != "free"}
-        found[key.get("name") or f"key{number}"] = own
-    return found
+        values_by_joint = {
+            name: values[start] for (name, kind), start in zip(reader.moving, starts, strict=False) if kind != "free"
+        }
+        postures[key.get("name") or f"key{number}"] = values_by_joint
+    return postures

@@ -57,28 +57,30 @@ class Settings:
 
         stack = [(element, MAIN) for element in root.findall("default")]
         while stack:
-            element, above = stack.pop()
+            element, parent_class = stack.pop()
             name = element.get("class", MAIN)
-            known = self.classes.get(name, self.classes[above])
-            own = {item.tag: {**known.get(item.tag, {}), **item.attrib} for item in element if item.tag != "default"}
-            self.classes[name] = {**known, **own}
+            inherited = self.classes.get(name, self.classes[parent_class])
+            defaults = {
+                item.tag: {**inherited.get(item.tag, {}), **item.attrib} for item in element if item.tag != "default"
+            }
+            self.classes[name] = {**inherited, **defaults}
             stack += [(item, name) for item in element.findall("default")]
 
-    def filled(self, element: Element, above: str, where: str) -> Element:
+    def filled(self, element: Element, parent_class: str, where: str) -> Element:
         """The element with the defaults of its class, or of the class of the body that it is in.
 
         Raises:
             UnknownNameError: If there is no such class.
         """
-        name = element.get("class", above)
+        name = element.get("class", parent_class)
         if name not in self.classes:
             raise UnknownNameError("default class", name, self.classes, where=where)
 
         filled = ElementTree.Element(element.tag, {**self.classes[name].get(element.tag, {}), **element.attrib})
         for key in _ORIENTATIONS:  # an orientation of its own takes the place of any other
             if key in element.attrib:
-                for other in (other for other in _ORIENTATIONS if other not in element.attrib):
-                    filled.attrib.pop(other, None)
+                for orientation in (orientation for orientation in _ORIENTATIONS if orientation not in element.attrib):
+                    filled.attrib.pop(orientation, None)
         return filled
 
     def angle(self, value: float) -> float:
@@ -88,11 +90,11 @@ class Settings:
     def placement(self, element: Element, where: str) -> pin.SE3:
         """``pinocchio.SE3`` of an element with pos and one of the five orientations."""
         position = numbers(element, "pos", 3, (0.0, 0.0, 0.0), where)
-        given = [key for key in _ORIENTATIONS if element.get(key) is not None]
-        if len(given) > 1:
-            raise InputError(f"{where}: <{element.tag}> has {' and '.join(given)}; leave one")
-        turn = getattr(self, f"_{given[0]}")(element, where) if given else np.eye(3)
-        return pin.SE3(turn, np.array(position))
+        written = [key for key in _ORIENTATIONS if element.get(key) is not None]
+        if len(written) > 1:
+            raise InputError(f"{where}: <{element.tag}> has {' and '.join(written)}; leave one")
+        rotation = getattr(self, f"_{written[0]}")(element, where) if written else np.eye(3)
+        return pin.SE3(rotation, np.array(position))
 
     def _quat(self, element: Element, where: str) -> Matrix:
         w, x, y, z = numbers(element, "quat", 4, None, where)

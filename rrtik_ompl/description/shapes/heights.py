@@ -63,7 +63,7 @@ def load_height_field(
 
     data = read_bytes(path, MAX_BYTES)
     what = str(path)
-    mark = None if nodata is None else finite_number(nodata, f"{path}: nodata")
+    no_data_value = None if nodata is None else finite_number(nodata, f"{path}: nodata")
     known_choice(invalid, what)
 
     picture = suffix in PICTURES
@@ -72,11 +72,11 @@ def load_height_field(
     elif picture:
         header = picture_header(data, what)
         rows = unstretched(_picture(data, what), header)
-        mark = header.nodata if mark is None else mark
+        no_data_value = header.nodata if no_data_value is None else no_data_value
     else:
         rows = text_rows(data, None, what)
 
-    rows = _marked(rows, mark, invalid, what, from_above=picture)
+    rows = _with_missing_as_nan(rows, no_data_value, invalid, what, from_above=picture)
     source = os.path.abspath(path)
 
     return HeightField(
@@ -86,16 +86,18 @@ def load_height_field(
         invalid=invalid,
         source=source,
         scale=factor,
-        nodata=None if nodata is None else mark,
+        nodata=None if nodata is None else no_data_value,
     )
 
 
-def _marked(rows: NDArray[Any], mark: float | None, invalid: Invalid, what: str, *, from_above: bool) -> NDArray[Any]:
+def _with_missing_as_nan(
+    rows: NDArray[Any], no_data_value: float | None, invalid: Invalid, what: str, *, from_above: bool
+) -> NDArray[Any]:
     """The heights, NaN where a number stands for no data.
 
     Args:
         rows: The heights of the file.
-        mark: The number; one that usually does, and lies far below all heights, is refused if None.
+        no_data_value: The number; one that usually does, and lies far below all heights, is refused if None.
         invalid: Whether such heights, and those that are not finite, are refused.
         what: The file, for messages.
         from_above: Whether the last row is the first one of the file.
@@ -103,8 +105,10 @@ def _marked(rows: NDArray[Any], mark: float | None, invalid: Invalid, what: str,
     Raises:
         InputError: If there is such a height, with the place of the first one in the file.
     """
-    guess = next((usual for usual in USUAL if _is_mark(rows, usual)), None) if mark is None else None
-    number = guess if mark is None else mark
+    guess = (
+        next((usual for usual in USUAL if _stands_for_no_data(rows, usual)), None) if no_data_value is None else None
+    )
+    number = guess if no_data_value is None else no_data_value
 
     missing = ~np.isfinite(rows)
     if number is not None:
@@ -116,24 +120,24 @@ def _marked(rows: NDArray[Any], mark: float | None, invalid: Invalid, what: str,
     if invalid == "refuse" or guess is not None:
         in_file = missing[::-1] if from_above else missing
         row, column = np.argwhere(in_file)[0].tolist()
-        some = f"{np.count_nonzero(missing)} of {rows.size} heights are no numbers"
+        counted = f"{np.count_nonzero(missing)} of {rows.size} heights are no numbers"
         remedy = "invalid='drop' leaves out their columns"
         if number is not None:
-            some = f"{some} or {number:g}, which stands for no data"
+            counted = f"{counted} or {number:g}, which stands for no data"
         if guess is not None:
             remedy = f"nodata={guess:g} with invalid='drop' leaves out their columns; if it is a height, state another"
-        raise InputError(f"{what}: {some}, the first in row {row}, column {column} (from 0); {remedy}")
+        raise InputError(f"{what}: {counted}, the first in row {row}, column {column} (from 0); {remedy}")
 
     return np.where(missing, np.nan, rows)
 
 
-def _is_mark(rows: NDArray[Any], usual: float) -> bool:
+def _stands_for_no_data(rows: NDArray[Any], usual: float) -> bool:
     """Whether a number that usually stands for no data is in a grid, far below all heights."""
-    found = rows[np.isfinite(rows)].astype(np.float64)
-    rest = found[found != usual]
-    if len(rest) == len(found):
+    finite = rows[np.isfinite(rows)].astype(np.float64)
+    others = finite[finite != usual]
+    if len(others) == len(finite):
         return False
-    return len(rest) == 0 or float(rest.min()) - usual > float(np.ptp(rest))
+    return len(others) == 0 or float(others.min()) - usual > float(np.ptp(others))
 
 
 def _picture(data: bytes, what: str) -> NDArray[Any]:
@@ -145,12 +149,12 @@ def _picture(data: bytes, what: str) -> NDArray[Any]:
         raise InputError(f"{what}: pictures need OpenCV: {remedy}") from None
 
     try:
-        found = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+        picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     except cv2.error:  # a header with a size larger than memory
-        found = None
+        picture = None
 
-    if found is None:
+    if picture is None:
         raise InputError(f"{what}: not a picture that can be read; save it as a grey PNG of 16 bits")
-    if found.ndim != 2:
-        raise InputError(f"{what}: a picture of heights is grey, this has {found.shape[2]} colours; save it as grey")
-    return np.asarray(found[::-1])
+    if picture.ndim != 2:
+        raise InputError(f"{what}: a picture of heights is grey, this has {picture.shape[2]} colours; save it as grey")
+    return np.asarray(picture[::-1])

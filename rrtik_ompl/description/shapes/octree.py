@@ -88,12 +88,12 @@ def octree_points(data: bytes, what: str) -> Matrix:
     if (count := float((widths**3).sum())) > MOST_POINTS:
         raise InputError(f"{what}: {count:.0f} occupied cells, more than {MOST_POINTS}; take it as an octree instead")
 
-    found = [np.zeros((0, 3))]
+    corners = [np.zeros((0, 3))]
     for width in np.unique(widths).astype(int).tolist():
-        inside = np.indices((width, width, width)).reshape(3, -1).T
-        found.append((places[widths == width][:, None] + inside).reshape(-1, 3))
+        offsets = np.indices((width, width, width)).reshape(3, -1).T
+        corners.append((places[widths == width][:, None] + offsets).reshape(-1, 3))
 
-    return resolution * (np.concatenate(found) + 0.5 - float(1 << (DEPTH - 1)))
+    return resolution * (np.concatenate(corners) + 0.5 - float(1 << (DEPTH - 1)))
 
 
 def octree_resolution(data: bytes, what: str) -> float:
@@ -107,8 +107,8 @@ def octree_resolution(data: bytes, what: str) -> float:
 
 def _header(data: bytes, what: str) -> tuple[dict[str, str], bytes]:
     """What the header of a file says, and the tree after it."""
-    head, found, body = data.partition(b"\ndata\n")
-    if not data.startswith(FIRST_LINE) or not found:
+    head, separator, body = data.partition(b"\ndata\n")
+    if not data.startswith(FIRST_LINE) or not separator:
         raise InputError(f"{what}: not a map of OctoMap: expected '{FIRST_LINE.decode()}' and a line 'data'")
     lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
     return {line[0]: line[1] for line in lines if len(line) == 2 and line[0] != "#"}, body
@@ -137,23 +137,23 @@ def _cells_in(
     resolution = _resolution(header, what)
 
     occupied: list[tuple[int, int, int, int]] = []
-    open_ = [(0, 0, 0, 0)] if body else []
-    at = 0
-    while open_:
-        x, y, z, level = open_.pop()
-        if level == DEPTH or at + 2 > len(body):
+    unvisited = [(0, 0, 0, 0)] if body else []
+    position = 0
+    while unvisited:
+        x, y, z, level = unvisited.pop()
+        if level == DEPTH or position + 2 > len(body):
             raise InputError(f"{what}: the tree {'is too deep' if level == DEPTH else 'ends too early'}; save it again")
 
-        bits = body[at] | body[at + 1] << 8
-        at += 2
+        bits = body[position] | body[position + 1] << 8
+        position += 2
         half = 1 << (DEPTH - 1 - level)
-        inner: list[tuple[int, int, int, int]] = []
+        inner_nodes: list[tuple[int, int, int, int]] = []
         for child in range(8):
             kind = bits >> (2 * child) & 3
             if kind >= OCCUPIED:
-                place = (x + half * (child & 1), y + half * (child >> 1 & 1), z + half * (child >> 2), level + 1)
-                (occupied if kind == OCCUPIED else inner).append(place)
-        open_ += inner[::-1]  # the first one follows first
+                child_node = (x + half * (child & 1), y + half * (child >> 1 & 1), z + half * (child >> 2), level + 1)
+                (occupied if kind == OCCUPIED else inner_nodes).append(child_node)
+        unvisited += inner_nodes[::-1]  # the first one follows first
 
     rows = np.array(occupied, dtype=np.float64).reshape(-1, 4)
-    return rows[:, :3], rows[:, 3], resolution, at
+    return rows[:, :3], rows[:, 3], resolution, position
