@@ -49,34 +49,41 @@ class Aids:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._key: Any = None
-        self._found = Distances(None, None)
+        self._measured_key: Any = None
+        self._distances = Distances(None, None)
 
     def distances(self) -> Distances:
         """Of the arm where it is."""
         session = self._session
-        around = session.surroundings
-        key = (session.q.tobytes(), around.version, session.target)
+        surroundings = session.surroundings
+        key = (session.q.tobytes(), surroundings.version, session.target)
 
-        if key != self._key:
-            world = around.world
+        if key != self._measured_key:
+            world = surroundings.world
             frames = world.robot.joint_frames(session.q[None])[0]
-            around_it = {each.name for each in world.scene.obstacles}
-            every = [
+            obstacle_names = {obstacle.name for obstacle in world.scene.obstacles}
+            to_obstacles = [
                 contact
                 for contact in measured(world.bodies, world.pairs, frames, near_only=False)
-                if {contact.first, contact.second} & around_it
+                if {contact.first, contact.second} & obstacle_names
             ]
 
-            tool = {*gripper_links(session.robot), *(solid.name for solid in around.held_solids(pin.SE3.Identity()))}
-            seen = None if session.target is None else around.named(session.target)
-            target = set() if seen is None else set(seen.object.solid_names)
-            pairs = [c for c in every if {c.first, c.second} & tool and {c.first, c.second} & target]
+            held_names = {solid.name for solid in surroundings.held_solids(pin.SE3.Identity())}
+            tool = {*gripper_links(session.robot), *held_names}
+            target_seen = None if session.target is None else surroundings.named(session.target)
+            target_solids = set() if target_seen is None else set(target_seen.object.solid_names)
+            tool_to_target = [
+                contact
+                for contact in to_obstacles
+                if {contact.first, contact.second} & tool and {contact.first, contact.second} & target_solids
+            ]
 
-            least = [min(found, key=lambda c: c.distance, default=None) for found in (every, pairs)]
-            self._key = key
-            self._found = Distances(*least)
-        return self._found
+            self._measured_key = key
+            self._distances = Distances(
+                nearest=min(to_obstacles, key=lambda contact: contact.distance, default=None),
+                to_target=min(tool_to_target, key=lambda contact: contact.distance, default=None),
+            )
+        return self._distances
 
     def document(self) -> dict[str, Any]:
         """The distances as plain values [mm]."""
@@ -95,25 +102,25 @@ def draw_aids(
     """The axis of the tool and that of the grasp, the line between them with its length, one straight down, the gap."""
     view = _View(drawn, camera, T_base_camera)
     if distances.nearest is not None and 0.0 < distances.nearest.distance < SHOWN:
-        gap = distances.nearest
-        view.line(gap.point_first, gap.point_second, NEAR_COLOR, f"{1e3 * gap.distance:.0f} mm")
+        nearest = distances.nearest
+        view.line(nearest.point_first, nearest.point_second, NEAR_COLOR, f"{1e3 * nearest.distance:.0f} mm")
 
-    seen = None if session.target is None else session.surroundings.named(session.target)
-    if seen is None:
+    target_seen = None if session.target is None else session.surroundings.named(session.target)
+    if target_seen is None:
         return
 
     tip = session.robot.fk(session.q)
-    at = tip.translation
+    tip_point = tip.translation
     if session.state.choice is not None:
-        goal = seen.grasp_pose(*session.state.choice)
-        view.line(at, at + AXIS * tip.rotation[:, 2], TOOL_AXIS)
+        goal = target_seen.grasp_pose(*session.state.choice)
+        view.line(tip_point, tip_point + AXIS * tip.rotation[:, 2], TOOL_AXIS)
         view.line(goal.translation - AXIS * goal.rotation[:, 2], goal.translation, GRASP_AXIS)
     else:
-        goal = seen.T_base_object
+        goal = target_seen.T_base_object
 
-    there = goal.translation
-    view.line(at, np.array([at[0], at[1], there[2]]), DOWN)
-    view.line(at, there, WHITE, f"{float(np.linalg.norm(there - at)):.3f} m")
+    goal_point = goal.translation
+    view.line(tip_point, np.array([tip_point[0], tip_point[1], goal_point[2]]), DOWN)
+    view.line(tip_point, goal_point, WHITE, f"{float(np.linalg.norm(goal_point - tip_point)):.3f} m")
 
 
 class _View:

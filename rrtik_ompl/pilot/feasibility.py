@@ -24,55 +24,67 @@ class FeasibilityCache:
         self._fault: tuple[Hashable, str] = ((), "")
         self._range: tuple[Hashable, JointRange | None] = ((), None)
 
-    def lamps(self, around: Surroundings, target: str | None, q: Vector) -> tuple[Lamp, ...]:
+    def lamps(self, surroundings: Surroundings, target: str | None, q: Vector) -> tuple[Lamp, ...]:
         """Lamps of an object where it is; none if it was never seen."""
-        seen = None if target is None else around.named(target)
-        if seen is None:
+        target_seen = None if target is None else surroundings.named(target)
+        if target_seen is None:
             return ()
 
-        key = (target, around, around.world_at(q, target).valid(q))
+        key = (target, surroundings, surroundings.world_at(q, target).valid(q))
         if key != self._lamps[0]:
-            holding = around.holding(seen.object.name)
-            self._lamps = (key, lamps(around.world, seen.object, seen.T_base_object, q, holding=holding))
+            world_touching = surroundings.holding(target_seen.object.name)
+            self._lamps = (
+                key,
+                lamps(surroundings.world, target_seen.object, target_seen.T_base_object, q, holding=world_touching),
+            )
         return self._lamps[1]
 
     def patient_lamp(
-        self, around: Surroundings, target: str | None, choice: tuple[str, int] | None, q: Vector
+        self, surroundings: Surroundings, target: str | None, choice: tuple[str, int] | None, q: Vector
     ) -> Lamp | None:
         """The lamp of a grasp; where the arm has no closed form and nothing was found, after a longer search."""
-        lamp = self._lamp(around, target, choice, q)
-        seen = None if target is None else around.named(target)
-        if lamp is None or seen is None or len(lamp.grasps) or has_closed_form(around.world.robot):
+        lamp = self._lamp(surroundings, target, choice, q)
+        target_seen = None if target is None else surroundings.named(target)
+        if lamp is None or target_seen is None or len(lamp.grasps) or has_closed_form(surroundings.world.robot):
             return lamp
 
-        holding = around.holding(seen.object.name)
+        world_touching = surroundings.holding(target_seen.object.name)
         key = self._lamps[0]
-        again = lamps(around.world, seen.object, seen.T_base_object, q, holding=holding, seconds=PATIENT_SECONDS)
+        longer_search = lamps(
+            surroundings.world,
+            target_seen.object,
+            target_seen.T_base_object,
+            q,
+            holding=world_touching,
+            seconds=PATIENT_SECONDS,
+        )
 
-        self._lamps = (key, again)
+        self._lamps = (key, longer_search)
         self._fault = ((), "")
-        return self._lamp(around, target, choice, q)
+        return self._lamp(surroundings, target, choice, q)
 
-    def _lamp(self, around: Surroundings, target: str | None, choice: tuple[str, int] | None, q: Vector) -> Lamp | None:
-        return next((lamp for lamp in self.lamps(around, target, q) if (lamp.type, lamp.level) == choice), None)
+    def _lamp(
+        self, surroundings: Surroundings, target: str | None, choice: tuple[str, int] | None, q: Vector
+    ) -> Lamp | None:
+        return next((lamp for lamp in self.lamps(surroundings, target, q) if (lamp.type, lamp.level) == choice), None)
 
-    def fault(self, around: Surroundings, target: str, lamp: Lamp, q: Vector) -> str:
+    def fault(self, surroundings: Surroundings, target: str, lamp: Lamp, q: Vector) -> str:
         """What is wrong with a grasp: how far out of reach it is, or what would touch; "" if it can be made."""
-        seen = around.named(target)
+        seen = surroundings.named(target)
         if seen is None or lamp.stage is None:
             return ""
 
         key = (self._lamps[0], lamp.type, lamp.level)
         if key != self._fault[0]:
-            worlds = around.world, around.holding(target)
+            worlds = surroundings.world, surroundings.holding(target)
             self._fault = (key, diagnose(lamp, seen.object, seen.T_base_object, q, *worlds))
         return self._fault[1]
 
-    def joint_range(self, around: Surroundings, world: World, q: Vector, joint: int) -> JointRange:
+    def joint_range(self, surroundings: Surroundings, world: World, q: Vector, joint: int) -> JointRange:
         """The range of a joint in a world of some surroundings now; it stays the same while that joint alone moves."""
-        key = (joint, np.delete(q, joint).tobytes(), around, id(world))
-        kept = self._range[1]
-        if kept is None or key != self._range[0] or not kept.low <= q[joint] <= kept.high:
-            kept = joint_range(world, q, joint)
-            self._range = (key, kept)
-        return kept
+        key = (joint, np.delete(q, joint).tobytes(), surroundings, id(world))
+        cached = self._range[1]
+        if cached is None or key != self._range[0] or not cached.low <= q[joint] <= cached.high:
+            cached = joint_range(world, q, joint)
+            self._range = (key, cached)
+        return cached

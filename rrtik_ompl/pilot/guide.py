@@ -42,25 +42,25 @@ def plan(_: Means, state: State) -> State:
 
 
 def _search(means: Means, state: State, q: Vector) -> State:
-    here = replace(state, q=frozen(q))
-    around = state.around
-    lamp = means.feasibility.patient_lamp(around, state.target, state.choice, here.q)
-    search = partial(propose, means.problem, around, state.target, lamp, here.q, means.rates, means.seed)
-    return here.do(FindRoute(search, _planned))
+    at_reading = replace(state, q=frozen(q))
+    surroundings = state.around
+    lamp = means.feasibility.patient_lamp(surroundings, state.target, state.choice, at_reading.q)
+    search = partial(propose, means.problem, surroundings, state.target, lamp, at_reading.q, means.rates, means.seed)
+    return at_reading.do(FindRoute(search, _planned))
 
 
 def _planned(means: Means, state: State, found: Route | NoRoute) -> State:
     if isinstance(found, NoRoute):
-        left = leave(state)
-        otherwise = "choose another grasp" if left.choice else "drive the arm elsewhere, or choose an object"
-        advice = escape_advice(world_by_hand(left), left.q) or otherwise
-        return left.say(refused(f"no route: {grasp_fault(means, left) or found}; {advice}"))
-    aimed = state.around.named(state.target) if state.target and state.choice else None
+        without_route = leave(state)
+        otherwise = "choose another grasp" if without_route.choice else "drive the arm elsewhere, or choose an object"
+        advice = escape_advice(world_by_hand(without_route), without_route.q) or otherwise
+        return without_route.say(refused(f"no route: {grasp_fault(means, without_route) or found}; {advice}"))
+    target_seen = state.around.named(state.target) if state.target and state.choice else None
 
-    made = proposed(means, state, found, aimed)
-    if aimed is None:
-        return made
-    return made.say(news(made.answer.text + made.around.not_compared(aimed.object.name)))
+    proposal = proposed(means, state, found, target_seen)
+    if target_seen is None:
+        return proposal
+    return proposal.say(news(proposal.answer.text + proposal.around.not_compared(target_seen.object.name)))
 
 
 def proposed(means: Means, state: State, route: Route, aimed: SeenObject | None = None) -> State:
@@ -94,10 +94,10 @@ def together(means: Means, state: State) -> State:
     return state.do(FindRoute(search, _put_together))
 
 
-def _put_together(means: Means, state: State, made: Route | NoRoute) -> State:
-    if isinstance(made, NoRoute):
-        return state.say(refused(f"no route {made}"))
-    return proposed(means, state, made, state.way.aimed)
+def _put_together(means: Means, state: State, route: Route | NoRoute) -> State:
+    if isinstance(route, NoRoute):
+        return state.say(refused(f"no route {route}"))
+    return proposed(means, state, route, state.way.aimed)
 
 
 def accept(_: Means, state: State) -> State:
@@ -106,15 +106,15 @@ def accept(_: Means, state: State) -> State:
         raise InputError("there is no route to accept; 'plan' proposes one")
 
     follower, progress = state.way.follower.update(state.q)
-    here = state.on_its_way(follower=follower)
+    updated = state.on_its_way(follower=follower)
     if progress.advice == "lost":
-        away = f"the arm is not where the route starts: {progress.fault}"
-        return here.say(refused(f"{away}; 'replan' starts it from here"))
+        message = f"the arm is not where the route starts: {progress.fault}"
+        return updated.say(refused(f"{message}; 'replan' starts it from here"))
 
-    if fault := fault_of_rest(here):
-        return withdrawn(here, fault)
+    if fault := fault_of_rest(updated):
+        return withdrawn(updated, fault)
 
-    accepted = replace(here.on_its_way(progress=progress, withdrawn=""), mode=FOLLOWING)
+    accepted = replace(updated.on_its_way(progress=progress, withdrawn=""), mode=FOLLOWING)
     return show_due(accepted).say(news("accepted; hold 'next' to make the next move"))
 
 
@@ -138,15 +138,15 @@ def back(means: Means, state: State) -> State:
 
 def settle(_: Means, state: State) -> State:
     """Take the current move for made where the arm does not come nearer to its end."""
-    due = state.way.follower
-    if due is None or due.joint() is None:
+    follower_before = state.way.follower
+    if follower_before is None or follower_before.joint() is None:
         raise InputError("no move is due")
 
-    passed, joint, left = due.pass_on(state.q)
+    passed, joint, remaining = follower_before.pass_on(state.q)
     follower, progress = passed.update(state.q)
 
     after = show_due(state.on_its_way(follower=follower, progress=progress))
-    return after.say(refused(f"{joint} comes no nearer than {left} to its end; release, then hold 'next' again"))
+    return after.say(refused(f"{joint} comes no nearer than {remaining} to its end; release, then hold 'next' again"))
 
 
 # --- what happens meanwhile ------------------------------------------------------------------------------------------
@@ -154,36 +154,36 @@ def settle(_: Means, state: State) -> State:
 
 def watch(means: Means, state: State) -> State:
     """The progress of an accepted route, where the arm is now."""
-    due = state.way.follower
-    if due is None or state.mode != FOLLOWING:
+    follower_before = state.way.follower
+    if follower_before is None or state.mode != FOLLOWING:
         return state
 
-    follower, progress = due.update(state.q)
+    follower, progress = follower_before.update(state.q)
     after = state.on_its_way(follower=follower, progress=progress)
 
     if progress.advice == "lost":
-        lost = after.stand_still()
-        return lost.say(alarm(f"off the route: {progress.fault}; 'replan' finds a new one from here"))
+        stopped = after.stand_still()
+        return stopped.say(alarm(f"off the route: {progress.fault}; 'replan' finds a new one from here"))
     if progress.advice == "done":
         return after if after.drive.active else _ended(means.robot, after, follower)
-    if follower.current == due.current:
+    if follower.current == follower_before.current:
         return after
 
-    done = f"move {follower.current} of {len(follower.moves)} is done; 'next' makes the next"
-    return show_due(after).say(news(done))
+    message = f"move {follower.current} of {len(follower.moves)} is done; 'next' makes the next"
+    return show_due(after).say(news(message))
 
 
 def _ended(robot: Robot, state: State, follower: Follower | Track) -> State:
     """All moves are made: whether the tip is where the route ends."""
     ended = replace(state, mode=MANOEUVRE)
 
-    away, turned = apart(robot.fk(follower.path.end), robot.fk(state.q))
-    if away <= MAX_END_OFFSET and turned <= MAX_END_TURN:
+    distance, turn = apart(robot.fk(follower.path.end), robot.fk(state.q))
+    if distance <= MAX_END_OFFSET and turn <= MAX_END_TURN:
         return ended.say(news(MADE))
 
-    far = f"{1e3 * away:.1f} mm and {np.rad2deg(turned):.2f} deg"
-    missed = f"all moves are made, but the tip is {far} away from the end of the route; 'replan' may go nearer"
-    return ended.say(refused(missed))
+    how_far = f"{1e3 * distance:.1f} mm and {np.rad2deg(turn):.2f} deg"
+    message = f"all moves are made, but the tip is {how_far} away from the end of the route; 'replan' may go nearer"
+    return ended.say(refused(message))
 
 
 def check(state: State) -> State:
@@ -233,26 +233,26 @@ def fault_of_rest(state: State) -> str:
         return ""
     if moved := _target_moved(state):
         return moved
-    around = state.around
+    surroundings = state.around
     target = state.target
-    grasping = target is not None and state.choice is not None and around.named(target) is not None
-    world = around.holding(str(target)) if grasping else world_by_hand(state)
+    is_grasping = target is not None and state.choice is not None and surroundings.named(target) is not None
+    world = surroundings.holding(str(target)) if is_grasping else world_by_hand(state)
     return path_fault(world, state.way.follower.rest(state.q))
 
 
 def _target_moved(state: State) -> str:
     """By how much the target is not where the route ends any more; "" if it is there."""
     aimed = state.way.aimed
-    now = None if aimed is None else state.around.named(aimed.object.name)
-    if aimed is None or now is None:
+    seen_now = None if aimed is None else state.around.named(aimed.object.name)
+    if aimed is None or seen_now is None:
         return ""
 
-    away, turned = apart(aimed.T_base_object, now.T_base_object)
-    if away <= MAX_SHIFT and turned <= MAX_TURN:
+    distance, turn = apart(aimed.T_base_object, seen_now.T_base_object)
+    if distance <= MAX_SHIFT and turn <= MAX_TURN:
         return ""
 
-    far = f"{1e3 * away:.0f} mm and {np.rad2deg(turned):.1f} deg"
-    return f"{aimed.object.name} has moved by {far} since the route was planned"
+    how_far = f"{1e3 * distance:.0f} mm and {np.rad2deg(turn):.1f} deg"
+    return f"{aimed.object.name} has moved by {how_far} since the route was planned"
 
 
 def leave(state: State) -> State:

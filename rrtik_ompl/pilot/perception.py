@@ -68,22 +68,22 @@ class LivePerception:
         self.T_base_camera: pin.SE3 | None = sensor.marker_map.T_base_camera
         self.others: tuple[NDArray[np.uint8], ...] = ()
         self.lost = self.hint = ""
-        self._explain_again = -np.inf
-        self._last: Picture | None = None
+        self._next_explanation_time = -np.inf
+        self._last_picture: Picture | None = None
         self._sensor = sensor
         self.source = source
 
     def update(self, session: Session, time: float) -> None:
         """Process the newest picture, and give the objects in it to the session."""
         try:
-            taken = self.source.latest()
-            if taken is None:
+            picture = self.source.latest()
+            if picture is None:
                 return
-            if self._frozen(taken) and not session.means.past:
+            if self._frozen(picture) and not session.means.past:
                 self.lost = REPEATS if session.time - session.state.pictures.time > STALE_SECONDS else self.lost
                 return
-            others = [Picture(each.pixels, each.name, time) for each in taken.others]
-            view = self._sensor.view(Picture(taken.pixels, taken.name, time), *others)
+            other_pictures = [Picture(each.pixels, each.name, time) for each in picture.others]
+            view = self._sensor.view(Picture(picture.pixels, picture.name, time), *other_pictures)
         except RrtikError as error:
             self.lost = str(error)
             if self.lost != ENDED:  # the last picture of a film was a good one
@@ -91,8 +91,8 @@ class LivePerception:
             return
 
         self.lost = ""
-        self.picture = taken.pixels
-        self.others = tuple(each.pixels for each in taken.others)
+        self.picture = picture.pixels
+        self.others = tuple(each.pixels for each in picture.others)
         session.see(view.placed, time)
 
         if tip := tip_seen(self._sensor.marker_map, view.seen):
@@ -102,16 +102,16 @@ class LivePerception:
         if not view.why_not_placed:
             self.T_base_camera, _ = base_from_camera(self._sensor.marker_map, view.seen)
 
-    def _frozen(self, taken: Picture) -> bool:
+    def _frozen(self, picture: Picture) -> bool:
         """Whether a picture, or that of another camera of the rig, is the last one again: it shows no present."""
-        before = self._last
-        self._last = taken
-        if before is None or len(before.others) != len(taken.others):
+        last_picture = self._last_picture
+        self._last_picture = picture
+        if last_picture is None or len(last_picture.others) != len(picture.others):
             return False
 
-        now = (taken, *taken.others)
-        then = (before, *before.others)
-        return any(each.repeats(last) for each, last in zip(now, then, strict=True))
+        pictures = (picture, *picture.others)
+        last_pictures = (last_picture, *last_picture.others)
+        return any(each.repeats(last) for each, last in zip(pictures, last_pictures, strict=True))
 
     def close(self) -> None:
         """Release the camera."""
@@ -127,12 +127,14 @@ class LivePerception:
         if view.placed:
             return ""
         if view.seen:
-            refused = next((f"{each.object.name}: {each.refused}" for each in view.seen if each.refused), "")
-            return refused or view.why_not_placed
+            for sighting in view.seen:
+                if sighting.refused:
+                    return f"{sighting.object.name}: {sighting.refused}"
+            return view.why_not_placed
         if known:
             return "no marker in view"
-        if time >= self._explain_again:
-            self._explain_again = time + EXPLANATION_SECONDS
+        if time >= self._next_explanation_time:
+            self._next_explanation_time = time + EXPLANATION_SECONDS
             return self._sensor.why_nothing("camera")
         return self.hint
 
@@ -184,9 +186,10 @@ class SimulatedSource:
             self._carry(arm, arm.robot.fk(q))
 
         tip = self.camera.T_start_base * self.camera.robot.fk(q)
-        on_arm = {each.name: tip for each in self.camera.marker_map.objects if each.role == "arm"}
-        if on_arm:
-            self.camera.places = {**self.camera.places, **on_arm}
+        on_arm = (marked_object for marked_object in self.camera.marker_map.objects if marked_object.role == "arm")
+        places_on_arm = {marked_object.name: tip for marked_object in on_arm}
+        if places_on_arm:
+            self.camera.places = {**self.camera.places, **places_on_arm}
 
         return self.camera.picture(q, float(self._count))
 
@@ -195,16 +198,19 @@ class SimulatedSource:
         tip = self.camera.T_start_base * T_base_tip
         camera = self.camera
         if arm.closed and not self._was_closed:
-            near = [
-                (float(np.linalg.norm(tip.actInv(camera.places[thing.name] * level).translation)), thing.name)
-                for thing in camera.marker_map.objects
-                if thing.loose and thing.name in camera.places
-                for grasp in thing.grasps
+            grasp_distances = [
+                (
+                    float(np.linalg.norm(tip.actInv(camera.places[marked_object.name] * level).translation)),
+                    marked_object.name,
+                )
+                for marked_object in camera.marker_map.objects
+                if marked_object.loose and marked_object.name in camera.places
+                for grasp in marked_object.grasps
                 for level in grasp.levels
             ]
 
-            if near and min(near)[0] <= FINGERS:
-                name = min(near)[1]
+            if grasp_distances and min(grasp_distances)[0] <= FINGERS:
+                name = min(grasp_distances)[1]
                 self._carried = (name, tip.actInv(camera.places[name]))
 
         if self._carried is not None:

@@ -82,31 +82,34 @@ class Surroundings:
     structure: Structure | None = None
     held: HeldObject | None = None
     version: int = 0
-    _seen: Mapping[str, SeenObject] = field(default_factory=dict)
-    _let_go: Mapping[str, pin.SE3] = field(default_factory=dict)  # where the tip was in what was put down, T_object_tip
-    _made: World | None = None  # of what was seen and is held; None before there was anything
-    _holding: dict[str, World] = field(default_factory=dict)  # kept results, of these surroundings
-    _grips: dict[str, MayTouch] = field(default_factory=dict)  # kept results, as long as the same thing is held
+    _seen_objects: Mapping[str, SeenObject] = field(default_factory=dict)
+    # T_object_tip of what was put down: where the tip was in it.
+    _tip_at_release: Mapping[str, pin.SE3] = field(default_factory=dict)
+    # Of what was seen and is held; None before there was anything.
+    _world_with_objects: World | None = None
+    # Results by name of the object that may be touched: of these surroundings, and as long as the same thing is held.
+    _worlds_touching: dict[str, World] = field(default_factory=dict)
+    _allowed_contacts: dict[str, MayTouch] = field(default_factory=dict)
 
     @property
     def world(self) -> World:
         """The world in which nothing may be touched."""
-        return self.given if self._made is None else self._made
+        return self.given if self._world_with_objects is None else self._world_with_objects
 
     @property
     def seen(self) -> tuple[SeenObject, ...]:
         """The objects seen now or earlier."""
-        return tuple(self._seen.values())
+        return tuple(self._seen_objects.values())
 
     @property
     def basis(self) -> tuple[str, ...]:
         """Names of the objects by whose places the world is made: the structure, and all that was seen."""
         fixed = () if self.structure is None else (self.structure.name,)
-        return tuple(dict.fromkeys((*fixed, *self._seen)))
+        return tuple(dict.fromkeys((*fixed, *self._seen_objects)))
 
     def named(self, name: str) -> SeenObject | None:
         """An object as it was seen last, None if it was never seen."""
-        return self._seen.get(name)
+        return self._seen_objects.get(name)
 
     def check_grasp(self, name: str | None, type: str, level: int) -> None:
         """Check that an object was seen and has a grasp.
@@ -130,33 +133,35 @@ class Surroundings:
 
         Matrices and not quaternions: a replay has to find the same routes, to the last bit.
         """
-        return [_plain(each) for each in self.seen]
+        return [_plain(object_seen) for object_seen in self.seen]
 
     def see(self, objects: Sequence[SeenObject]) -> Surroundings:
         """With the objects that the camera sees; these surroundings themselves if none of them is new or has moved."""
-        held = "" if self.held is None else self.held.seen.object.name
-        news = [each for each in objects if each.object.name != held and self._moved(each)]
-        if not news:
+        held_name = "" if self.held is None else self.held.seen.object.name
+        candidates = [object_seen for object_seen in objects if object_seen.object.name != held_name]
+        changed = [object_seen for object_seen in candidates if self._has_moved(object_seen)]
+        if not changed:
             return self
 
-        seen = {**self._seen, **{each.object.name: each for each in news}}
-        return self._renewed(_seen=seen)
+        seen = {**self._seen_objects, **{object_seen.object.name: object_seen for object_seen in changed}}
+        return self._renewed(_seen_objects=seen)
 
     def hold(self, seen: SeenObject, T_tip_object: pin.SE3, q: Vector) -> Surroundings:
         """With an object in the gripper; what it touches at q, shape (dof,), it may until the two have parted.
 
         How far they may overlap says `held`: a millimetre more than now.
         """
-        others = {name: each for name, each in self._seen.items() if name != seen.object.name}
-        taken = HeldObject(seen, T_tip_object, ())
-        world = replace(self, held=taken, _seen=others, _grips={}).world_with(())
+        other_objects = {name: other for name, other in self._seen_objects.items() if name != seen.object.name}
+        held_object = HeldObject(seen, T_tip_object, ())
+        world = replace(self, held=held_object, _seen_objects=other_objects, _allowed_contacts={}).world_with(())
 
-        mine = seen.object.solid_names
-        near = [frozenset((contact.first, contact.second)) for contact in world.contacts(q)]
-        rests = {pair: allowed(world.bodies, *sorted(pair)) for pair in near if pair & set(mine)}
-        rests |= {each.pair: each.going_on() for name in mine for each in touching_at(world, q, name)}
+        own_solids = seen.object.solid_names
+        touching_pairs = [frozenset((contact.first, contact.second)) for contact in world.contacts(q)]
+        rests = {pair: allowed(world.bodies, *sorted(pair)) for pair in touching_pairs if pair & set(own_solids)}
+        rests |= {touching.pair: touching.going_on() for name in own_solids for touching in touching_at(world, q, name)}
 
-        return self._renewed(held=taken._replace(rests=tuple(rests.values())), _seen=others, _grips={})
+        held_object = held_object._replace(rests=tuple(rests.values()))
+        return self._renewed(held=held_object, _seen_objects=other_objects, _allowed_contacts={})
 
     def release(self, T_base_tip: pin.SE3) -> Surroundings:
         """With what is held where it is for a pose of the tip."""
@@ -166,8 +171,12 @@ class Surroundings:
         name = held.seen.object.name
         placed = replace(held.seen, T_base_object=T_base_tip * held.T_tip_object, sighting=None)
 
-        let_go = {**self._let_go, name: held.T_tip_object.inverse()}
-        return self._renewed(held=None, _seen={**self._seen, name: placed}, _let_go=let_go, _grips={})
+        return self._renewed(
+            held=None,
+            _seen_objects={**self._seen_objects, name: placed},
+            _tip_at_release={**self._tip_at_release, name: held.T_tip_object.inverse()},
+            _allowed_contacts={},
+        )
 
     def settle(self, q: Vector) -> Surroundings:
         """What is held may not touch again what it has parted from with an arm at q, shape (dof,)."""
@@ -175,16 +184,17 @@ class Surroundings:
         if held is None or not held.rests:
             return self
 
-        rests = tuple(contact for contact in held.rests if not parted(self.world, q, contact))
-        return self if rests == held.rests else self._renewed(held=held._replace(rests=rests))
+        still_touching = tuple(contact for contact in held.rests if not parted(self.world, q, contact))
+        return self if still_touching == held.rests else self._renewed(held=held._replace(rests=still_touching))
 
     def left_inside(self, q: Vector) -> str:
         """What is held would be left deep inside something by an arm at q, shape (dof,), in words; "" if not."""
         names = () if self.held is None else self.held.seen.object.solid_names
-        around = {each.name for each in self.world.scene.obstacles}
+        obstacle_names = {obstacle.name for obstacle in self.world.scene.obstacles}
 
-        touching = [near for name in names for near in touching_at(self.world, q, name) if near.second in around]
-        deepest = min(touching, key=lambda near: near.distance, default=None)
+        touched = [touch for name in names for touch in touching_at(self.world, q, name)]
+        touched_obstacles = [touch for touch in touched if touch.second in obstacle_names]
+        deepest = min(touched_obstacles, key=lambda touch: touch.distance, default=None)
         return left_inside(deepest) if deepest is not None and deepest.too_deep else ""
 
     def held_solids(self, T_base_tip: pin.SE3) -> tuple[Obstacle, ...]:
@@ -194,88 +204,90 @@ class Surroundings:
 
     def holding(self, name: str) -> World:
         """The world in which the gripper may touch an object."""
-        if name not in self._holding:
-            grip = self._grip(name)
-            self._holding[name] = self.world_with((*grip.contacts, *self.rests), grip.buried)
-        return self._holding[name]
+        if name not in self._worlds_touching:
+            grip = self._contacts_allowed(name)
+            self._worlds_touching[name] = self.world_with((*grip.contacts, *self.rests), grip.buried)
+        return self._worlds_touching[name]
 
     def not_compared(self, name: str) -> str:
         """Which solids of an object are so deep in the gripper at a grasp that they are not compared; "" if none."""
-        solids = sorted({solid for _, solid in self._grip(name).buried})
+        solids = sorted({solid for _, solid in self._contacts_allowed(name).buried})
         return f" (the gripper is not compared with {', '.join(solids)})" if solids else ""
 
-    def _grip(self, name: str) -> MayTouch:
+    def _contacts_allowed(self, name: str) -> MayTouch:
         """What the gripper may touch of an object, and what it holds: no deeper than at one of the object's grasps.
 
         What it holds may come a millimetre nearer than there. The gripper itself may be as far off as an object may
         have moved before a route to it is withdrawn.
         """
-        if name in self._grips:
-            return self._grips[name]
+        if name in self._allowed_contacts:
+            return self._allowed_contacts[name]
 
-        near = self._at_grasps(name)
+        nearness = self._nearness_at_grasps(name)
 
         links = gripper_links(self.given.robot)
         contacts = []
         buried = []
 
-        for pair, each in near.items():
+        for pair, reach in nearness.items():
             part, solid = pair
             leeway = DEEPER + MAX_SHIFT if part in links else DEEPER
-            if each.distance < -each.deepest and part in links:
+            if reach.distance < -reach.deepest and part in links:
                 buried.append(pair)
             else:
-                contacts.append(Touching(part, solid, max(min(each.distance, 0.0) - leeway, -each.deepest)))
+                contacts.append(Touching(part, solid, max(min(reach.distance, 0.0) - leeway, -reach.deepest)))
 
-        self._grips[name] = MayTouch(tuple(contacts), tuple(buried))
-        return self._grips[name]
+        self._allowed_contacts[name] = MayTouch(tuple(contacts), tuple(buried))
+        return self._allowed_contacts[name]
 
-    def _at_grasps(self, name: str) -> dict[tuple[str, str], Nearness]:
+    def _nearness_at_grasps(self, name: str) -> dict[tuple[str, str], Nearness]:
         """How near each part of the gripper, and of what it holds, comes to each solid of an object at its grasps."""
-        seen = self._seen[name]
+        seen = self._seen_objects[name]
         robot = self.given.robot
         attached = tuple(self._attached())
-        thing = seen.object
+        marked_object = seen.object
         parts = (*gripper_links(robot), *(item.name for item in attached))
 
         q = robot.clamp(np.zeros((1, robot.dof)))[0]
         tip = robot.fk(q)
 
-        tips = [level for grasp in thing.grasps for level in grasp.levels]
-        found: dict[tuple[str, str], Nearness] = {}
+        tips = [level for grasp in marked_object.grasps for level in grasp.levels]
+        if name in self._tip_at_release:
+            tips.append(self._tip_at_release[name])
 
-        for T_object_tip in (*tips, *([self._let_go[name]] if name in self._let_go else [])):
-            there = replace(seen, T_base_object=tip * T_object_tip.inverse())
-            world = self.given.with_scene(Scene(there.solids(), attached))
-            for part, solid in product(parts, thing.solid_names):
-                apart = Nearness(part, solid, np.inf, deepest_contact(world.bodies, part, solid))
-                found.setdefault((part, solid), apart)
+        nearest: dict[tuple[str, str], Nearness] = {}
+        for T_object_tip in tips:
+            placed = replace(seen, T_base_object=tip * T_object_tip.inverse())
+            world = self.given.with_scene(Scene(placed.solids(), attached))
+            for part, solid in product(parts, marked_object.solid_names):
+                not_touching = Nearness(part, solid, np.inf, deepest_contact(world.bodies, part, solid))
+                nearest.setdefault((part, solid), not_touching)
 
-            for near in (near for solid in thing.solid_names for near in touching_at(world, q, solid)):
-                pair = near.second, near.first
-                if pair in found and near.distance < found[pair].distance:
-                    found[pair] = near
-        return found
+            for touch in (touch for solid in marked_object.solid_names for touch in touching_at(world, q, solid)):
+                pair = touch.second, touch.first
+                if pair in nearest and touch.distance < nearest[pair].distance:
+                    nearest[pair] = touch
+        return nearest
 
     def world_at(self, q: Vector, target: str | None) -> World:
         """The world for an arm at q, shape (dof,): its gripper may touch the target if that alone is what it touches.
 
         It got there by a route to a grasp, for no other motion may end in contact.
         """
-        if target is None or target not in self._seen or self.world.valid(q):
+        if target is None or target not in self._seen_objects or self.world.valid(q):
             return self.world
 
         holding = self.holding(target)
         return holding if holding.valid(q) else self.world
 
-    def _moved(self, new: SeenObject) -> bool:
-        old = self._seen.get(new.object.name)
+    def _has_moved(self, new: SeenObject) -> bool:
+        old = self._seen_objects.get(new.object.name)
         if old is None:
             return True
 
-        shifted, turned = apart(old.T_base_object, new.T_base_object)
-        wider = max(_margins(new), default=0.0) - max(_margins(old), default=0.0)
-        return shifted > MIN_SHIFT or turned > MIN_ROTATION or abs(wider) > MIN_SHIFT
+        shift, turn = apart(old.T_base_object, new.T_base_object)
+        margin_change = max(_margins(new), default=0.0) - max(_margins(old), default=0.0)
+        return shift > MIN_SHIFT or turn > MIN_ROTATION or abs(margin_change) > MIN_SHIFT
 
     def world_with(self, contacts: Sequence[Touching], buried: Sequence[tuple[str, str]] = ()) -> World:
         """The world of what is given, seen and held.
@@ -285,15 +297,15 @@ class Surroundings:
             buried: Pairs that are not compared.
         """
         given = self._fixed_scene()
-        scene = scene_with(given, [solid for each in self._seen.values() for solid in each.solids()])
+        scene = scene_with(given, [solid for each in self._seen_objects.values() for solid in each.solids()])
         attached = (*given.attached, *self._attached())
         changed = replace(scene, attached=attached, allowed_collisions=(*given.allowed_collisions, *buried))
         return self.given.with_accuracy("exact").with_scene(with_contacts(changed, contacts))
 
     def _renewed(self, **changes: Any) -> Surroundings:
         """With changes, the world made of them, and none of those kept."""
-        changed = replace(self, version=self.version + 1, _holding={}, **changes)
-        return replace(changed, _made=changed.world_with(changed.rests))
+        changed = replace(self, version=self.version + 1, _worlds_touching={}, **changes)
+        return replace(changed, _world_with_objects=changed.world_with(changed.rests))
 
     @property
     def rests(self) -> tuple[Touching, ...]:
@@ -307,35 +319,40 @@ class Surroundings:
         if held is None:
             return []
 
-        near = gripper_links(robot)
-        thing = held.seen.object
+        gripper = gripper_links(robot)
+        marked_object = held.seen.object
         return [
             AttachedObject(
                 name,
                 robot.tip,
                 solid.shape,
                 held.T_tip_object * solid.pose,
-                near,
+                gripper,
                 margin=solid.margin + held.seen.margin(solid),
             )
-            for name, solid in zip(thing.solid_names, thing.solids, strict=True)
+            for name, solid in zip(marked_object.solid_names, marked_object.solids, strict=True)
         ]
 
     def _fixed_scene(self) -> Scene:
         """The problem's scene where the structure is seen; how far that is uncertain is the margin of its obstacles."""
         given = self.given.scene
-        fixed = self.structure
+        structure = self.structure
 
-        seen = None if fixed is None else self._seen.get(fixed.name)
-        if fixed is None or seen is None:
+        structure_seen = None if structure is None else self._seen_objects.get(structure.name)
+        if structure is None or structure_seen is None:
             return given
 
-        from_object = fixed.T_base_object.inverse()
-        local = [replace(each, pose=from_object * each.pose) for each in given.obstacles]
-        moved = [
-            replace(each, pose=seen.T_base_object * each.pose, margin=each.margin + seen.margin(each)) for each in local
+        from_object = structure.T_base_object.inverse()
+        in_structure = [replace(obstacle, pose=from_object * obstacle.pose) for obstacle in given.obstacles]
+        in_base = [
+            replace(
+                obstacle,
+                pose=structure_seen.T_base_object * obstacle.pose,
+                margin=obstacle.margin + structure_seen.margin(obstacle),
+            )
+            for obstacle in in_structure
         ]
-        return replace(given, obstacles=tuple(moved))
+        return replace(given, obstacles=tuple(in_base))
 
 
 def _plain(seen: SeenObject) -> dict[str, Any]:

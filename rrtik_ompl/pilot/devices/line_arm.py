@@ -61,7 +61,7 @@ class Line:
     def __init__(self, connection: socket.socket) -> None:
         connection.settimeout(TIMEOUT_SECONDS)
         self._socket = connection
-        self._rest = b""
+        self._unread_bytes = b""
 
     def send(self, **words: object) -> None:
         """Send an object."""
@@ -74,20 +74,20 @@ class Line:
             OSError: If the connection ends, nothing comes in time, or what comes is none.
         """
         end = time.monotonic() + TIMEOUT_SECONDS
-        while b"\n" not in self._rest:
+        while b"\n" not in self._unread_bytes:
             self._socket.settimeout(max(end - time.monotonic(), 1e-3))  # one deadline, however the bytes trickle in
-            more = self._socket.recv(4096)
-            self._rest += more
-            if not more or len(self._rest) > MAX_LINE_BYTES:
-                raise ConnectionError("the other side has closed the connection" if not more else "an endless line")
+            received = self._socket.recv(4096)
+            self._unread_bytes += received
+            if not received or len(self._unread_bytes) > MAX_LINE_BYTES:
+                raise ConnectionError("the other side has closed the connection" if not received else "an endless line")
 
-        line, _, self._rest = self._rest.partition(b"\n")
+        line, _, self._unread_bytes = self._unread_bytes.partition(b"\n")
         self._socket.settimeout(TIMEOUT_SECONDS)
 
-        found = message_in(line)
-        if found is None:
+        message = message_in(line)
+        if message is None:
             raise ConnectionError("the other side does not send JSON lines")
-        return found
+        return message
 
     def close(self) -> None:
         """End the connection."""
@@ -139,8 +139,8 @@ class LineArm:
 
         self._request: dict[str, Any] | None = None
         self._set_point: dict[str, Any] | None = None  # what the arm was told last, if it was not a stop
-        self._told_at = -np.inf  # when that was
-        self._holds = 0.0  # for how long what was sent last does [s]
+        self._set_point_time = -np.inf  # when that was
+        self._valid_seconds = 0.0  # for how long what was sent last does [s]
         self._grip: dict[str, Any] | None = None  # goes first, and no move takes its place
 
         self._lock = threading.Lock()
@@ -208,7 +208,7 @@ class LineArm:
         with self._lock:
             self._request = message
             self._set_point = message if message["do"] in SET_POINTS else None
-            self._told_at = time.monotonic()
+            self._set_point_time = time.monotonic()
         self._wake.set()
 
     def _connect(self) -> Line:
@@ -250,9 +250,9 @@ class LineArm:
                 message = self._request
                 self._request = None
             if message is None and self.judge is not None and self._set_point is not None:
-                young = time.monotonic() - self._told_at < RENEW_SECONDS
-                message = self._set_point if young else {"do": "stop"}
-                self._set_point = self._set_point if young else None
+                is_recent = time.monotonic() - self._set_point_time < RENEW_SECONDS
+                message = self._set_point if is_recent else {"do": "stop"}
+                self._set_point = self._set_point if is_recent else None
 
         message = message or {"do": "read"}
         if self.judge is None:
@@ -261,27 +261,27 @@ class LineArm:
             message = {"do": "stop"}
 
         if message["do"] == "stop":
-            self._holds = 0.0
+            self._valid_seconds = 0.0
         if message["do"] not in SET_POINTS:
             return message
 
-        left = UNSEEN_SECONDS * self.judge.room() - self._holds  # what was sent before still holds
-        self._holds = max(min(left, 0.5 * UNSEEN_SECONDS), SHORTEST_SECONDS)
-        return message | {"seconds": self._holds}
+        allowed_seconds = UNSEEN_SECONDS * self.judge.room() - self._valid_seconds  # what was sent before still holds
+        self._valid_seconds = max(min(allowed_seconds, 0.5 * UNSEEN_SECONDS), SHORTEST_SECONDS)
+        return message | {"seconds": self._valid_seconds}
 
     def _judge(self, q: Vector) -> None:
         """Have a reading judged; the next request follows at once if that is a stop."""
         if self.judge is None:
             return
-        known = self.judge.fault
+        previous_fault = self.judge.fault
         self.judge.read(q, time.monotonic())
-        if self.judge.fault and not known:
+        if self.judge.fault and not previous_fault:
             self._wake.set()
 
     def _communicate(self) -> None:
         """Request the joints and send moves, until the end; connect again when the connection is lost."""
         while True:
-            self._wake.wait(DRIVEN_POLL_SECONDS if self._holds else POLL_SECONDS)
+            self._wake.wait(DRIVEN_POLL_SECONDS if self._valid_seconds else POLL_SECONDS)
             self._wake.clear()
 
             message = self._next_request()
@@ -353,50 +353,50 @@ class LineServer:
             line.close()
 
     def _answer(self, line: Line) -> None:
-        before = time.monotonic()
-        until = np.inf
+        last_time = time.monotonic()
+        expiry_time = np.inf
         while not self._ended.is_set():
             request = line.receive()
             now = time.monotonic()
-            if now > until:
-                self.arm.advance(until - before)
+            if now > expiry_time:
+                self.arm.advance(expiry_time - last_time)
                 self.arm.stop()
-                before = until
-                until = np.inf
+                last_time = expiry_time
+                expiry_time = np.inf
 
-            self.arm.advance(now - before)
-            before = now
+            self.arm.advance(now - last_time)
+            last_time = now
 
             fault = self._execute(request)
             if request.get("do") in SET_POINTS and not fault:
-                until = now + request.get("seconds", np.inf)
+                expiry_time = now + request.get("seconds", np.inf)
             line.send(**({"error": fault} if fault else {"q": self.arm.read().tolist()}))
 
     def _execute(self, request: dict[str, Any]) -> str:
         """Execute a request; returns what is wrong with it, "" if nothing is."""
-        what = request.get("do")
+        action = request.get("do")
         joint = request.get("joint")
         target = request.get("target")
         seconds = request.get("seconds", 1.0)
-        if what in SET_POINTS and not (type(seconds) in (int, float) and 0.0 < seconds < LARGEST):
-            return f"{what} needs seconds above 0, if any"
+        if action in SET_POINTS and not (type(seconds) in (int, float) and 0.0 < seconds < LARGEST):
+            return f"{action} needs seconds above 0, if any"
 
-        if what == "stop":
+        if action == "stop":
             self.arm.stop()
-        elif what == "move":
-            numbers = type(joint) is int and type(target) in (int, float)  # true is neither
-            if not (numbers and 0 <= joint < self.arm.robot.dof and abs(target) < LARGEST):  # type: ignore[operator,arg-type]
+        elif action == "move":
+            are_numbers = type(joint) is int and type(target) in (int, float)  # true is neither
+            if not (are_numbers and 0 <= joint < self.arm.robot.dof and abs(target) < LARGEST):  # type: ignore[operator,arg-type]
                 return f"move needs a joint from 0 to {self.arm.robot.dof - 1} and a finite target"
             self.arm.move(int(joint), float(target))  # type: ignore[arg-type]
-        elif what == "grip":
+        elif action == "grip":
             if not isinstance(request.get("closed"), bool):
                 return "grip needs closed: true or false"
             self.arm.grip(request["closed"])
-        elif what == "follow":
+        elif action == "follow":
             try:
                 self.arm.follow(request.get("q"))  # type: ignore[arg-type]
             except InputError as error:
                 return str(error)
-        elif what != "read":
+        elif action != "read":
             return "do must be read, move, grip or stop, or follow"
         return ""

@@ -131,30 +131,42 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
     folder = document.path.parent
 
     marker_map = load_marker_map(folder / entry.map)
-    places = {}
-    for number, each in enumerate(entry.places):
+    poses = {}
+    for number, place in enumerate(entry.places):
         with document.at(("places", number, "name")):
-            places[marker_map.named(each.name).name] = each.pose.build()
+            poses[marker_map.named(place.name).name] = place.pose.build()
 
     with document.at(("arm",)):
         faults = None if entry.arm is None else entry.arm.build()
     with document.at(("base_motion",)):
-        motion = None if entry.base_motion is None else entry.base_motion.build()
+        base_motion = None if entry.base_motion is None else entry.base_motion.build()
 
     with document.at(("structure",)):
         structure = None if entry.structure is None else marker_map.named(entry.structure).name
-        if structure is not None and structure not in places:
+        if structure is not None and structure not in poses:
             raise InputError(f"structure '{structure}' has no place; give one under places")
 
     with document.at(("further_cameras",)):
-        further = tuple(each.build() for each in entry.further_cameras)
-        if len({each.name for each in further}) < len(further):
+        mounts = tuple(camera_entry.build() for camera_entry in entry.further_cameras)
+        distinct_names = {mount.name for mount in mounts}
+        if len(distinct_names) < len(mounts):
             raise InputError("two further cameras have the same name; give each its own")
 
-    camera = load_camera(folder / entry.camera)
-    T = entry.camera_pose.build()
-    patience = UNSEEN_SECONDS if entry.patience is None and motion is not None else entry.patience
-    return SimulatedVehicle(camera, marker_map, places, T, faults, motion, structure, further, patience)
+    patience = entry.patience
+    if patience is None and base_motion is not None:
+        patience = UNSEEN_SECONDS  # a vehicle that moves does not stay for long where it was seen
+
+    return SimulatedVehicle(
+        camera=load_camera(folder / entry.camera),
+        marker_map=marker_map,
+        places=poses,
+        T_base_camera=entry.camera_pose.build(),
+        faults=faults,
+        base_motion=base_motion,
+        structure=structure,
+        further=mounts,
+        patience=patience,
+    )
 
 
 def find_vehicle(problem: str) -> Path:
@@ -163,14 +175,14 @@ def find_vehicle(problem: str) -> Path:
     Raises:
         InputError: If there is none.
     """
-    shipped = {file.stem: file for folder in problem_folders() for file in _vehicle_files(folder)}
-    if problem not in shipped:
-        there = ", ".join(sorted(shipped)) or "no problem"
+    file_of_problem = {file.stem: file for folder in problem_folders() for file in _vehicle_files(folder)}
+    if problem not in file_of_problem:
+        known_problems = ", ".join(sorted(file_of_problem)) or "no problem"
         raise InputError(
-            f"no simulated vehicle ships for '{problem}' (but for {there}); give one with --scenario FILE, or "
+            f"no simulated vehicle ships for '{problem}' (but for {known_problems}); give one with --scenario FILE, or "
             "show a record with its own --camera-file and --map"
         )
-    return shipped[problem]
+    return file_of_problem[problem]
 
 
 def _vehicle_files(folder: Path) -> list[Path]:

@@ -74,8 +74,8 @@ class SimulatedCamera:
         grey = [np.rint(rng.normal(0.0, NOISE, size)).astype(np.int16) for _ in range(NOISE_PICTURES)]
         self._noise = [np.repeat(each, 3, axis=2) for each in grey]
 
-        self._kept: Any = (None, None, None)
-        self._kept_arm: Any = (None, None, None)
+        self._cached_background: Any = (None, None, None)
+        self._cached_arm: Any = (None, None, None)
 
     def picture(self, q: NDArray[np.float64], time: float) -> Picture:
         """The picture with the arm at a configuration, shape (dof,)."""
@@ -85,25 +85,25 @@ class SimulatedCamera:
 
     def _clean(self, q: NDArray[np.float64]) -> NDArray[np.uint8]:
         """The picture without noise; made anew only when the arm or an object moved."""
-        still, solids = self._still()
-        before, there, clean = self._kept_arm
-        if before is not still or not np.array_equal(there, q):
-            clean = self._arm.draw(still, self.T_base_camera, q, real=solids, opacity=1.0)
-            self._kept_arm = (still, np.array(q), clean)
+        background, solids = self._background()
+        cached_background, cached_q, clean = self._cached_arm
+        if cached_background is not background or not np.array_equal(cached_q, q):
+            clean = self._arm.draw(background, self.T_base_camera, q, real=solids, opacity=1.0)
+            self._cached_arm = (background, np.array(q), clean)
         return np.asarray(clean)
 
-    def _still(self) -> tuple[NDArray[np.uint8], list[Obstacle]]:
+    def _background(self) -> tuple[NDArray[np.uint8], list[Obstacle]]:
         """The picture without the arm, and the solids in it; made anew only when an object moved."""
         T_base_start = self.T_start_base.inverse()
         places = {name: T_base_start * T for name, T in sorted(self.places.items())}
         key: Any = tuple((name, T.homogeneous.tobytes()) for name, T in places.items())
         key = (self.T_base_camera.homogeneous.tobytes(), key)
-        if key != self._kept[0]:
-            around = self._scene.obstacles
+        if key != self._cached_background[0]:
+            obstacles = self._scene.obstacles
             if self._fixed:
-                around = tuple(replace(each, pose=T_base_start * each.pose) for each in around)
+                obstacles = tuple(replace(each, pose=T_base_start * each.pose) for each in obstacles)
 
-            solids = [*around, *self._object_solids(places)]
+            solids = [*obstacles, *self._object_solids(places)]
             drawn = self._arm.draw(_water(self.camera), self.T_base_camera, obstacles=solids, opacity=1.0)
             depths = self._arm.depths()
             T_camera_base = self.T_base_camera.inverse()
@@ -111,8 +111,8 @@ class SimulatedCamera:
                 if thing.name in places:
                     self._lay_markers(drawn, depths, thing, T_camera_base * places[thing.name])
 
-            self._kept = (key, drawn, solids)
-        return self._kept[1], self._kept[2]
+            self._cached_background = (key, drawn, solids)
+        return self._cached_background[1], self._cached_background[2]
 
     def _object_solids(self, places: Mapping[str, pin.SE3]) -> list[Obstacle]:
         return [
@@ -134,11 +134,11 @@ class SimulatedCamera:
             sheet = np.pad(marker_cells(self.marker_map.dictionary, marker.number), 1, constant_values=255)
             half = 0.5 * marker.side * len(sheet) / (len(sheet) - 2)
             corners = np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
-            around = corners @ T.rotation.T + T.translation
-            if (around[:, 2] > 0.05).all():
-                self._lay(drawn, depths, sheet, self.camera.project(around), T)
+            corners_in_camera = corners @ T.rotation.T + T.translation
+            if (corners_in_camera[:, 2] > 0.05).all():
+                self._draw_marker(drawn, depths, sheet, self.camera.project(corners_in_camera), T)
 
-    def _lay(
+    def _draw_marker(
         self,
         drawn: NDArray[np.uint8],
         depths: NDArray[np.float32],
@@ -160,18 +160,20 @@ class SimulatedCamera:
         ss = 3  # rays through a pixel, squared
         shape = (ss * (high - low)).tolist()
         target = ((pixels - low + 0.5) * ss - 0.5).astype(np.float32)
-        bend = cv2.getPerspectiveTransform(square, target)
+        homography = cv2.getPerspectiveTransform(square, target)
 
-        laid = cv2.warpPerspective(fine, bend, shape, flags=cv2.INTER_AREA, borderValue=(0.0,))
-        there = cv2.warpPerspective(np.full_like(fine, 255), bend, shape, flags=cv2.INTER_LINEAR, borderValue=(0.0,))
+        warped = cv2.warpPerspective(fine, homography, shape, flags=cv2.INTER_AREA, borderValue=(0.0,))
+        coverage = cv2.warpPerspective(
+            np.full_like(fine, 255), homography, shape, flags=cv2.INTER_LINEAR, borderValue=(0.0,)
+        )
         small = tuple((high - low).tolist())
-        share = cv2.resize(there, small, interpolation=cv2.INTER_AREA).astype(np.float32)[..., None] / 255.0
-        value = cv2.resize(laid, small, interpolation=cv2.INTER_AREA).astype(np.float32)[..., None]
+        opacity = cv2.resize(coverage, small, interpolation=cv2.INTER_AREA).astype(np.float32)[..., None] / 255.0
+        value = cv2.resize(warped, small, interpolation=cv2.INTER_AREA).astype(np.float32)[..., None]
 
         box = np.s_[low[1] : high[1], low[0] : high[0]]
-        share[depths[box] < T.translation[2] - 0.02 - 0.5 * np.ptp(pixels) / self.camera.matrix[0, 0]] = 0.0
-        piece = drawn[box].astype(np.float32)
-        drawn[box] = np.clip(value + (1.0 - share) * piece, 0, 255) * (share > 0) + piece * (share == 0)
+        opacity[depths[box] < T.translation[2] - 0.02 - 0.5 * np.ptp(pixels) / self.camera.matrix[0, 0]] = 0.0
+        below = drawn[box].astype(np.float32)
+        drawn[box] = np.clip(value + (1.0 - opacity) * below, 0, 255) * (opacity > 0) + below * (opacity == 0)
 
 
 def _water(camera: Camera) -> NDArray[np.uint8]:

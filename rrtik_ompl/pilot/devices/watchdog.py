@@ -10,7 +10,7 @@ from contextlib import suppress
 from rrtik_ompl.pilot.devices.arm import Arm
 
 PATIENCE_SECONDS = 3.0  # longer than it takes to connect again to an arm or a camera
-LOOKS = 10  # in that time
+LOOKS_PER_PATIENCE = 10  # in that time
 
 Report = Callable[[], float]
 
@@ -56,18 +56,18 @@ class Watchdog:
         self._thread.join(timeout=5.0)
 
     def _watch(self) -> None:
-        known: set[str] = set()
+        reported_silent: set[str] = set()
         begin = time.monotonic()
-        while not self._ended.wait(self._patience / LOOKS):
+        while not self._ended.wait(self._patience / LOOKS_PER_PATIENCE):
             oldest = time.monotonic() - self._patience
             silent = {name for name, last in self._reports.items() if max(last(), begin) < oldest}
-            if silent - known:
+            if silent - reported_silent:
                 with suppress(Exception):  # whatever is wrong with the arm, the others are watched on
                     self._arm.stop()
 
-            said = f"{', '.join(sorted(silent))}: no report for {self._patience:g} s; the arm was stopped"
-            self.fault = said if silent else ""  # in one step: another thread reads it
-            if self._tell is not None and silent - known:
+            message = f"{', '.join(sorted(silent))}: no report for {self._patience:g} s; the arm was stopped"
+            self.fault = message if silent else ""  # in one step: another thread reads it
+            if self._tell is not None and silent - reported_silent:
                 with suppress(Exception):  # a terminal that has gone must not end the watch
                     self._tell(self.fault)
-            known = silent
+            reported_silent = silent

@@ -52,36 +52,36 @@ def _closed(means: Means, state: State, q: Vector) -> State:
     after = replace(state, q=frozen(q), gripper=replace(state.gripper, closed=True))
 
     tip = means.robot.fk(after.q)
-    near = sorted(
-        ((apart(tip, pose), seen, lift) for seen, lift, pose in _grasps(after.around)), key=lambda each: each[0][0]
+    grasp_errors = sorted(
+        ((apart(tip, pose), seen, lift) for seen, lift, pose in _grasps(after.around)), key=lambda grasp: grasp[0][0]
     )
 
-    if not near:
+    if not grasp_errors:
         return after.say(refused(NOTHING))
-    there = next((each for each in near if _within(each[0])), None)
-    if there is None:
-        away, turned = near[0][0]
-        far = f"{1e3 * away:.0f} mm and {np.rad2deg(turned):.0f} deg away"
-        return after.say(refused(f"{NOTHING}; the nearest grasp is {far}"))
+    at_grasp = next((grasp for grasp in grasp_errors if _within(grasp[0])), None)
+    if at_grasp is None:
+        distance, turn = grasp_errors[0][0]
+        how_far = f"{1e3 * distance:.0f} mm and {np.rad2deg(turn):.0f} deg away"
+        return after.say(refused(f"{NOTHING}; the nearest grasp is {how_far}"))
 
-    _, seen, lift = there
+    _, seen, lift = at_grasp
     name = seen.object.name
 
     if not seen.object.loose:
         return replace(after, gripper=Gripper(True, name, lift)).say(news(f"closed on {name}"))
 
-    around = after.around.hold(seen, tip.actInv(seen.T_base_object), after.q)
-    until = "".join(f"; {contact} until they part" for contact in around.rests)
+    surroundings = after.around.hold(seen, tip.actInv(seen.T_base_object), after.q)
+    contact_texts = "".join(f"; {contact} until they part" for contact in surroundings.rests)
 
     holding = replace(
         guide.leave(after),
-        around=around,
+        around=surroundings,
         target=None,
         choice=None,
         mode=MANOEUVRE,
         gripper=replace(after.gripper, lift=lift),
     )
-    return holding.say(news(f"closed: {name} is held{until}; 'lift' takes it up, or choose where it goes"))
+    return holding.say(news(f"closed: {name} is held{contact_texts}; 'lift' takes it up, or choose where it goes"))
 
 
 def open_hand(_: Means, state: State) -> State:
@@ -98,10 +98,10 @@ def _opened(means: Means, state: State, q: Vector) -> State:
     if not name:
         return after.say(news("open"))
 
-    inside = after.around.left_inside(after.q)
-    around = after.around.release(means.robot.fk(after.q))
-    left = replace(guide.leave(after), around=around, target=name, choice=None, mode=MANOEUVRE)
-    return left.say(alarm(f"open: {inside}") if inside else news(f"open: {name} is put down"))
+    left_inside = after.around.left_inside(after.q)
+    surroundings = after.around.release(means.robot.fk(after.q))
+    left = replace(guide.leave(after), around=surroundings, target=name, choice=None, mode=MANOEUVRE)
+    return left.say(alarm(f"open: {left_inside}") if left_inside else news(f"open: {name} is put down"))
 
 
 def lift(means: Means, state: State) -> State:
@@ -119,12 +119,12 @@ def lift(means: Means, state: State) -> State:
 
 def _route_up(means: Means, world: World, q: Vector, goal: pin.SE3, name: str) -> Route | NoRoute:
     """A route to a pose of the tip; where it cannot be reached, the reason says what to do with what is held."""
-    found = solve_ik(means.robot, PoseGoal(goal), near=q, world=world, seconds=LIFT_SECONDS)
-    if not found.found:
-        why = found.detail or found.reason
+    result = solve_ik(means.robot, PoseGoal(goal), near=q, world=world, seconds=LIFT_SECONDS)
+    if not result.found:
+        why = result.detail or result.reason
         return NoRoute(f"{why}; choose where {name} goes, or drive the arm")
 
-    return route_to(world, q, found.solutions[0], means.rates, means.seed)
+    return route_to(world, q, result.solutions[0], means.rates, means.seed)
 
 
 def _lifted(means: Means, state: State, made: Route | NoRoute) -> State:
@@ -133,11 +133,11 @@ def _lifted(means: Means, state: State, made: Route | NoRoute) -> State:
     return guide.proposed(means, state, made)
 
 
-def _grasps(around: Surroundings) -> list[tuple[SeenObject, float, pin.SE3]]:
+def _grasps(surroundings: Surroundings) -> list[tuple[SeenObject, float, pin.SE3]]:
     """All grasps of what is in view: the object, how far it is lifted, and ``T_base_tip``."""
     return [
         (seen, grasp.lift, seen.grasp_pose(grasp.name, level))
-        for seen in around.seen
+        for seen in surroundings.seen
         for grasp in seen.object.grasps
         for level in range(len(grasp.levels))
     ]

@@ -46,10 +46,10 @@ def release(means: Means, state: State) -> State:
         going_on = state.mode == FOLLOWING
         return after.say(news("released: hold 'next' to go on" if going_on else "released"))
 
-    joint, end = state.press.due
-    left, unit = reading(abs(end - float(state.q[joint])), joint_unit(means.robot.prismatic[joint]))
+    joint, target = state.press.due
+    remaining, unit = reading(abs(target - float(state.q[joint])), joint_unit(means.robot.prismatic[joint]))
     name = means.robot.joint_names[joint]
-    return after.say(refused(f"{name}: {left:.3g} {unit} are left of the move; hold 'next' to go on"))
+    return after.say(refused(f"{name}: {remaining:.3g} {unit} are left of the move; hold 'next' to go on"))
 
 
 def jog(means: Means, state: State, direction: float, press: float) -> State:
@@ -60,12 +60,12 @@ def jog(means: Means, state: State, direction: float, press: float) -> State:
         return pressed.at_rest().say(news("released"))
 
     joint = state.selected
-    room = joint_range(means, state)
-    goal, end = (room.high, room.above) if sign > 0.0 else (room.low, room.below)
-    if room.low == room.high:  # the arm touches something where it is
+    free_range = joint_range(means, state)
+    goal, what_ends_it = (free_range.high, free_range.above) if sign > 0.0 else (free_range.low, free_range.below)
+    if free_range.low == free_range.high:  # the arm touches something where it is
         goal = way_out(world_by_hand(state), state.q, joint, sign)
-        end = "out of contact"
-    at_goal = refused(f"end of the range: {end}")
+        what_ends_it = "out of contact"
+    at_goal = refused(f"end of the range: {what_ends_it}")
 
     driven = _drive(means, pressed, joint, goal, min(abs(direction), 1.0), at_goal)
     if not driven.drive.active:
@@ -78,9 +78,9 @@ def move(means: Means, state: State, target: float) -> State:
     joint = state.selected
     warnings = _check(state, joint, target)
 
-    place = f"{_place(means.robot, joint, target)}: hold Enter to drive there"
-    said = "; ".join(filter(None, (place, *warnings, out_of_view(means, state))))
-    return replace(state, desired=_with(state.q, joint, target)).say(news(said))
+    announcement = f"{_place(means.robot, joint, target)}: hold Enter to drive there"
+    message = "; ".join(filter(None, (announcement, *warnings, out_of_view(means, state))))
+    return replace(state, desired=_with(state.q, joint, target)).say(news(message))
 
 
 def go(means: Means, state: State, press: float) -> State:
@@ -140,27 +140,27 @@ def _begin_move(means: Means, state: State, due: Follower) -> State:
     """Begin the move that is due."""
     follower, progress = due.update(state.q)
     joint = follower.joint()
-    here = state.on_its_way(follower=follower, progress=progress)
+    updated = state.on_its_way(follower=follower, progress=progress)
     if progress.advice == "lost" or joint is None:
-        return here.released().say(refused(progress.fault or "all moves are done"))
+        return updated.released().say(refused(progress.fault or "all moves are done"))
 
-    if fault := guide.fault_of_rest(here):
-        return guide.withdrawn(here, fault)
+    if fault := guide.fault_of_rest(updated):
+        return guide.withdrawn(updated, fault)
 
     end = float(follower.target[joint])
-    near = min(MADE, 0.25 * abs(end - float(state.q[joint])))  # a short move has to be made, too
-    press = replace(here.press, due=(joint, end), nearest=(np.inf, state.time), near=near)
-    return _go_on(means, replace(guide.show_due(here), press=press), follower)
+    made_within = min(MADE, 0.25 * abs(end - float(state.q[joint])))  # a short move has to be made, too
+    press = replace(updated.press, due=(joint, end), nearest=(np.inf, state.time), near=made_within)
+    return _go_on(means, replace(guide.show_due(updated), press=press), follower)
 
 
 def _go_on(means: Means, state: State, follower: Follower) -> State:
     """Go on with the move that was begun; take it for made where the arm does not get to its end."""
     joint, end = state.press.due
-    away = abs(end - float(state.q[joint]))
+    remaining = abs(end - float(state.q[joint]))
     nearest, since = state.press.nearest
-    if away < nearest - MADE:
-        state = replace(state, press=replace(state.press, nearest=(away, state.time)))
-    elif MADE < away <= float(follower.slack[joint]) and state.time - since > STUCK_SECONDS:
+    if remaining < nearest - MADE:
+        state = replace(state, press=replace(state.press, nearest=(remaining, state.time)))
+    elif MADE < remaining <= float(follower.slack[joint]) and state.time - since > STUCK_SECONDS:
         return state.do(Give("settle"))
 
     name = means.robot.joint_names[joint]
@@ -203,18 +203,18 @@ def watch(means: Means, state: State, standing: tuple[int, float, float] | None)
     name = robot.joint_names[joint]
     prismatic = bool(robot.prismatic[joint])
 
-    left = abs(drive.goal - float(state.q[joint]))
-    near = joint == drive.joint and left <= slack_of(robot)[joint]
-    if near and state.press.verb == "next":
+    remaining = abs(drive.goal - float(state.q[joint]))
+    is_near = joint == drive.joint and remaining <= slack_of(robot)[joint]
+    if is_near and state.press.verb == "next":
         return state  # `next` itself takes the move for made
 
-    ended = state.released()
-    if near:
-        return ended.say(refused(f"{name} comes no nearer than {amount(left, prismatic=prismatic)}: stopped"))
+    released = state.released()
+    if is_near:
+        return released.say(refused(f"{name} comes no nearer than {amount(remaining, prismatic=prismatic)}: stopped"))
 
-    late = f"does not move ({amount(moved, prismatic=prismatic)} in {seconds:.1f} s)"
+    description = f"does not move ({amount(moved, prismatic=prismatic)} in {seconds:.1f} s)"
     stopped = f"stopped, for an arm that follows later than {FOLLOW_SECONDS:g} s is not driven"
-    return ended.say(alarm(f"{name} {late}: {stopped}"))
+    return released.say(alarm(f"{name} {description}: {stopped}"))
 
 
 def still_free(state: State) -> bool:
@@ -259,21 +259,21 @@ def lead_to(means: Means, state: State, point: Vector, share: float) -> State:
 
 def _drive(means: Means, state: State, joint: int, goal: float, share: float, at_goal: Answer) -> State:
     """Drive a joint on towards a goal, at a share of the speed; what there is to say where it is there."""
-    here = float(state.q[joint])
-    if abs(goal - here) <= state.press.near:
+    value = float(state.q[joint])
+    if abs(goal - value) <= state.press.near:
         return state.released().say(at_goal)
 
     speed = max(min(state.speed * share, pace(means, state)), 1e-3)
     rate = speed * float(means.rates[joint])
     if not state.drive.goes_on_to(joint, goal):
         rested = state.at_rest()
-        state = replace(rested, drive=rested.drive.begun(here, state.time))
+        state = replace(rested, drive=rested.drive.begun(value, state.time))
 
-    drive = state.drive.on(joint, goal, rate, here, state.time)
-    ahead = np.zeros(means.robot.dof)
-    ahead[joint] = rate * LEASH_SECONDS
+    drive = state.drive.on(joint, goal, rate, value, state.time)
+    max_lead = np.zeros(means.robot.dof)
+    max_lead[joint] = rate * LEASH_SECONDS
 
-    driven = replace(state, drive=drive).do(SetPoint(_with(state.q, joint, drive.point), ahead, joint))
+    driven = replace(state, drive=drive).do(SetPoint(_with(state.q, joint, drive.point), max_lead, joint))
     return driven.say(news(f"driving {means.robot.joint_names[joint]}"))
 
 

@@ -76,32 +76,34 @@ def servo(means: Means, state: State, press: float) -> State:
     world = state.around.holding(state.target)
 
     pressed, anew = begins(state, "servo", press)
-    before = state.servoed_at
+    last_time = state.servoed_at
     if anew:
-        away, turned = apart(means.robot.fk(state.q), goal)
-        if away > NEAR or turned > TURNED:
-            far = f"{100 * away:.0f} cm and {np.rad2deg(turned):.0f} deg away"
-            raise InputError(f"the grasp is {far}; servoing is for the last {100 * NEAR:.0f} cm: plan a route first")
-        before = state.time - LEASH_SECONDS
+        distance, turn = apart(means.robot.fk(state.q), goal)
+        if distance > NEAR or turn > TURNED:
+            how_far = f"{100 * distance:.0f} cm and {np.rad2deg(turn):.0f} deg away"
+            raise InputError(
+                f"the grasp is {how_far}; servoing is for the last {100 * NEAR:.0f} cm: plan a route first"
+            )
+        last_time = state.time - LEASH_SECONDS
 
-    seconds = float(np.clip(state.time - before, 1e-3, MAX_STEP_SECONDS))
-    in_view = unseen_for(state, state.target) == 0.0
-    asked = StepToGrasp(world, goal if in_view else None, seconds, anew, _stepped)
-    return replace(pressed, servoed_at=state.time).do(asked)
+    seconds = float(np.clip(state.time - last_time, 1e-3, MAX_STEP_SECONDS))
+    target_in_view = unseen_for(state, state.target) == 0.0
+    request = StepToGrasp(world, goal if target_in_view else None, seconds, anew, _stepped)
+    return replace(pressed, servoed_at=state.time).do(request)
 
 
 def _stepped(means: Means, state: State, step: ServoStep) -> State:
-    left = f"{1e3 * step.away:.1f} mm and {np.rad2deg(step.turned):.1f} deg"
+    remaining = f"{1e3 * step.away:.1f} mm and {np.rad2deg(step.turned):.1f} deg"
 
     if step.state == "done":
-        there = f"at the grasp, to {1e3 * step.away:.2f} mm and {np.rad2deg(step.turned):.2f} deg"
-        return state.released().say(news(there))
+        message = f"at the grasp, to {1e3 * step.away:.2f} mm and {np.rad2deg(step.turned):.2f} deg"
+        return state.released().say(news(message))
     if step.state != "moving":
-        raise InputError(f"stopped {left} before the grasp: {WHY_NOT[step.state].format(state.target)}")
+        raise InputError(f"stopped {remaining} before the grasp: {WHY_NOT[step.state].format(state.target)}")
 
-    fast = float((np.abs(step.rates) / means.rates).max()) / pace(means, state)
-    led = _led(means, state, state.q + step.rates * (LEASH_SECONDS / max(fast, 1.0)))
-    return led.say(news(f"servoing: {left} to the grasp"))
+    speed_excess = float((np.abs(step.rates) / means.rates).max()) / pace(means, state)
+    led = _led(means, state, state.q + step.rates * (LEASH_SECONDS / max(speed_excess, 1.0)))
+    return led.say(news(f"servoing: {remaining} to the grasp"))
 
 
 def lead(_: Means, state: State, press: float) -> State:
@@ -116,14 +118,14 @@ def _begin_lead(means: Means, state: State, master: Vector) -> State:
 
 
 def _go_on_leading(means: Means, state: State, master: Vector) -> State:
-    away = means.robot.clamp(master) - state.q
-    most = means.rates * pace(means, state) * LEASH_SECONDS
-    point = state.q + np.clip(away, -most, most)
+    to_go = means.robot.clamp(master) - state.q
+    max_lead = means.rates * pace(means, state) * LEASH_SECONDS
+    point = state.q + np.clip(to_go, -max_lead, max_lead)
 
     world = world_by_hand(state)
     if not world.motion_valid(state.q, point):
-        touched = world.contacts(point)
-        pair = f"'{touched[0].first}' and '{touched[0].second}' would touch" if touched else "not free"
+        contacts = world.contacts(point)
+        pair = f"'{contacts[0].first}' and '{contacts[0].second}' would touch" if contacts else "not free"
         raise InputError(f"stopped: {pair}; lead the master another way, then hold again")
     return _led(means, state, point).say(news("led by the master arm"))
 
@@ -133,13 +135,13 @@ def _led(means: Means, state: State, point: Vector) -> State:
     return lead_to(means, replace(state, desired=desired), desired, pace(means, state))
 
 
-def _check_aligned(robot: Robot, away: Vector) -> None:
-    share = np.abs(away) / np.where(robot.prismatic, ALIGNED_SLIDING, ALIGNED)
-    worst = int(share.argmax())
-    if share[worst] > 1.0:
-        by, unit = reading(float(away[worst]), joint_unit(robot.prismatic[worst]))
+def _check_aligned(robot: Robot, errors: Vector) -> None:
+    error_shares = np.abs(errors) / np.where(robot.prismatic, ALIGNED_SLIDING, ALIGNED)
+    worst = int(error_shares.argmax())
+    if error_shares[worst] > 1.0:
+        shown_error, unit = reading(float(errors[worst]), joint_unit(robot.prismatic[worst]))
         raise InputError(
-            f"bring the master to the arm first: its {robot.joint_names[worst]} differs by {by:.1f} {unit}"
+            f"bring the master to the arm first: its {robot.joint_names[worst]} differs by {shown_error:.1f} {unit}"
         )
 
 

@@ -38,7 +38,7 @@ REST_SECONDS = 1.5  # for as long after a stop the arm is watched
 GOING_ON = 3  # changes of its readings after a stop, which an arm that was put elsewhere at rest does not have
 FOLLOW_SECONDS = 0.4  # a joint that is driven moves within that time
 NOISE = 0.05  # of the slack: a smaller change of a reading is none
-ASKED = 0.25  # of the way that a set point is ahead: an arm nearer to it need not move
+MIN_LEAD_SHARE = 0.25  # of the way that a set point is ahead: an arm nearer to it need not move
 
 
 def slack_of(robot: Robot) -> Vector:
@@ -81,24 +81,24 @@ class Supervisor:
         self._rates = rates
         self._slack = slack_of(robot)
         self._q: Vector | None = None
-        self._time = -np.inf
-        self._changed = -np.inf
-        self._rest_until = -np.inf
-        self._active = False
+        self._time = -np.inf  # of the last reading
+        self._last_change_time = -np.inf  # of a reading that was another one than that before it
+        self._watch_until = -np.inf  # after a stop
+        self._active = False  # whether it is driven
 
         zeros = np.zeros(robot.dof)
-        self._way = zeros.copy()  # of each joint that is driven: 1 up, -1 down; 0 if it has to stand still
-        self._aim = zeros.copy()  # where each joint is told to be
-        self._ahead = zeros.copy()  # how far at most the set point is ahead of the arm
-        self._back = zeros.copy()  # how far a joint has gone against its way
-        self._used = 0.0  # share of the slack by which the worst joint is off at the last reading
-        self._changes = 0  # of the readings, since the arm should stand
-        self._room = self._slack.copy()  # how far a joint may be faster than its rate allows
-        self._good_at = zeros.copy()  # when each joint was last where it should be
-        self._coasts_until = np.full(robot.dof, -np.inf)
-        self._coast_way = zeros.copy()  # in which a joint that coasts was driven
-        self._mark = zeros.copy()  # where each joint has moved last
-        self._mark_time = zeros.copy()  # and when
+        self._direction = zeros.copy()  # of each joint that is driven: 1 up, -1 down; 0 if it has to stand still
+        self._set_point = zeros.copy()  # where each joint is told to be
+        self._max_lead = zeros.copy()  # how far at most the set point is ahead of the arm
+        self._wrong_way_travel = zeros.copy()  # how far a joint has gone against its way
+        self._slack_used = 0.0  # share of the slack by which the worst joint is off at the last reading
+        self._changes_after_stop = 0  # of the readings, since the arm should stand
+        self._speed_allowance = self._slack.copy()  # how far a joint may be faster than its rate allows
+        self._last_good_time = zeros.copy()  # when each joint was last where it should be
+        self._coasts_until = np.full(robot.dof, -np.inf)  # after a stop, or a change of direction
+        self._coast_direction = zeros.copy()  # in which a joint that coasts was driven
+        self._position_at_last_move = zeros.copy()  # where each joint has moved last
+        self._time_of_last_move = zeros.copy()  # and when
 
     def acknowledge(self) -> None:
         """The fault is known to the pilot: the arm may be driven again."""
@@ -111,39 +111,40 @@ class Supervisor:
         An arm that may move only as long as it takes for that much cannot go farther than the slack unseen.
         """
         with self._lock:
-            return 0.0 if self.fault else max(1.0 - self._used, 0.0)
+            return 0.0 if self.fault else max(1.0 - self._slack_used, 0.0)
 
-    def told(self, aim: Vector, ahead: Vector, q: Vector, time: float) -> None:
+    def told(self, set_point: Vector, max_lead: Vector, q: Vector, time: float) -> None:
         """The arm was sent to a set point.
 
         Args:
-            aim: Shape (dof,) [rad or m]; where the arm is, for joints that shall stand still.
-            ahead: How far the set point of each joint is ahead of the arm at most, shape (dof,).
+            set_point: Shape (dof,) [rad or m]; where the arm is, for joints that shall stand still.
+            max_lead: How far the set point of each joint is ahead of the arm at most, shape (dof,).
             q: Where the arm is.
             time: Now [s].
         """
         with self._lock:
-            back = self._back.copy()
+            wrong_way_travel = self._wrong_way_travel.copy()
             if not self._active:
-                self._begin(q, time)
+                self._restart(q, time)
 
-            away = aim - q
-            way = np.where(np.abs(away) > 0.0, np.sign(away), self._way)
-            turned = (way != self._way) & (self._way != 0.0)
-            new = way != self._way
-            again = (time <= self._rest_until) & (way == self._coast_way)  # what it did before the stop still counts
+            to_go = set_point - q
+            direction = np.where(np.abs(to_go) > 0.0, np.sign(to_go), self._direction)
+            is_reversed = (direction != self._direction) & (self._direction != 0.0)
+            has_new_direction = direction != self._direction
+            # A joint that goes on as before a stop: what it did before the stop still counts.
+            resumes = (time <= self._watch_until) & (direction == self._coast_direction)
 
-            self._coasts_until[turned] = time + COAST_SECONDS
-            self._coast_way[turned] = self._way[turned]
-            self._coasts_until[again] = -np.inf
-            self._back[new] = np.where(again, back, 0.0)[new]
-            self._good_at[new] = time
-            self._mark[new] = q[new]
-            self._mark_time[new] = time
+            self._coasts_until[is_reversed] = time + COAST_SECONDS
+            self._coast_direction[is_reversed] = self._direction[is_reversed]
+            self._coasts_until[resumes] = -np.inf
+            self._wrong_way_travel[has_new_direction] = np.where(resumes, wrong_way_travel, 0.0)[has_new_direction]
+            self._last_good_time[has_new_direction] = time
+            self._position_at_last_move[has_new_direction] = q[has_new_direction]
+            self._time_of_last_move[has_new_direction] = time
 
-            self._way = way
-            self._ahead = ahead
-            self._aim = np.where(way != 0.0, aim, self._aim)
+            self._direction = direction
+            self._max_lead = max_lead
+            self._set_point = np.where(direction != 0.0, set_point, self._set_point)
 
     def stopped(self, time: float) -> None:
         """The arm was told to stop; what was driven comes to rest."""
@@ -151,37 +152,37 @@ class Supervisor:
             if not self._active:
                 return
 
-            driven = self._way != 0.0
+            driven = self._direction != 0.0
             self._coasts_until[driven] = time + COAST_SECONDS
-            self._coast_way[driven] = self._way[driven]
+            self._coast_direction[driven] = self._direction[driven]
             self._active = False
-            self._rest_until = time + REST_SECONDS
-            self._changes = 0
-            self._way[:] = 0.0
+            self._watch_until = time + REST_SECONDS
+            self._changes_after_stop = 0
+            self._direction[:] = 0.0
 
     def read(self, q: Vector, time: float) -> None:
         """Compare a reading, shape (dof,), with what the arm was told; sets `fault`."""
         with self._lock:
-            before = self._q
+            last_q = self._q
             self._q = q.copy()
             back_in_time = time < self._time
             self._time = time
-            watched = self._active or time <= self._rest_until
-            if before is None or back_in_time or not watched:
-                self._begin(q, time, active=self._active)
+            is_watched = self._active or time <= self._watch_until
+            if last_q is None or back_in_time or not is_watched:
+                self._restart(q, time, active=self._active)
                 return
 
-            gap = min(time - self._changed, LONGEST_GAP)
-            if (q != before).any():
-                self._changed = time
-                self._changes += int((time >= self._coasts_until).all())
+            interval = min(time - self._last_change_time, LONGEST_GAP)
+            if (q != last_q).any():
+                self._last_change_time = time
+                self._changes_after_stop += int((time >= self._coasts_until).all())
 
-            found = self._too_fast(q - before, gap)
-            if found and not self._active:  # at rest an arm may be put elsewhere
-                self._begin(q, time, active=False)
+            speed_fault = self._too_fast(q - last_q, interval)
+            if speed_fault and not self._active:  # at rest an arm may be put elsewhere
+                self._restart(q, time, active=False)
                 return
 
-            self.fault = self.fault or found or self._elsewhere(q, q - before, time)
+            self.fault = self.fault or speed_fault or self._off_course(q, q - last_q, time)
             self._note_motion(q, time)
 
     def standing(self, time: float) -> tuple[int, float, float] | None:
@@ -190,89 +191,95 @@ class Supervisor:
             if not self._active or self._q is None:
                 return None
 
-            patience = np.maximum(FOLLOW_SECONDS, 0.4 * NOISE * self._slack / np.maximum(self._ahead, 1e-9))
-            late = (self._way != 0.0) & (time - self._mark_time > patience)
-            if not late.any():
+            patience = np.maximum(FOLLOW_SECONDS, 0.4 * NOISE * self._slack / np.maximum(self._max_lead, 1e-9))
+            is_late = (self._direction != 0.0) & (time - self._time_of_last_move > patience)
+            if not is_late.any():
                 return None
 
-            joint = int(np.flatnonzero(late)[0])
-            return joint, float(abs(self._q[joint] - self._mark[joint])), float(time - self._mark_time[joint])
+            joint = int(np.flatnonzero(is_late)[0])
+            moved = abs(self._q[joint] - self._position_at_last_move[joint])
+            return joint, float(moved), float(time - self._time_of_last_move[joint])
 
-    def _amount(self, joint: int, value: float) -> str:
+    def _amount_in_words(self, joint: int, value: float) -> str:
         return amount(value, prismatic=bool(self._prismatic[joint]))
 
-    def _begin(self, q: Vector, time: float, active: bool = True) -> None:
-        """The arm is where it is: from here on it is compared."""
+    def _restart(self, q: Vector, time: float, active: bool = True) -> None:
+        """Take the arm's place for right: from here on it is compared."""
         if self._q is None:
             self._q = q.copy()
-        self._aim = np.where(self._way != 0.0, self._aim, q)
-        self._back[:] = 0.0
-        self._good_at[:] = time
-        self._room = self._slack.copy()
-        self._used = 0.0
-        self._changed = time
+        self._set_point = np.where(self._direction != 0.0, self._set_point, q)
+        self._wrong_way_travel[:] = 0.0
+        self._last_good_time[:] = time
+        self._speed_allowance = self._slack.copy()
+        self._slack_used = 0.0
+        self._last_change_time = time
         self._active = active
-        self._mark = q.copy()
-        self._mark_time = np.full(len(q), time)
+        self._position_at_last_move = q.copy()
+        self._time_of_last_move = np.full(len(q), time)
 
-    def _too_fast(self, change: Vector, gap: float) -> str:
-        """Whether a joint has moved farther than its rate allows."""
+    def _too_fast(self, change: Vector, interval: float) -> str:
+        """What a joint has done that has moved farther than its rate allows, in words; "" if none has."""
         if not change.any():
             return ""
 
-        allowed = FASTEST * self._rates * gap
-        room = self._room + allowed - np.abs(change)
-        self._room = np.minimum(np.maximum(room, 0.0), self._slack)
-        if (room >= 0.0).all():
+        allowed = FASTEST * self._rates * interval
+        allowance = self._speed_allowance + allowed - np.abs(change)
+        self._speed_allowance = np.minimum(np.maximum(allowance, 0.0), self._slack)
+        if (allowance >= 0.0).all():
             return ""
 
-        joint = int(room.argmin())
+        joint = int(allowance.argmin())
         name = self._names[joint]
-        far = self._amount(joint, float(change[joint]))
+        distance = self._amount_in_words(joint, float(change[joint]))
         if abs(change[joint]) > self._slack[joint] + allowed[joint]:
-            return f"{name} jumped by {far} between two readings"
-        return f"{name} moves faster than {self._amount(joint, FASTEST * float(self._rates[joint]))}/s"
+            return f"{name} jumped by {distance} between two readings"
+        return f"{name} moves faster than {self._amount_in_words(joint, FASTEST * float(self._rates[joint]))}/s"
 
-    def _elsewhere(self, q: Vector, change: Vector, time: float) -> str:
-        """Whether a joint would be farther than the slack from where it should be before the arm could stand."""
-        coasts = time < self._coasts_until
-        stops = coasts & (self._way == 0.0)
-        turns = coasts & (self._way != 0.0)
-        self._aim = np.where(stops, q, self._aim)
-        way = np.where(stops, self._coast_way, self._way)
-        self._back = np.where(turns, 0.0, np.maximum(self._back - way * change, 0.0))
-        wrong = np.where(way != 0.0, self._back, np.abs(q - self._aim))
-        self._good_at[wrong <= NOISE * self._slack] = time
+    def _off_course(self, q: Vector, change: Vector, time: float) -> str:
+        """What a joint has done that would be off by more than the slack before the arm could stand; "" if none is."""
+        is_coasting = time < self._coasts_until
+        is_stopping = is_coasting & (self._direction == 0.0)
+        is_turning = is_coasting & (self._direction != 0.0)
+        self._set_point = np.where(is_stopping, q, self._set_point)
+        direction = np.where(is_stopping, self._coast_direction, self._direction)
+        self._wrong_way_travel = np.where(is_turning, 0.0, np.maximum(self._wrong_way_travel - direction * change, 0.0))
+        deviation = np.where(direction != 0.0, self._wrong_way_travel, np.abs(q - self._set_point))
+        self._last_good_time[deviation <= NOISE * self._slack] = time
 
-        speed = wrong / np.maximum(time - self._good_at, READING_SECONDS)
-        reaction = np.where(way != 0.0, HUNTING_SECONDS, REACTION_SECONDS)
-        excess = np.where(wrong > NOISE * self._slack, wrong + reaction * speed, 0.0) / self._slack
-        over = np.where(coasts, 0.0, self._way * (q - self._aim)) / self._slack
-        self._used = float(max((wrong / self._slack).max(), over.max()))
+        speed = deviation / np.maximum(time - self._last_good_time, READING_SECONDS)
+        reaction = np.where(direction != 0.0, HUNTING_SECONDS, REACTION_SECONDS)
+        excess = np.where(deviation > NOISE * self._slack, deviation + reaction * speed, 0.0) / self._slack
+        overshoot = np.where(is_coasting, 0.0, self._direction * (q - self._set_point)) / self._slack
+        self._slack_used = float(max((deviation / self._slack).max(), overshoot.max()))
 
         joint = int(excess.argmax())
-        if excess[joint] > 1.0 and way[joint] != 0.0:
-            return f"{self._names[joint]} goes the wrong way, by {self._amount(joint, float(wrong[joint]))}"
-        if excess[joint] > 1.0 and (self._active or self._changes >= GOING_ON):
-            return self._says(joint, float(wrong[joint]))
+        if excess[joint] > 1.0 and direction[joint] != 0.0:
+            return (
+                f"{self._names[joint]} goes the wrong way, by {self._amount_in_words(joint, float(deviation[joint]))}"
+            )
+        if excess[joint] > 1.0 and (self._active or self._changes_after_stop >= GOING_ON):
+            return self._off_course_in_words(joint, float(deviation[joint]))
 
-        joint = int(over.argmax())
-        if over[joint] > 1.0:
-            return f"{self._names[joint]} went {self._amount(joint, float(q[joint] - self._aim[joint]))} too far"
+        joint = int(overshoot.argmax())
+        if overshoot[joint] > 1.0:
+            beyond = self._amount_in_words(joint, float(q[joint] - self._set_point[joint]))
+            return f"{self._names[joint]} went {beyond} too far"
         return ""
 
-    def _says(self, joint: int, wrong: float) -> str:
+    def _off_course_in_words(self, joint: int, deviation: float) -> str:
         name = self._names[joint]
-        far = self._amount(joint, wrong)
+        distance = self._amount_in_words(joint, deviation)
         if not self._active:
-            return f"{name} moved on by {far} after the stop"
-        driven = [each for each, way in zip(self._names, self._way, strict=True) if way != 0.0]
-        told = driven[0] if len(driven) == 1 else "others"
-        return f"{name} moved by {far} while {told} was driven" if driven else f"{name} moved by {far} untold"
+            return f"{name} moved on by {distance} after the stop"
+        driven = [self._names[k] for k in np.flatnonzero(self._direction != 0.0)]
+        if not driven:
+            return f"{name} moved by {distance} untold"
+        what_was_driven = driven[0] if len(driven) == 1 else "others"
+        return f"{name} moved by {distance} while {what_was_driven} was driven"
 
     def _note_motion(self, q: Vector, time: float) -> None:
         """Where joints that are driven have moved last, or need not move."""
-        asked: Mask = self._way * (self._aim - q) >= ASKED * self._ahead
-        new = ~asked | (np.abs(q - self._mark) >= NOISE * self._slack)
-        self._mark[new] = q[new]
-        self._mark_time[new] = time
+        must_move: Mask = self._direction * (self._set_point - q) >= MIN_LEAD_SHARE * self._max_lead
+        moved = ~must_move | (np.abs(q - self._position_at_last_move) >= NOISE * self._slack)
+        self._position_at_last_move[moved] = q[moved]
+        self._time_of_last_move[moved] = time

@@ -267,35 +267,35 @@ class Augmenter:
 
     def _figure(self, obstacles: Sequence[Obstacle]) -> Figure:
         """Triangles of obstacles, kept from picture to picture while they are where they were."""
-        key = tuple((id(each.shape), each.pose.homogeneous.tobytes()) for each in obstacles)
+        key = tuple((id(obstacle.shape), obstacle.pose.homogeneous.tobytes()) for obstacle in obstacles)
         if key not in self._figures:
             if len(self._figures) >= MAX_FIGURES:
                 self._figures.pop(next(iter(self._figures)))
 
-            kept = tuple(obstacles)  # so that no other shape gets the identity of one that is gone
-            self._figures[key] = (kept, figure_of(obstacle_surfaces(kept, self._shapes)))
+            held_obstacles = tuple(obstacles)  # so that no other shape gets the identity of one that is gone
+            self._figures[key] = (held_obstacles, figure_of(obstacle_surfaces(held_obstacles, self._shapes)))
         return self._figures[key][1]
 
     def _pixels(
         self, points: Matrix, T_camera_base: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Sixteenths of pixels of points in the base's frame, and which of them are before the camera."""
-        seen = np.asarray(points, dtype=np.float64) @ T_camera_base[:3, :3].T + T_camera_base[:3, 3]
-        before = seen[:, 2] > NEAREST_DRAWN
+        in_camera = np.asarray(points, dtype=np.float64) @ T_camera_base[:3, :3].T + T_camera_base[:3, 3]
+        is_visible = in_camera[:, 2] > NEAREST_DRAWN
 
-        pixels = np.zeros((len(seen), 2))
-        if before.any():
-            pixels[before] = self.camera.project(seen[before])
-        return np.clip(np.rint(16.0 * pixels), -(2**20), 2**20).astype(np.int64), before
+        pixels = np.zeros((len(in_camera), 2))
+        if is_visible.any():
+            pixels[is_visible] = self.camera.project(in_camera[is_visible])
+        return np.clip(np.rint(16.0 * pixels), -(2**20), 2**20).astype(np.int64), is_visible
 
     def _draw_line(
         self, drawn: NDArray[np.uint8], points: Matrix, T_camera_base: NDArray[np.float64], color: str
     ) -> None:
-        pixels, before = self._pixels(finite_array(points, (None, 3), "trail"), T_camera_base)
+        pixels, is_visible = self._pixels(finite_array(points, (None, 3), "trail"), T_camera_base)
 
-        runs = np.split(np.arange(len(pixels)), np.flatnonzero(np.diff(before.astype(int))) + 1)
+        runs = np.split(np.arange(len(pixels)), np.flatnonzero(np.diff(is_visible.astype(int))) + 1)
         for run in runs:
-            if len(run) > 1 and before[run[0]]:
+            if len(run) > 1 and is_visible[run[0]]:
                 line = pixels[run].astype(np.int32)[:, None]
                 cv2.polylines(drawn, [line], False, (0, 0, 0), 4, cv2.LINE_AA, 4)
                 cv2.polylines(drawn, [line], False, _bgr(color), 2, cv2.LINE_AA, 4)

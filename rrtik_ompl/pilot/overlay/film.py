@@ -60,12 +60,12 @@ class ArmInPictures:
         self._seconds = seconds
 
         self._augmenter = Augmenter(robot, sensor.camera)
-        self._ahead = np.linspace(0.0, 1.0, ghosts + 1)[1:]
+        self._ghost_shares = np.linspace(0.0, 1.0, ghosts + 1)[1:]
         self._trail = robot.fk_batch(self._along(np.linspace(0.0, 1.0, TRAIL_POINTS)))[:, :3, 3]
 
         self._T_base_camera: pin.SE3 | None = None
-        self._known: dict[str, SeenObject] = {}
-        self._begin: float | None = None
+        self._objects_seen: dict[str, SeenObject] = {}
+        self._first_time: float | None = None
         self.count = self.without_base = 0
 
     def draw(self, picture: Picture) -> NDArray[np.uint8]:
@@ -85,17 +85,21 @@ class ArmInPictures:
                 self.without_base += 1
                 return picture.pixels
 
-        self._known |= {each.object.name: each for each in view.placed}
-        self._begin = picture.time if self._begin is None else self._begin
+        self._objects_seen |= {each.object.name: each for each in view.placed}
+        self._first_time = picture.time if self._first_time is None else self._first_time
 
-        share = min((picture.time - self._begin) / self._seconds, 1.0)
+        share = min((picture.time - self._first_time) / self._seconds, 1.0)
         q = self._along(np.array([share]))[0]
-        ghosts = [Ghost(row) for row in self._along(self._ahead[self._ahead > share])] if len(self._rows) > 1 else []
+        ghosts = (
+            [Ghost(row) for row in self._along(self._ghost_shares[self._ghost_shares > share])]
+            if len(self._rows) > 1
+            else []
+        )
         return self._augmenter.draw(
             picture.pixels, self._T_base_camera, q, ghosts=ghosts,
-            real=[solid for each in self._known.values() for solid in each.solids()],
+            real=[solid for each in self._objects_seen.values() for solid in each.solids()],
             trail=self._trail if len(self._rows) > 1 else None,
-            frames=[self._robot.fk(q), *(each.T_base_object for each in self._known.values())],
+            frames=[self._robot.fk(q), *(each.T_base_object for each in self._objects_seen.values())],
         )  # fmt: skip
 
     def _along(self, shares: Vector) -> Matrix:
@@ -107,8 +111,8 @@ class ArmInPictures:
 def rate_of(pictures: Iterator[Picture]) -> tuple[float, Iterator[Picture]]:
     """Pictures a second, by the times of the first two, and all of the pictures."""
     first = list(islice(pictures, 2))
-    apart = first[1].time - first[0].time if len(first) == 2 else 0.0
-    rate = 1.0 / apart if apart > 1.0 / MAX_RATE else DEFAULT_RATE
+    interval = first[1].time - first[0].time if len(first) == 2 else 0.0
+    rate = 1.0 / interval if interval > 1.0 / MAX_RATE else DEFAULT_RATE
     return rate, chain(first, pictures)
 
 
@@ -133,7 +137,7 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
         if writer is None:
             raise InputError(f"{path}: there is no picture to write")
         writer.release()
-        if not _room_behind(unfinished) or _pictures_in(unfinished) != count:
+        if not _has_room_to_grow(unfinished) or _pictures_in(unfinished) != count:
             raise InputError(f"{path}: cannot be written whole; is there room on the disk?")
         os.replace(unfinished, path)
     except OSError as error:
@@ -144,7 +148,7 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
         unfinished.unlink(missing_ok=True)
 
 
-def _room_behind(file: Path) -> bool:
+def _has_room_to_grow(file: Path) -> bool:
     """Whether a file could be longer: of a full disk the writer of films says nothing, and may lack the index alone."""
     size = file.stat().st_size
     try:

@@ -27,21 +27,21 @@ def closest_pair(world: World, rows: Matrix) -> Contact | None:
         world: Robot and surroundings.
         rows: Configurations that are free, shape (m, dof), m > 0.
     """
-    bound = np.full(len(rows), -np.inf)
+    lower_bounds = np.full(len(rows), -np.inf)
     best = None
     while True:
-        row = int(np.argmin(bound))
-        if best is not None and bound[row] >= best.clearance - CLEARANCE_ERROR:
+        row = int(np.argmin(lower_bounds))
+        if best is not None and lower_bounds[row] >= best.clearance - CLEARANCE_ERROR:
             return best
 
-        found = world.closest(rows[row], known_free=True)
-        if found is None:
+        closest = world.closest(rows[row], known_free=True)
+        if closest is None:
             return None
-        if best is None or found.clearance < best.clearance:
-            best = found
+        if best is None or closest.clearance < best.clearance:
+            best = closest
 
-        bound = np.maximum(bound, found.clearance - 2.0 * np.abs(rows - rows[row]) @ world.weights)
-        bound[row] = np.inf
+        lower_bounds = np.maximum(lower_bounds, closest.clearance - 2.0 * np.abs(rows - rows[row]) @ world.weights)
+        lower_bounds[row] = np.inf
 
 
 def proven_clearance(parts: Iterable[tuple[World, Matrix]]) -> float:
@@ -55,17 +55,17 @@ def proven_clearance(parts: Iterable[tuple[World, Matrix]]) -> float:
     """
     parts = [(world, rows) for world, rows in parts if len(rows) > 1]
 
-    def kept(millimetres: int) -> bool:
+    def is_proven(millimetres: int) -> bool:
         return all(world.prove(rows, clearance=1e-3 * millimetres).proven for world, rows in parts)
 
-    if kept(FARTHEST):
+    if is_proven(FARTHEST):
         return float("inf")
 
     low = 0
     high = FARTHEST
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (middle, high) if kept(middle) else (low, middle)
+        low, high = (middle, high) if is_proven(middle) else (low, middle)
     return 1e-3 * low
 
 
@@ -104,6 +104,6 @@ def free_rows(world: World, rows: Matrix) -> NDArray[np.bool_]:
     if rows.shape[1] < 2:
         return np.ones(len(rows), dtype=bool)
 
-    inside = world.robot.clamp(rows.reshape(-1, rows.shape[-1])).reshape(rows.shape)
-    starts, ends = (part.reshape(-1, rows.shape[-1]) for part in (inside[:, :-1], inside[:, 1:]))
+    within_limits = world.robot.clamp(rows.reshape(-1, rows.shape[-1])).reshape(rows.shape)
+    starts, ends = (part.reshape(-1, rows.shape[-1]) for part in (within_limits[:, :-1], within_limits[:, 1:]))
     return np.asarray(world.motion_valid_batch(starts, ends).reshape(len(rows), -1).all(axis=1))

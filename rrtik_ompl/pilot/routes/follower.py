@@ -103,13 +103,13 @@ class Follower:
         if abs(remaining) <= min(MADE, 0.5 * abs(end - begin)):  # a short move has to be made, too
             return replace(self, current=self.current + 1).update(q)
 
-        inside = min(begin, end) - self.slack[joint] <= q[joint] <= max(begin, end) + self.slack[joint]
-        if not inside:
+        is_on_move = min(begin, end) - self.slack[joint] <= q[joint] <= max(begin, end) + self.slack[joint]
+        if not is_on_move:
             return self, self._off(joint, float(q[joint]), float(end))
 
         share = float(np.clip(1.0 - remaining / (end - begin), 0.0, 1.0))
-        ending = abs(remaining) <= self.rates[joint] * REACTION_SECONDS
-        return self, Progress(self.current, share, remaining, "stop" if ending else "move")
+        is_ending = abs(remaining) <= self.rates[joint] * REACTION_SECONDS
+        return self, Progress(self.current, share, remaining, "stop" if is_ending else "move")
 
     def pass_on(self, q: Vector) -> tuple[Follower, str, str]:
         """Take the current move for made although its end is not reached.
@@ -124,10 +124,10 @@ class Follower:
         if joint is None:
             raise InputError("all moves are done")
         name = self.path.joint_names[joint]
-        left = abs(float(self.target[joint] - q[joint]))
+        remaining = abs(float(self.target[joint] - q[joint]))
 
-        shown, unit = reading(left, joint_unit(self.path.prismatic[joint]))
-        if left > self.slack[joint]:
+        shown, unit = reading(remaining, joint_unit(self.path.prismatic[joint]))
+        if remaining > self.slack[joint]:
             raise InputError(f"{name}: {shown:.3g} {unit} are left of the move")
         return replace(self, current=self.current + 1), name, f"{shown:.2g} {unit}"
 
@@ -137,8 +137,8 @@ class Follower:
 
     def back(self, q: Vector) -> JointPath:
         """The path back to the beginning: the moves that were made, reversed, each for its joint alone."""
-        made = self.moves[: self.current + 1]  # the current one is under way
-        return self._from(q, [(move.joint, move.start) for move in made[::-1]])
+        moves_made = self.moves[: self.current + 1]  # the current one is under way
+        return self._from(q, [(move.joint, move.start) for move in moves_made[::-1]])
 
     def _from(self, q: Vector, ends: list[tuple[str, float]]) -> JointPath:
         rows = [np.array(q, dtype=np.float64)]
@@ -149,15 +149,20 @@ class Follower:
         return self.path.with_waypoints(np.array(rows if len(rows) > 1 else [*rows, *rows]))
 
     def _lost(self, q: Vector, planned: Vector, moving: int | None) -> Progress | None:
-        away = np.abs(q - planned)
+        errors = np.abs(q - planned)
         if moving is not None:
-            away[moving] = 0.0
-        off = np.flatnonzero(away > self.slack)
-        return self._off(int(off[0]), float(q[off[0]]), float(planned[off[0]])) if len(off) else None
+            errors[moving] = 0.0
+        off_joints = np.flatnonzero(errors > self.slack)
+        if not len(off_joints):
+            return None
+
+        first = int(off_joints[0])
+        return self._off(first, float(q[first]), float(planned[first]))
 
     def _off(self, joint: int, value: float, planned: float) -> Progress:
-        (here, unit), (there, _) = (reading(v, joint_unit(self.path.prismatic[joint])) for v in (value, planned))
-        fault = f"{self.path.joint_names[joint]} is at {here:.2f} {unit} instead of {there:.2f}"
+        shown_value, unit = reading(value, joint_unit(self.path.prismatic[joint]))
+        shown_planned, _ = reading(planned, joint_unit(self.path.prismatic[joint]))
+        fault = f"{self.path.joint_names[joint]} is at {shown_value:.2f} {unit} instead of {shown_planned:.2f}"
         return Progress(self.current, 0.0, 0.0, "lost", fault)
 
 

@@ -62,13 +62,13 @@ class Lamp:
 
 def stage_poses(T_base_object: pin.SE3, grasp: GraspType, level: int) -> tuple[pin.SE3, pin.SE3, pin.SE3]:
     """``T_base_tip`` of approach, grasp and lift."""
-    at = T_base_object * grasp.levels[level]
-    before = at.copy()
-    after = at.copy()
+    grasp_pose = T_base_object * grasp.levels[level]
+    approach_pose = grasp_pose.copy()
+    lift_pose = grasp_pose.copy()
 
-    before.translation = at.translation - grasp.approach * at.rotation[:, 2]
-    after.translation = at.translation + np.array([0.0, 0.0, grasp.lift])
-    return before, at, after
+    approach_pose.translation = grasp_pose.translation - grasp.approach * grasp_pose.rotation[:, 2]
+    lift_pose.translation = grasp_pose.translation + np.array([0.0, 0.0, grasp.lift])
+    return approach_pose, grasp_pose, lift_pose
 
 
 def lamps(
@@ -90,37 +90,37 @@ def lamps(
         holding: For grasp and lift: the same world in which the gripper may touch the object.
         seconds: For each pose, where the arm has no closed form [s].
     """
-    names = [(grasp, level) for grasp in thing.grasps for level in range(len(grasp.levels))]
-    if not names:
+    grasps_and_levels = [(grasp, level) for grasp in thing.grasps for level in range(len(grasp.levels))]
+    if not grasps_and_levels:
         return ()
 
-    poses = np.array([[T.homogeneous for T in stage_poses(T_base_object, *name)] for name in names])
+    poses = np.array([[T.homogeneous for T in stage_poses(T_base_object, *name)] for name in grasps_and_levels])
     postures, why = _postures(world.robot, poses.reshape(-1, 4, 4), near, seconds)
-    shape = (len(names), len(STAGES), *postures.shape[1:])
+    shape = (len(grasps_and_levels), len(STAGES), *postures.shape[1:])
     postures = postures.reshape(shape)
 
     free = _free(postures, (world, holding, holding))
     nearest = _nearest(world.robot, postures, free, near)
 
-    found = []
-    stuck = not (world.valid(near) or holding.valid(near))
-    for row, (grasp, level) in enumerate(names):
+    found_lamps = []
+    is_stuck = not (world.valid(near) or holding.valid(near))
+    for row, (grasp, level) in enumerate(grasps_and_levels):
         reasons = why[row * len(STAGES) : (row + 1) * len(STAGES)]
 
         grasps = postures[row, 1][free[row, 1]]
-        clear = free[row].any(axis=1)
-        if clear[1] and not clear[0]:
-            clear[0] = _approached(world, holding, nearest[row, 1], stage_poses(T_base_object, grasp, level))
+        has_free_posture = free[row].any(axis=1)
+        if has_free_posture[1] and not has_free_posture[0]:
+            has_free_posture[0] = _approached(world, holding, nearest[row, 1], stage_poses(T_base_object, grasp, level))
 
-        color, stage, fault = _color(reasons, clear)
-        if stuck and color == GREEN:
+        color, stage, fault = _color(reasons, has_free_posture)
+        if is_stuck and color == GREEN:
             color = AMBER
             stage = STAGES[0]
             fault = "the arm touches something where it is"
 
         reason = "" if stage is None else f"{stage}: {fault}"
-        found.append(Lamp(grasp.name, level, color, stage, reason, nearest[row], grasps))
-    return tuple(found)
+        found_lamps.append(Lamp(grasp.name, level, color, stage, reason, nearest[row], grasps))
+    return tuple(found_lamps)
 
 
 def _approached(world: World, holding: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3]) -> bool:
@@ -146,8 +146,8 @@ def diagnose(
 
     stage = STAGES.index(lamp.stage)
     goal = PoseGoal(stage_poses(T_base_object, thing.grasp(lamp.type), lamp.level)[stage])
-    found = solve_ik(world.robot, goal, near=near, world=(world, holding, holding)[stage], seconds=DIAGNOSIS_SECONDS)
-    return f"{lamp.stage}: {found.detail}" if found.detail else lamp.reason
+    result = solve_ik(world.robot, goal, near=near, world=(world, holding, holding)[stage], seconds=DIAGNOSIS_SECONDS)
+    return f"{lamp.stage}: {result.detail}" if result.detail else lamp.reason
 
 
 def _postures(
@@ -155,10 +155,10 @@ def _postures(
 ) -> tuple[NDArray[np.float64], list[str]]:
     """For each pose the postures inside the limits, NaN for the others, shape (m, b, dof); and why there is none."""
     if chosen_method(robot, (PoseGoal(poses[0]),), "auto") == "closed-form":
-        found = solutions(robot, poses, near=near, check=False)
-        postures = np.where(found.valid[..., None], found.branches, np.nan)
-        reasons = np.where(found.real.any(axis=1), LIMITS, UNREACHABLE)
-        return postures, np.where(found.valid.any(axis=1), "", reasons).tolist()
+        closed_form = solutions(robot, poses, near=near, check=False)
+        postures = np.where(closed_form.valid[..., None], closed_form.branches, np.nan)
+        reasons = np.where(closed_form.real.any(axis=1), LIMITS, UNREACHABLE)
+        return postures, np.where(closed_form.valid.any(axis=1), "", reasons).tolist()
     batch = solve_ik_batch(robot, poses, near=near, seconds=seconds)
     return np.array(batch.q[:, None]), list(batch.reasons)
 
@@ -167,7 +167,7 @@ def _free(postures: NDArray[np.float64], worlds: tuple[World, ...]) -> NDArray[n
     """Which postures exist and touch nothing, each stage in its own world. Shape (m, stages, b)."""
     free = ~np.isnan(postures[..., 0])
     for world in dict.fromkeys(worlds):
-        stages = [k for k, each in enumerate(worlds) if each is world]
+        stages = [k for k, stage_world in enumerate(worlds) if stage_world is world]
         pending = np.zeros_like(free)
         pending[:, stages] = free[:, stages]
         free[pending] = world.valid_batch(postures[pending])
@@ -176,20 +176,20 @@ def _free(postures: NDArray[np.float64], worlds: tuple[World, ...]) -> NDArray[n
 
 def _nearest(robot: Robot, postures: NDArray[np.float64], free: NDArray[np.bool_], near: Vector) -> NDArray[np.float64]:
     """Of the free postures of each stage the nearest one, NaN where there is none. Shape (m, stages, dof)."""
-    away = np.linalg.norm(joint_difference(robot, postures, near), axis=-1)
+    distances = np.linalg.norm(joint_difference(robot, postures, near), axis=-1)
 
-    best = np.argmin(np.where(free, away, np.inf), axis=2)
-    chosen: NDArray[np.float64] = np.take_along_axis(postures, best[..., None, None], axis=2)[:, :, 0]
-    some: NDArray[np.bool_] = np.asarray(free.any(axis=2))
-    return np.where(some[..., None], chosen, np.nan)
+    best = np.argmin(np.where(free, distances, np.inf), axis=2)
+    nearest: NDArray[np.float64] = np.take_along_axis(postures, best[..., None, None], axis=2)[:, :, 0]
+    exists: NDArray[np.bool_] = np.asarray(free.any(axis=2))
+    return np.where(exists[..., None], nearest, np.nan)
 
 
-def _color(reasons: list[str], clear: NDArray[np.bool_]) -> tuple[Color, Stage | None, str]:
+def _color(reasons: list[str], has_free_posture: NDArray[np.bool_]) -> tuple[Color, Stage | None, str]:
     """Color, the first stage that fails and why; reasons why stages are out of reach, and which stages are free."""
     if reasons[1]:
         return RED, STAGES[1], reasons[1]
 
-    failing = next((k for k in (1, 0, 2) if not clear[k]), None)
+    failing = next((k for k in (1, 0, 2) if not has_free_posture[k]), None)
     if failing is None:
         return GREEN, None, ""
     return AMBER, STAGES[failing], reasons[failing] or "something is in the way"

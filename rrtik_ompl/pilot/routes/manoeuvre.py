@@ -148,10 +148,10 @@ def way_out(world: World, q: Vector, joint: int, sign: float) -> float:
     Raises:
         InputError: If it does not.
     """
-    small = float(slack(JointPath.of(world.robot, q[None]))[joint])
+    small_error = float(slack(JointPath.of(world.robot, q[None]))[joint])
     check = None
-    for far in ESCAPE_STEPS:
-        target = float(q[joint]) + sign * far * small
+    for multiple in ESCAPE_STEPS:
+        target = float(q[joint]) + sign * multiple * small_error
         check = check_move(world, q, joint, target)
         if check.allowed:
             return target
@@ -161,27 +161,27 @@ def way_out(world: World, q: Vector, joint: int, sign: float) -> float:
 def joint_range(world: World, q: Vector, joint: int) -> JointRange:
     """How far a joint can be driven; nowhere if the arm touches something, a full turn if it is endless and free."""
     robot = world.robot
-    here = float(q[joint])
+    value = float(q[joint])
     if not world.valid(q):
         why = world.explain(q)
-        return JointRange(here, here, why, why, ())
-    low, below = _reach(world, q, joint, float(robot.lower[joint]), here - TAU)
-    high, above = _reach(world, q, joint, float(robot.upper[joint]), here + TAU)
+        return JointRange(value, value, why, why, ())
+    low, below = _reach(world, q, joint, float(robot.lower[joint]), value - TAU)
+    high, above = _reach(world, q, joint, float(robot.upper[joint]), value + TAU)
     return JointRange(low, high, below, above, _singular_stretches(robot, q, joint, low, high))
 
 
 def _reach(world: World, q: Vector, joint: int, limit: float, turn: float) -> tuple[float, str]:
     """How far a joint goes towards its limit, or round once, and what ends it: that, or the pair that touches."""
-    end, name = (limit, "limit") if np.isfinite(limit) else (turn, "full turn")
+    end, end_name = (limit, "limit") if np.isfinite(limit) else (turn, "full turn")
     reached = free_until(world, q, joint, end)
     if reached == end:
-        return end, name
-    start = q.copy()
-    last = q.copy()
-    start[joint] = reached
-    last[joint] = end
+        return end, end_name
+    last_free = q.copy()
+    end_posture = q.copy()
+    last_free[joint] = reached
+    end_posture[joint] = end
 
-    touching = world.contacts(_first_blocked(world, start, last))
+    touching = world.contacts(_first_blocked(world, last_free, end_posture))
     return reached, f"{touching[0].first} meets {touching[0].second}" if touching else "too close to tell"
 
 
@@ -190,11 +190,13 @@ def _singular_stretches(robot: Robot, q: Vector, joint: int, low: float, high: f
     values = np.linspace(low, high, SINGULARITY_SAMPLES)
     rows = np.tile(q, (len(values), 1))
     rows[:, joint] = values
-    found: list[Stretch] = []
-    for case, near in _near_singular(robot, rows).items():
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
-        found += [(float(values[a]), float(values[b - 1]), case) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return tuple(found)
+    stretches: list[Stretch] = []
+    for case, is_near in _near_singular(robot, rows).items():
+        run_edges = np.flatnonzero(np.diff(np.concatenate([[False], is_near, [False]]).astype(int)))
+        stretches += [
+            (float(values[a]), float(values[b - 1]), case) for a, b in zip(run_edges[::2], run_edges[1::2], strict=True)
+        ]
+    return tuple(stretches)
 
 
 def escape_move(world: World, q: Vector) -> tuple[int, float] | None:
@@ -202,9 +204,9 @@ def escape_move(world: World, q: Vector) -> tuple[int, float] | None:
 
     Of all single joints the one that has to go least far, a few small errors' width at most.
     """
-    small = slack(JointPath.of(world.robot, q[None]))
-    for far in ESCAPE_STEPS:
-        for joint, step in enumerate(far * small):
+    small_errors = slack(JointPath.of(world.robot, q[None]))
+    for multiple in ESCAPE_STEPS:
+        for joint, step in enumerate(multiple * small_errors):
             for target in (q[joint] + step, q[joint] - step):
                 if check_move(world, q, joint, float(target)).allowed:
                     return joint, float(target)
@@ -215,30 +217,34 @@ def escape_advice(world: World, q: Vector) -> str:
     """How to get an arm that touches something free; "" if it touches nothing."""
     if world.valid(q):
         return ""
-    out = escape_move(world, q)
-    if out is None:
+    way_free = escape_move(world, q)
+    if way_free is None:
         return "drive the arm out of it first"
 
-    value, unit = reading(out[1], joint_unit(world.robot.prismatic[out[0]]))
-    return f"{world.robot.joint_names[out[0]]} to {value:.4g} {unit} gets it free"
+    value, unit = reading(way_free[1], joint_unit(world.robot.prismatic[way_free[0]]))
+    return f"{world.robot.joint_names[way_free[0]]} to {value:.4g} {unit} gets it free"
 
 
 def _out_of_contact(world: World, start: Vector, end: Vector) -> MoveCheck:
     """An arm that touches something may move so that the overlap decreases and then ends."""
     rows = start + np.linspace(0.0, 1.0, CLEARANCE_SAMPLES)[:, None] * (end - start)
-    gaps = np.array([world.clearance(row) for row in rows])
-    free = int(np.argmax(gaps > 0.0))
-    if gaps[-1] <= 0.0 or (np.diff(gaps[: free + 1]) <= 0.0).any() or not world.motion_valid(rows[free], end):
+    clearances = np.array([world.clearance(row) for row in rows])
+    first_free = int(np.argmax(clearances > 0.0))
+    if (
+        clearances[-1] <= 0.0
+        or (np.diff(clearances[: first_free + 1]) <= 0.0).any()
+        or not world.motion_valid(rows[first_free], end)
+    ):
         why = f"the arm touches something, and this does not get it free: {world.explain(start)}"
         return MoveCheck(False, why, (), -np.inf)
-    return MoveCheck(True, "", ("out of contact",), float(gaps[-1]))
+    return MoveCheck(True, "", ("out of contact",), float(clearances[-1]))
 
 
 def _first_blocked(world: World, start: Vector, end: Vector) -> Vector:
     """The first configuration along a motion that is not free; its end if none is found. Shape (dof,)."""
     rows = start + np.linspace(0.0, 1.0, world.steps(start, end) + 1)[:, None] * (end - start)
-    blocked = np.flatnonzero(~world.valid_batch(rows))
-    return np.array(rows[blocked[0]] if len(blocked) else end)
+    blocked_rows = np.flatnonzero(~world.valid_batch(rows))
+    return np.array(rows[blocked_rows[0]] if len(blocked_rows) else end)
 
 
 def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
@@ -250,8 +256,8 @@ def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
 
 
 def _singular(world: World, q: Vector) -> list[str]:
-    near = [case for case, there in _near_singular(world.robot, q[None]).items() if there[0]]
-    return [f"near the singular posture '{case}'" if case else "near a singular posture" for case in near]
+    cases = [case for case, is_near in _near_singular(world.robot, q[None]).items() if is_near[0]]
+    return [f"near the singular posture '{case}'" if case else "near a singular posture" for case in cases]
 
 
 def _near_singular(robot: Robot, rows: Matrix) -> dict[str, Mask]:
@@ -259,5 +265,5 @@ def _near_singular(robot: Robot, rows: Matrix) -> dict[str, Mask]:
     if has_closed_form(robot):
         return {case: np.asarray(size < SINGULARITY_THRESHOLD) for case, size in form_of(robot).nearness(rows).items()}
 
-    least = np.linalg.svd(robot.jacobian_batch(rows), compute_uv=False)[:, -1]
-    return {"": np.asarray(least < SINGULARITY_THRESHOLD)}
+    smallest_singular = np.linalg.svd(robot.jacobian_batch(rows), compute_uv=False)[:, -1]
+    return {"": np.asarray(smallest_singular < SINGULARITY_THRESHOLD)}

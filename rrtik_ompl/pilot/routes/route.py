@@ -115,55 +115,55 @@ def _tails(
     world: World, holding: World, stages: tuple[pin.SE3, pin.SE3, pin.SE3], grasp: Vector, seed: int
 ) -> Sequence[Tail] | NoRoute:
     """The last parts of routes to a grasp: few moves from about the pose before it, or else some from exactly there."""
-    short = approaches(world, holding, grasp, stages, MAX_BEGINNINGS)
-    if short:
-        return short
+    few_moves = approaches(world, holding, grasp, stages, MAX_BEGINNINGS)
+    if few_moves:
+        return few_moves
 
-    before = solve_ik_batch(world.robot, [stages[0].homogeneous], near=grasp, world=world, seed=seed)
-    if not before.found[0]:
-        return NoRoute(before.details[0] or before.reasons[0] or "not to be reached", "the pose before the object")
+    approach = solve_ik_batch(world.robot, [stages[0].homogeneous], near=grasp, world=world, seed=seed)
+    if not approach.found[0]:
+        return NoRoute(approach.details[0] or approach.reasons[0] or "not to be reached", "the pose before the object")
 
-    last = planned(holding, before.q[0], grasp, seed)
+    last = planned(holding, approach.q[0], grasp, seed)
     return NoRoute(str(last), "from before the object to it") if isinstance(last, NoRoute) else [[last]]
 
 
 def _without_tiny_moves(world: World, goal: Vector, q: Vector) -> Vector:
     """A goal whose joints that are there already need not move, as long as the tip ends where it should."""
     robot = world.robot
-    kept = goal
+    goal_with_fewer_moves = goal
 
-    wanted = robot.fk(goal)
+    goal_pose = robot.fk(goal)
     for joint in np.argsort(np.abs(goal - q)):
-        tried = kept.copy()
+        tried = goal_with_fewer_moves.copy()
         tried[joint] = q[joint]
-        away, turned = apart(wanted, robot.fk(tried))
-        if away > END_OFFSET or turned > END_TURN or not world.valid(tried):
+        distance, turn = apart(goal_pose, robot.fk(tried))
+        if distance > END_OFFSET or turn > END_TURN or not world.valid(tried):
             break
-        kept = tried
-    return kept
+        goal_with_fewer_moves = tried
+    return goal_with_fewer_moves
 
 
 def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates: Vector, seed: int) -> Route | NoRoute:
     search = RouteSearch(world, holding, q, seed)
     try:
-        found = search.find(tails)
+        route = search.find(tails)
     except ProblemError as error:
         return NoRoute(str(error))
-    if isinstance(found, NoRoute):
-        return found
+    if isinstance(route, NoRoute):
+        return route
 
-    path = JointPath.of(world.robot, found.rows)
+    path = JointPath.of(world.robot, route.rows)
     moves = path.moves()
     names = list(path.joint_names)
 
     seconds = sum(abs(move.change) / rates[names.index(move.joint)] for move in moves)
-    used = tuple(name for name in names if any(move.joint == name for move in moves))
+    moving_joints = tuple(name for name in names if any(move.joint == name for move in moves))
     travel = sum(abs(move.change) for move in moves)
 
-    robustness = search.robustness(found)
-    proven = search.proven(found)
-    clearance = search.clearance(found) if proven else 0.0
+    robustness = search.robustness(route)
+    proven = search.proven(route)
+    clearance = search.clearance(route) if proven else 0.0
     return Route(
-        path, found.grasp_from, travel, float(seconds), clearance, used, robustness, proven,
+        path, route.grasp_from, travel, float(seconds), clearance, moving_joints, robustness, proven,
         contacts=world.scene.contacts,
     )  # fmt: skip

@@ -86,17 +86,17 @@ class Track:
     def update(self, q: Vector) -> tuple[Track, Progress]:
         """The track with the place that an arm at q has reached, and the arm's progress."""
         places = np.linspace(self.at, min(self.at + AHEAD_SECONDS, self.seconds), PLACES)
-        off = np.abs(np.array([self._place(each) for each in places]) - q) / self.slack
+        errors = np.abs(np.array([self._place(seconds) for seconds in places]) - q) / self.slack
 
-        nearest = int(off.max(axis=1).argmin())
-        if off[nearest].max() > 1.0:
-            return self, Progress(0, self.share, 0.0, "lost", self._fault(q, int(off[nearest].argmax())))
+        nearest = int(errors.max(axis=1).argmin())
+        if errors[nearest].max() > 1.0:
+            return self, Progress(0, self.share, 0.0, "lost", self._fault(q, int(errors[nearest].argmax())))
 
         if self.done or np.abs(q - self.path.end).max() <= MADE:
             return replace(self, current=1, at=self.seconds), Progress(1, 1.0, 0.0, "done")
 
-        moved = replace(self, at=float(places[nearest]))
-        return moved, Progress(0, moved.share, moved.seconds - moved.at, "move")
+        advanced = replace(self, at=float(places[nearest]))
+        return advanced, Progress(0, advanced.share, advanced.seconds - advanced.at, "move")
 
     def ahead(self, seconds: float) -> Vector:
         """The place on the path that is so much ahead of the arm. Shape (dof,)."""
@@ -112,13 +112,15 @@ class Track:
 
     def rest(self, q: Vector) -> JointPath:
         """What remains, from q."""
-        left = self.path.waypoints[np.searchsorted(self._times, self.at, side="right") :]
-        return self.path.with_waypoints(np.vstack([q, left if len(left) else self.path.end[None]]))
+        waypoints_ahead = self.path.waypoints[np.searchsorted(self._times, self.at, side="right") :]
+        return self.path.with_waypoints(
+            np.vstack([q, waypoints_ahead if len(waypoints_ahead) else self.path.end[None]])
+        )
 
     def back(self, q: Vector) -> JointPath:
         """The path back to the beginning."""
-        made = self.path.waypoints[: np.searchsorted(self._times, self.at, side="right")]
-        return self.path.with_waypoints(np.vstack([q, made[::-1]]))
+        waypoints_behind = self.path.waypoints[: np.searchsorted(self._times, self.at, side="right")]
+        return self.path.with_waypoints(np.vstack([q, waypoints_behind[::-1]]))
 
     def _place(self, seconds: float) -> Vector:
         return np.array([np.interp(seconds, self._times, column) for column in self.path.waypoints.T])
@@ -130,8 +132,10 @@ class Track:
 
     def _fault(self, q: Vector, joint: int) -> str:
         unit = joint_unit(self.path.prismatic[joint])
-        (here, shown), (there, _) = (reading(float(row[joint]), unit) for row in (q, self._place(self.at)))
-        return f"{self.path.joint_names[joint]} is at {here:.2f} {shown} instead of {there:.2f}"
+        (shown_value, unit_name), (shown_planned, _) = (
+            reading(float(row[joint]), unit) for row in (q, self._place(self.at))
+        )
+        return f"{self.path.joint_names[joint]} is at {shown_value:.2f} {unit_name} instead of {shown_planned:.2f}"
 
 
 def together(route: Route, world: World, rates: Vector, seed: int) -> Route | NoRoute:
@@ -150,17 +154,22 @@ def together(route: Route, world: World, rates: Vector, seed: int) -> Route | No
         return NoRoute("only moves of single joints are left", STAGE)
 
     problem = Problem(world, rows[0], before)
-    found = plan(problem, "rrtconnect", seconds=PLANNER_SECONDS, seed=seed)
-    if found.path is None:
-        return NoRoute(found.reason, STAGE)
+    planned = plan(problem, "rrtconnect", seconds=PLANNER_SECONDS, seed=seed)
+    if planned.path is None:
+        return NoRoute(planned.reason, STAGE)
 
-    path = shorten(found.path, problem, seed=seed)
-    whole = path.with_waypoints(np.vstack([path.waypoints, last]))
+    path = shorten(planned.path, problem, seed=seed)
+    whole_path = path.with_waypoints(np.vstack([path.waypoints, last]))
 
-    used = tuple(name for name, way in zip(whole.joint_names, np.ptp(whole.waypoints, axis=0), strict=True) if way > 0)
+    moving_joints = tuple(
+        name
+        for name, travel in zip(whole_path.joint_names, np.ptp(whole_path.waypoints, axis=0), strict=True)
+        if travel > 0
+    )
     return replace(
-        route, path=whole, grasp_from=len(path.waypoints) - 1, seconds=Track(whole, rates).seconds, joints=used,
-        travel=float(np.abs(np.diff(whole.waypoints, axis=0)).sum()),
+        route, path=whole_path, grasp_from=len(path.waypoints) - 1, joints=moving_joints,
+        seconds=Track(whole_path, rates).seconds,
+        travel=float(np.abs(np.diff(whole_path.waypoints, axis=0)).sum()),
         clearance=min(proven_clearance([(world, path.waypoints)]), route.clearance),
         proven=bool(world.prove(path.waypoints).proven) and route.proven, together=True,
     )  # fmt: skip
