@@ -57,19 +57,21 @@ def cloud_from_depth(
         raise InputError(f"depth picture: the camera has {size} pixels, got an array of shape {picture.shape}")
 
     step = whole_number(every, "every", 1)
-    low = not_negative(nearest, "nearest")
+    nearest_depth = not_negative(nearest, "nearest")
     z = positive(scale, "scale") * picture[::step, ::step]
-    seen = np.isfinite(z) & (z >= low) & (z <= positive(farthest, "farthest")) & (z > 0.0)
-    if not seen.any():
-        raise InputError(f"depth picture: no pixel has a depth between {low:g} and {farthest:g} m; check its scale")
+    is_measured = np.isfinite(z) & (z >= nearest_depth) & (z <= positive(farthest, "farthest")) & (z > 0.0)
+    if not is_measured.any():
+        raise InputError(
+            f"depth picture: no pixel has a depth between {nearest_depth:g} and {farthest:g} m; check its scale"
+        )
 
-    row, column = np.nonzero(seen)
-    away = z[row, column]
-    flat = camera.rays(step * np.column_stack([column, row]).astype(np.float64))
-    points = np.column_stack([flat * away[:, None], away])
+    row, column = np.nonzero(is_measured)
+    depths = z[row, column]
+    rays = camera.rays(step * np.column_stack([column, row]).astype(np.float64))
+    points = np.column_stack([rays * depths[:, None], depths])
 
     if pose is not None:
-        place = rigid(pose, "pose of the camera")
-        points = points @ place.rotation.T + place.translation
+        camera_pose = rigid(pose, "pose of the camera")
+        points = points @ camera_pose.rotation.T + camera_pose.translation
 
     return PointCloud(points, radius)

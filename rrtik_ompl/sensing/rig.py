@@ -84,61 +84,68 @@ def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: M
     if len(pictures) != len(rig.cameras):
         raise InputError(f"a rig of {len(rig.cameras)} cameras needs as many pictures, got {len(pictures)}")
 
-    seen: dict[str, list[Sighting]] = {}
+    sightings_of: dict[str, list[Sighting]] = {}
     for number, (picture, camera) in enumerate(zip(pictures, rig.cameras, strict=True)):
         check_size(picture, camera, f"picture of camera {number + 1}")
-        for each in detect_objects(picture, camera, marker_map):
-            seen.setdefault(each.object.name, []).append(_in_first(each, rig, number))
+        for sighting in detect_objects(picture, camera, marker_map):
+            sightings_of.setdefault(sighting.object.name, []).append(_in_first(sighting, rig, number))
 
-    return tuple(joined(seen[each.name]) for each in marker_map.objects if each.name in seen)
+    names = [marked_object.name for marked_object in marker_map.objects]
+    return tuple(joined(sightings_of[name]) for name in names if name in sightings_of)
 
 
 def joined(sightings: Sequence[Sighting]) -> Sighting:
     """One sighting of several of the same object, all in the same frame; what is refused counts only if all are."""
-    usable = [each for each in sightings if not each.refused]
+    usable = [sighting for sighting in sightings if not sighting.refused]
     if len(usable) < 2:
         return (usable or list(sightings))[0]
 
     # Each camera may leave two poses open: the combination that contradicts itself least is taken.
-    tried = [_joined(usable, poses) for poses in product(*(_branches(each) for each in usable))]
-    pose = min(tried, key=lambda each: each.surprise)
+    fused = [_fuse(usable, poses) for poses in product(*(_branches(sighting) for sighting in usable))]
+    pose = min(fused, key=lambda candidate: candidate.surprise)
 
-    others = [each for each in tried if each is not pose]
-    second = min(others, key=lambda each: each.surprise, default=None)
-    if second is not None and second.surprise < MAX_CONTRADICTION:
-        pose = replace(pose, other=second.T_camera_object, other_error=pose.error)
+    other_fused = [candidate for candidate in fused if candidate is not pose]
+    second_best = min(other_fused, key=lambda candidate: candidate.surprise, default=None)
+    if second_best is not None and second_best.surprise < MAX_CONTRADICTION:
+        pose = replace(pose, other=second_best.T_camera_object, other_error=pose.error)
 
-    markers = {marker.number: marker for each in reversed(usable) for marker in each.markers}
+    markers = {marker.number: marker for sighting in reversed(usable) for marker in sighting.markers}
     refused = "" if pose.surprise <= MAX_CONTRADICTION else CONTRADICTION.format(pose.surprise**0.5)
     return Sighting(usable[0].object, pose, tuple(markers[number] for number in sorted(markers)), refused)
 
 
 def _branches(sight: Sighting) -> list[pin.SE3]:
     pose = sight.pose
-    return [pose.T_camera_object, pose.other] if pose.ambiguous and pose.other is not None else [pose.T_camera_object]
+    if pose.ambiguous and pose.other is not None:
+        return [pose.T_camera_object, pose.other]
+    return [pose.T_camera_object]
 
 
-def _joined(sightings: Sequence[Sighting], poses: Sequence[pin.SE3]) -> CornerPose:
-    """The pose that is nearest to some poses by their covariances, and by how much they contradict each other."""
-    weights = [np.linalg.inv(each.pose.covariance) for each in sightings]
+def _fuse(sightings: Sequence[Sighting], poses: Sequence[pin.SE3]) -> CornerPose:
+    """The pose that is nearest to some poses by their covariances, found by Gauss-Newton's steps.
+
+    Its ``surprise`` says by how much they contradict each other.
+    """
+    weights = [np.linalg.inv(sighting.pose.covariance) for sighting in sightings]
     covariance = np.linalg.inv(sum(weights))
 
-    found = poses[0]
+    fused_pose = poses[0]
     for _ in range(ROUNDS):
-        away = [_away(found, pose) for pose in poses]
-        step = covariance @ sum(w @ a for w, a in zip(weights, away, strict=True))
-        found = pin.SE3(pin.exp3(step[3:]) @ found.rotation, found.translation + step[:3])
+        differences = [_pose_difference(fused_pose, pose) for pose in poses]
+        step = covariance @ sum(w @ a for w, a in zip(weights, differences, strict=True))
+        fused_pose = pin.SE3(pin.exp3(step[3:]) @ fused_pose.rotation, fused_pose.translation + step[:3])
 
-    squares = sum(float(a @ w @ a) for w, a in zip(weights, (_away(found, pose) for pose in poses), strict=True))
+    differences = [_pose_difference(fused_pose, pose) for pose in poses]
+    squares = sum(float(a @ w @ a) for w, a in zip(weights, differences, strict=True))
     surprise = squares / (6.0 * (len(poses) - 1))
-    error = max(each.pose.error for each in sightings)
-    return CornerPose(found, None, error, np.inf, frozen(max(surprise, 1.0) * covariance), surprise)
+    error = max(sighting.pose.error for sighting in sightings)
+    return CornerPose(fused_pose, None, error, np.inf, frozen(max(surprise, 1.0) * covariance), surprise)
 
 
-def _away(begin: pin.SE3, end: pin.SE3) -> Vector:
+def _pose_difference(begin: pin.SE3, end: pin.SE3) -> Vector:
     """From one pose to another: position, and a small rotation about the axes of the camera. Shape (6,)."""
-    turned: Matrix = end.rotation @ begin.rotation.T
-    return np.concatenate([end.translation - begin.translation, pin.log3(turned)])
+    rotation: Matrix = end.rotation @ begin.rotation.T
+    return np.concatenate([end.translation - begin.translation, pin.log3(rotation)])
 
 
 def _in_first(sight: Sighting, rig: Rig, number: int) -> Sighting:
@@ -148,24 +155,28 @@ def _in_first(sight: Sighting, rig: Rig, number: int) -> Sighting:
 
     T = rig.poses[number]
     pose = sight.pose
-    axes = np.kron(np.eye(2), T.rotation)
+    rotation_of_both = np.kron(np.eye(2), T.rotation)
 
-    lever = np.eye(6)
-    lever[:3, 3:] = -pin.skew(T.rotation @ pose.T_camera_object.translation)
-    doubt = np.diag(np.repeat(np.square([rig.position_sigma, rig.rotation_sigma]), 3))
-    spread = axes @ pose.covariance @ axes.T + lever @ doubt @ lever.T
+    rotation_lever = np.eye(6)
+    rotation_lever[:3, 3:] = -pin.skew(T.rotation @ pose.T_camera_object.translation)
+    pose_doubt = np.diag(np.repeat(np.square([rig.position_sigma, rig.rotation_sigma]), 3))
+    covariance = (
+        rotation_of_both @ pose.covariance @ rotation_of_both.T + rotation_lever @ pose_doubt @ rotation_lever.T
+    )
 
     other = None if pose.other is None else T * pose.other
-    moved = replace(pose, T_camera_object=T * pose.T_camera_object, other=other, covariance=frozen(spread))
+    in_first = replace(pose, T_camera_object=T * pose.T_camera_object, other=other, covariance=frozen(covariance))
 
-    return replace(sight, pose=moved, markers=tuple(_marker_in_first(m, moved, sight, rig) for m in sight.markers))
+    return replace(
+        sight, pose=in_first, markers=tuple(_marker_in_first(m, in_first, sight, rig) for m in sight.markers)
+    )
 
 
 def _marker_in_first(marker: SeenMarker, pose: CornerPose, sight: Sighting, rig: Rig) -> SeenMarker:
     """A marker with its corners where the first camera of the rig would see them; in its corner what is behind it."""
-    mounted = next(each for each in sight.object.markers if each.number == marker.number)
+    mounted_marker = next(candidate for candidate in sight.object.markers if candidate.number == marker.number)
     T = pose.T_camera_object
-    corners = mounted.corners @ T.rotation.T + T.translation
-    ahead = bool((corners[:, 2] > NEAREST).all())
-    seen = rig.cameras[0].project(corners) if ahead else np.zeros((4, 2))
-    return replace(marker, corners=frozen(seen), spread=None)
+    corners = mounted_marker.corners @ T.rotation.T + T.translation
+    in_front = bool((corners[:, 2] > NEAREST).all())
+    pixels = rig.cameras[0].project(corners) if in_front else np.zeros((4, 2))
+    return replace(marker, corners=frozen(pixels), spread=None)

@@ -63,8 +63,8 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
         InputError: If there are fewer than two cameras, other numbers of pictures, too few of them show the board, or
             the cameras did not stand still to each other.
     """
-    if len(pictures) < 2 or len({len(each) for each in pictures}) > 1:
-        counts = ", ".join(str(len(each)) for each in pictures)
+    if len(pictures) < 2 or len({len(camera_pictures) for camera_pictures in pictures}) > 1:
+        counts = ", ".join(str(len(camera_pictures)) for camera_pictures in pictures)
         raise InputError(
             f"a rig needs as many pictures of each of two cameras or more, in the same order; got {counts}"
         )
@@ -75,34 +75,37 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
         )
 
     cameras = []
-    for number, taken in enumerate(pictures, start=1):
+    for number, camera_pictures in enumerate(pictures, start=1):
         try:
-            cameras.append(calibrate(taken, board))
+            cameras.append(calibrate(camera_pictures, board))
         except InputError as reason:
             raise InputError(f"camera {number}: {reason}") from None
 
-    corners = [[board_corners(as_gray(picture), board) for picture in taken] for taken in pictures]
-    beside = [_beside_first(cameras, corners, number) for number in range(1, len(pictures))]
-    poses, moments, errors, sigmas = zip(*beside, strict=True)
+    corners = [[board_corners(as_gray(picture), board) for picture in camera_pictures] for camera_pictures in pictures]
+    relative = [_relative_to_first(cameras, corners, number) for number in range(1, len(pictures))]
+    poses, moments, errors, sigmas = zip(*relative, strict=True)
 
     position, rotation = np.max(sigmas, axis=0)
-    lenses = tuple(each.camera for each in cameras)
+    lenses = tuple(calibration.camera for calibration in cameras)
     rig = Rig(lenses, (pin.SE3.Identity(), *poses), float(position), float(rotation))
     return RigCalibration(rig, tuple(cameras), moments, errors)
 
 
-def _beside_first(
+def _relative_to_first(
     cameras: Sequence[Calibration], corners: Sequence[Sequence[tuple[Matrix, Matrix]]], number: int
 ) -> tuple[pin.SE3, int, float, Vector]:
-    """How a camera stands to the first one: its pose, in how many moments both saw the board, and as of `_stands`."""
-    common = [each for pair in zip(corners[0], corners[number], strict=True) if (each := _common(*pair))]
+    """How a camera stands to the first one: its pose, in how many moments both saw the board, error and deviations.
+
+    The last two are those of `_relative_pose`.
+    """
+    common = [moment for pair in zip(corners[0], corners[number], strict=True) if (moment := _common_corners(*pair))]
     if len(common) < MIN_MOMENTS:
         raise InputError(
             f"cameras 1 and {number + 1} see the board together in {len(common)} moments, at least {MIN_MOMENTS} "
             "are needed: hold it where both see it"
         )
 
-    pose, error, sigma = _stands(cameras[0].camera, cameras[number].camera, common)
+    pose, error, sigma = _relative_pose(cameras[0].camera, cameras[number].camera, common)
     if error > MAX_ERROR:
         raise InputError(
             f"camera {number + 1}: corners lie {error:.1f} pixels off where the first has them: pictures "
@@ -111,35 +114,45 @@ def _beside_first(
     return pose, len(common), error, sigma
 
 
-def _common(first: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix]) -> Common | None:
+def _common_corners(first: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix]) -> Common | None:
     """The corners that both saw; None if these are too few."""
-    places = {tuple(np.round(point, 6)): k for k, point in enumerate(other[0])}
-    both = [(k, places[key]) for k, point in enumerate(first[0]) if (key := tuple(np.round(point, 6))) in places]
-    if len(both) < MIN_CORNERS:
+    index_of_point = {tuple(np.round(point, 6)): k for k, point in enumerate(other[0])}
+    index_pairs = []
+    for k, point in enumerate(first[0]):
+        key = tuple(np.round(point, 6))
+        if key in index_of_point:
+            index_pairs.append((k, index_of_point[key]))
+    if len(index_pairs) < MIN_CORNERS:
         return None
 
-    one, two = np.array(both).T
-    return Common(*(each.astype(np.float32) for each in (first[0][one], first[1][one], other[1][two])))
+    first_rows, other_rows = np.array(index_pairs).T
+    return Common(
+        *(rows.astype(np.float32) for rows in (first[0][first_rows], first[1][first_rows], other[1][other_rows]))
+    )
 
 
-def _stands(first: Camera, other: Camera, common: Sequence[Common]) -> tuple[pin.SE3, float, Vector]:
+def _relative_pose(first: Camera, other: Camera, common: Sequence[Common]) -> tuple[pin.SE3, float, Vector]:
     """``T_first_other``, the error [pixels], and standard deviations of its position [m] and rotation [rad]."""
-    pose, error = _solved(first, other, common)
-    away = []
+    pose, error = _stereo_calibrated(first, other, common)
+    shifts = []
     for left_out in range(len(common)):
-        less, _ = _solved(first, other, [each for k, each in enumerate(common) if k != left_out])
-        away.append([*(less.translation - pose.translation), *pin.log3(less.rotation @ pose.rotation.T)])
+        without_one, _ = _stereo_calibrated(first, other, [moment for k, moment in enumerate(common) if k != left_out])
+        shifts.append(
+            [*(without_one.translation - pose.translation), *pin.log3(without_one.rotation @ pose.rotation.T)]
+        )
 
-    spread = (len(common) - 1) / len(common) * np.square(away).sum(axis=0)
-    return pose, error, np.sqrt([spread[:3].max(), spread[3:].max()])
+    variances = (len(common) - 1) / len(common) * np.square(shifts).sum(axis=0)
+    return pose, error, np.sqrt([variances[:3].max(), variances[3:].max()])
 
 
-def _solved(first: Camera, other: Camera, common: Sequence[Common]) -> tuple[pin.SE3, float]:
+def _stereo_calibrated(first: Camera, other: Camera, common: Sequence[Common]) -> tuple[pin.SE3, float]:
     solve: Any = cv2.stereoCalibrate  # its type requires more where None is allowed
-    error, *_, turn, shift, _, _ = solve(
-        [each.points for each in common], [each.first for each in common], [each.other for each in common],
+    error, *_, rotation, translation, _, _ = solve(
+        [moment.points for moment in common],
+        [moment.first for moment in common],
+        [moment.other for moment in common],
         first.matrix.copy(), first.distortion.copy(), other.matrix.copy(), other.distortion.copy(),
         (first.width, first.height),
         flags=cv2.CALIB_FIX_INTRINSIC, criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 100, 1e-9),
     )  # fmt: skip
-    return pin.SE3(np.asarray(turn), np.ravel(shift)).inverse(), float(error)
+    return pin.SE3(np.asarray(rotation), np.ravel(translation)).inverse(), float(error)

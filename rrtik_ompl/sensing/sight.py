@@ -101,11 +101,13 @@ def detect_objects(
     gray = as_gray(picture)
     check_size(gray, camera)
 
-    known = [marker for each in before for marker in each.markers]
-    seen = find_markers(gray, marker_map.dictionary, align=align, tone=camera.tone, before=known, near=near)
+    last_markers = [marker for last_sighting in before for marker in last_sighting.markers]
+    markers_seen = find_markers(
+        gray, marker_map.dictionary, align=align, tone=camera.tone, before=last_markers, near=near
+    )
 
-    sightings = (sighting(camera, each, seen) for each in marker_map.objects)
-    return tuple(found for found in sightings if found is not None)
+    sightings = (sighting(camera, marked_object, markers_seen) for marked_object in marker_map.objects)
+    return tuple(found_sighting for found_sighting in sightings if found_sighting is not None)
 
 
 def check_size(picture: NDArray[np.uint8], camera: Camera, name: str = "the picture") -> None:
@@ -125,24 +127,32 @@ def check_size(picture: NDArray[np.uint8], camera: Camera, name: str = "the pict
 def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) -> Sighting | None:
     """The sighting of one object by the markers in view; None if none of them is on it."""
     mounted = {marker.number: marker for marker in thing.markers}
-    own = tuple(marker for marker in seen if marker.number in mounted)
-    if not own:
+    seen_on_object = tuple(marker for marker in seen if marker.number in mounted)
+    if not seen_on_object:
         return None
 
-    usable = [marker for marker in own if marker.side >= MIN_SIDE_PIXELS] or list(own)
-    sharp = [marker for marker in usable if marker.likeness >= MIN_LIKENESS]
-    sigma = ALIGNED_SIGMA if sharp else ROUGH_SIGMA
-    usable = [_straightened(camera, marker, mounted[marker.number].side) for marker in sharp] or usable
+    used_markers = [marker for marker in seen_on_object if marker.side >= MIN_SIDE_PIXELS] or list(seen_on_object)
+    sharp_markers = [marker for marker in used_markers if marker.likeness >= MIN_LIKENESS]
+    sigma = ALIGNED_SIGMA if sharp_markers else ROUGH_SIGMA
+    used_markers = [
+        _straightened(camera, marker, mounted[marker.number].side) for marker in sharp_markers
+    ] or used_markers
 
-    if len(usable) == 1:
-        pose = _of_one(camera, usable[0], mounted[usable[0].number], sigma)
+    if len(used_markers) == 1:
+        pose = _of_one(camera, used_markers[0], mounted[used_markers[0].number], sigma)
     else:
-        points = np.vstack([mounted[m.number].corners for m in usable])
-        spread = None if any(m.spread is None for m in usable) else block_diag(*(m.spread for m in usable))
-        shifts = _side_shifts([mounted[m.number] for m in usable])
-        pose = pose_of_points(camera, np.vstack([m.corners for m in usable]), points, sigma, spread, shifts)
+        points = np.vstack([mounted[marker.number].corners for marker in used_markers])
+        spread = (
+            None
+            if any(marker.spread is None for marker in used_markers)
+            else block_diag(*(marker.spread for marker in used_markers))
+        )
+        shifts = _side_shifts([mounted[marker.number] for marker in used_markers])
+        pose = pose_of_points(
+            camera, np.vstack([marker.corners for marker in used_markers]), points, sigma, spread, shifts
+        )
 
-    return Sighting(thing, pose, own, _refusal(pose, usable))
+    return Sighting(thing, pose, seen_on_object, _refusal(pose, used_markers))
 
 
 def _straightened(camera: Camera, marker: SeenMarker, side: float) -> SeenMarker:
@@ -156,17 +166,24 @@ def _straightened(camera: Camera, marker: SeenMarker, side: float) -> SeenMarker
 
 def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: float) -> CornerPose:
     """The pose of the object from that of its only visible marker."""
-    found = pose_of_square(camera, marker.corners, mounted.side, sigma, marker.spread, mounted.side_sigma)
+    marker_pose = pose_of_square(camera, marker.corners, mounted.side, sigma, marker.spread, mounted.side_sigma)
     T_marker_object = mounted.T_object_marker.inverse()
 
-    first = found.T_camera_object * T_marker_object
-    second = None if found.other is None else found.other * T_marker_object
+    object_pose = marker_pose.T_camera_object * T_marker_object
+    other_object_pose = None if marker_pose.other is None else marker_pose.other * T_marker_object
 
-    arm = first.translation - found.T_camera_object.translation  # a rotation at the marker moves the object's origin
-    lever = np.eye(6)
-    lever[:3, 3:] = -pin.skew(arm)
+    # A rotation at the marker moves the object's origin.
+    origin_from_marker = object_pose.translation - marker_pose.T_camera_object.translation
+    rotation_lever = np.eye(6)
+    rotation_lever[:3, 3:] = -pin.skew(origin_from_marker)
 
-    return CornerPose(first, second, found.error, found.other_error, lever @ found.covariance @ lever.T)
+    return CornerPose(
+        object_pose,
+        other_object_pose,
+        marker_pose.error,
+        marker_pose.other_error,
+        rotation_lever @ marker_pose.covariance @ rotation_lever.T,
+    )
 
 
 def _side_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
@@ -175,8 +192,8 @@ def _side_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
     for k, marker in enumerate(markers):
         if marker.side_sigma > 0.0:
             shift = np.zeros((4 * len(markers), 3))
-            around = marker.corners - marker.T_object_marker.translation
-            shift[4 * k : 4 * k + 4] = around * marker.side_sigma / marker.side
+            from_centre = marker.corners - marker.T_object_marker.translation
+            shift[4 * k : 4 * k + 4] = from_centre * marker.side_sigma / marker.side
             shifts.append(shift)
 
     return shifts

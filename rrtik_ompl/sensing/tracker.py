@@ -59,10 +59,10 @@ class PoseTracker:
     def __init__(self) -> None:
         self._filter = MotionFilter()
         self._time = -np.inf
-        self._branches: list[pin.SE3] = []  # poses of the last sighting, not smoothed
+        self._branches: list[pin.SE3] = []  # poses of the last sighting, one or two, not smoothed
         self._belief: Vector = np.ones(0)  # in each of them
-        self._last: pin.SE3 | None = None  # the one of them that is followed
-        self._strays = 0
+        self._followed_pose: pin.SE3 | None = None  # the one of them that is followed
+        self._outliers_in_row = 0
 
     def update(self, sight: Sighting, time: float) -> Tracked:
         """Update by a sighting at a time [s].
@@ -77,24 +77,29 @@ class PoseTracker:
         pose = sight.pose
 
         branches = [pose.T_camera_object, pose.other] if pose.ambiguous else [pose.T_camera_object]
-        belief = self._believed(branches, np.array([pose.error, pose.other_error])[: len(branches)], pose, seconds)
-        taken, switched = self._taken(branches, belief)
+        belief = self._updated_belief(
+            branches, np.array([pose.error, pose.other_error])[: len(branches)], pose, seconds
+        )
+        chosen, switched = self._chosen_branch(branches, belief)
 
-        settled = not self._sure(self._belief) and self._sure(belief)  # a wrong pose may have been tracked until now
-        outlier = not switched and self._is_outlier(branches[taken], sight, seconds)
-        self._strays = self._strays + 1 if outlier else 0
+        # A wrong pose may have been tracked until now.
+        became_certain = not self._is_certain(self._belief) and self._is_certain(belief)
+        outlier = not switched and self._is_outlier(branches[chosen], sight, seconds)
+        self._outliers_in_row = self._outliers_in_row + 1 if outlier else 0
 
-        if outlier and not settled and self._strays < MAX_OUTLIERS:
-            return Tracked(self._filter.ahead(seconds), pose.covariance, True, taken == 1, self._sure(self._belief))
+        if outlier and not became_certain and self._outliers_in_row < MAX_OUTLIERS:
+            return Tracked(
+                self._filter.ahead(seconds), pose.covariance, True, chosen == 1, self._is_certain(self._belief)
+            )
 
-        begin = outlier or switched or self._last is None
+        restarts = outlier or switched or self._followed_pose is None
         self._time = time
         self._branches = branches
         self._belief = belief
-        self._last = branches[taken]
+        self._followed_pose = branches[chosen]
 
-        smooth = self._smoothed(branches[taken], pose.covariance, None if begin else seconds)
-        return Tracked(*smooth, False, taken == 1, self._sure(belief))
+        smoothed = self._smoothed(branches[chosen], pose.covariance, None if restarts else seconds)
+        return Tracked(*smoothed, False, chosen == 1, self._is_certain(belief))
 
     def _smoothed(self, seen: pin.SE3, covariance: Matrix, seconds: float | None) -> tuple[pin.SE3, Matrix]:
         """A pose and its covariance, ``seconds`` after the one before it that it goes on from."""
@@ -102,44 +107,46 @@ class PoseTracker:
             self._filter.restart(seen, covariance)
             return seen, covariance
 
-        found = self._filter.update(seen, covariance, seconds)
-        moved = np.concatenate([found.translation - seen.translation, pin.log3(found.rotation @ seen.rotation.T)])
-        return found, frozen(covariance + np.outer(moved, moved))
+        filtered = self._filter.update(seen, covariance, seconds)
+        smoothing_shift = np.concatenate(
+            [filtered.translation - seen.translation, pin.log3(filtered.rotation @ seen.rotation.T)]
+        )
+        return filtered, frozen(covariance + np.outer(smoothing_shift, smoothing_shift))
 
-    def _believed(self, branches: list[pin.SE3], errors: Vector, pose: CornerPose, seconds: float) -> Vector:
+    def _updated_belief(self, branches: list[pin.SE3], errors: Vector, pose: CornerPose, seconds: float) -> Vector:
         """Belief that each pose of a new sighting is the true one; sums to 1."""
         prior = np.ones(len(branches))
         if self._branches:
             reach = np.hypot(2.0 * pose.rotation_sigma, BRANCH_TURN_RATE * seconds)
-            apart = np.array([[turn_between(before, now) for now in branches] for before in self._branches])
-            passed = 1.0 / (1.0 + (apart / reach) ** 2)  # a much larger change is rare, not impossible
-            before = self._belief**BELIEF_MEMORY
-            prior = before / before.sum() @ (passed / passed.sum(axis=1, keepdims=True))
+            turns = np.array([[turn_between(last, new) for new in branches] for last in self._branches])
+            transition = 1.0 / (1.0 + (turns / reach) ** 2)  # a much larger change is rare, not impossible
+            remembered = self._belief**BELIEF_MEMORY
+            prior = remembered / remembered.sum() @ (transition / transition.sum(axis=1, keepdims=True))
 
         squares = errors**2 + ALIGNED_SIGMA**2
         belief = prior / np.minimum(squares / squares.min(), MAX_ODDS)
         return np.asarray(belief / belief.sum())
 
-    def _taken(self, branches: list[pin.SE3], belief: Vector) -> tuple[int, bool]:
+    def _chosen_branch(self, branches: list[pin.SE3], belief: Vector) -> tuple[int, bool]:
         """Which pose is followed, and whether it does not go on from the one that was followed until now."""
         best = int(belief.argmax())
-        if self._last is None:
+        if self._followed_pose is None:
             return best, False
 
-        next_one = int(np.argmin([turn_between(self._last, each) for each in branches]))
-        switched = best != next_one and belief[best] > SWITCH_BELIEF
-        return (best if switched else next_one), switched
+        nearest = int(np.argmin([turn_between(self._followed_pose, branch) for branch in branches]))
+        switched = best != nearest and belief[best] > SWITCH_BELIEF
+        return (best if switched else nearest), switched
 
     @staticmethod
-    def _sure(belief: Vector) -> bool:
+    def _is_certain(belief: Vector) -> bool:
         return len(belief) > 0 and bool(belief.max() >= CERTAIN_BELIEF)
 
     def _is_outlier(self, pose: pin.SE3, sight: Sighting, seconds: float) -> bool:
-        if self._last is None:
+        if self._followed_pose is None:
             return False
 
-        shift = float(np.linalg.norm(pose.translation - self._last.translation))
-        turn = turn_between(self._last, pose)
+        shift = float(np.linalg.norm(pose.translation - self._followed_pose.translation))
+        turn = turn_between(self._followed_pose, pose)
         return (
             shift > OUTLIER_LIMIT * sight.pose.position_sigma + MAX_SPEED * seconds
             or turn > OUTLIER_LIMIT * sight.pose.rotation_sigma + MAX_TURN_RATE * seconds

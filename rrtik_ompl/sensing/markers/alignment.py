@@ -32,7 +32,7 @@ _SPOTS = _DEFAULT_SPOT * 1.5 ** np.arange(-2, 5)  # that are tried
 _NEAR_SPOTS = 1.5 ** np.arange(-1.0, 2.0)  # that are tried where one is known, as factors of that
 _SPOT_TOLERANCE = 0.1  # relative difference below which no second alignment is made
 _TONE_TOLERANCE = 0.05
-_AS_LIKE = 1.2  # times as much unlike as the last estimate of blur and tone left: it holds still
+_UNLIKENESS_RATIO = 1.2  # times as much unlike as the last estimate of blur and tone left: it holds still
 _ROUNDS = 3  # of alignment, each with what was learned of the picture in the one before
 _LINEAR_BELOW = 0.35  # a smaller tone is taken for that of a linear camera, which coarse sampling makes look larger
 _FEW = 48  # samples along a side are enough where the way that light is shown is searched for
@@ -89,18 +89,18 @@ def aligned_corners(
         Below `MIN_LIKENESS` the corners are returned unchanged.
     """
     framed = np.pad(cells, 1, constant_values=255)
-    low, square, fit = _laid_over(gray, corners, framed, _CELL_PIXELS, tone, before)
+    low, square, fit = _lay_over(gray, corners, framed, _CELL_PIXELS, tone, before)
     if fit is None:
         return Aligned(corners, 0.0, None, None)
 
     moved = cv2.perspectiveTransform(square[:, None], fit.homography.astype(np.float64))[:, 0]
-    better = np.asarray(moved, dtype=np.float64)
-    if np.abs(better + low - corners).max() > max(2.0, _MAX_CORNER_SHIFT * mean_side(corners)):
+    moved_corners = np.asarray(moved, dtype=np.float64)
+    if np.abs(moved_corners + low - corners).max() > max(2.0, _MAX_CORNER_SHIFT * mean_side(corners)):
         return Aligned(corners, 0.0, None, None)
     if fit.likeness < MIN_LIKENESS:
         return Aligned(corners, fit.likeness, None, None)
 
-    corners, spread = corner_spread(fit.model, fit.seen, square, better)
+    corners, spread = corner_spread(fit.model, fit.seen, square, moved_corners)
     return Aligned(corners + low, fit.likeness, spread, fit.look)
 
 
@@ -112,7 +112,7 @@ def look_of(gray: NDArray[np.uint8], corners: Matrix, framed: NDArray[np.uint8])
         corners: Of the pattern without what is around it, to a pixel. Shape (4, 2).
         framed: The pattern, with one cell more on each side: what is around it. Shape (n + 2, n + 2).
     """
-    fit = _laid_over(gray, corners, framed, _SQUARE_PIXELS)[2]
+    fit = _lay_over(gray, corners, framed, _SQUARE_PIXELS)[2]
     return None if fit is None or fit.likeness < MIN_LIKENESS else fit.look
 
 
@@ -131,13 +131,13 @@ class _Fit(NamedTuple):
     look: Look
 
 
-def _laid_over(
+def _lay_over(
     gray: NDArray[np.uint8],
     corners: Matrix,
     framed: NDArray[np.uint8],
     sizes: tuple[int, int],
     tone: float | None = None,
-    before: Look | None = None,
+    last_look: Look | None = None,
 ) -> tuple[Matrix, Matrix, _Fit | None]:
     """A pattern with a frame of one cell, laid over a picture.
 
@@ -151,18 +151,18 @@ def _laid_over(
     rim = round(_RIM_CELLS * cell)
     square = np.array([[0, 0], [count, 0], [count, count], [0, count]], dtype=np.float64) * cell + rim - 0.5
 
-    low, piece = _neighbourhood(gray, corners, margin=int(0.35 * side) + 4)
-    guess = cv2.getPerspectiveTransform(square.astype(np.float32), (corners - low).astype(np.float32))
+    origin, piece = _neighbourhood(gray, corners, margin=int(0.35 * side) + 4)
+    homography = cv2.getPerspectiveTransform(square.astype(np.float32), (corners - origin).astype(np.float32))
 
     ideal = _ideal(framed, cell, rim)
     try:
-        fit = _aligned(ideal, piece, guess.astype(np.float32), tone, before)
-        if before is not None and fit.likeness < MIN_LIKENESS:  # the picture before it misled
-            fit = _aligned(ideal, piece, guess.astype(np.float32), tone, None)
+        fit = _align_with_look(ideal, piece, homography.astype(np.float32), tone, last_look)
+        if last_look is not None and fit.likeness < MIN_LIKENESS:  # the picture before it misled
+            fit = _align_with_look(ideal, piece, homography.astype(np.float32), tone, None)
     except cv2.error:  # the alignment did not converge
-        return low, square, None
+        return origin, square, None
 
-    return low, square, fit
+    return origin, square, fit
 
 
 def _neighbourhood(gray: NDArray[np.uint8], corners: Matrix, margin: int) -> tuple[Matrix, Pixels]:
@@ -177,27 +177,29 @@ def _ideal(framed: NDArray[np.uint8], cell: int, rim: int) -> Pixels:
     return large[cut, cut].astype(np.float32)
 
 
-def _aligned(ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | None, before: Look | None) -> _Fit:
+def _align_with_look(
+    ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | None, last_look: Look | None
+) -> _Fit:
     """The homography from the ideal marker to a picture, whose blur, tone and light are estimated too."""
     tones = TONES if tone is None else (tone,)
-    starts = [Look(_DEFAULT_SPOT, each) for each in ((LINEAR, SRGB) if tone is None else tones)]
-    if before is not None:
-        starts = [before if tone is None else before._replace(tone=tone)]
+    starts = [Look(_DEFAULT_SPOT, start_tone) for start_tone in ((LINEAR, SRGB) if tone is None else tones)]
+    if last_look is not None:
+        starts = [last_look if tone is None else last_look._replace(tone=tone)]
     best = max((_fit(ideal, piece, homography, start) for start in starts), key=lambda fit: fit.likeness)
 
-    known = before is not None
-    if before is not None and 1.0 - best.likeness <= _AS_LIKE * (1.0 - before.likeness):
+    look_is_known = last_look is not None
+    if last_look is not None and 1.0 - best.likeness <= _UNLIKENESS_RATIO * (1.0 - last_look.likeness):
         return best
 
-    for number in range(_ROUNDS):
-        spots: Vector = np.asarray(best.look.spot * _NEAR_SPOTS if known else _SPOTS, dtype=np.float64)
+    for round_number in range(_ROUNDS):
+        spots: Vector = np.asarray(best.look.spot * _NEAR_SPOTS if look_is_known else _SPOTS, dtype=np.float64)
         look = _spot_and_tone(ideal, best.seen, _spread(best.homography, ideal.shape), best.look, tones, spots)
         if tone is None and abs(look.tone) < _LINEAR_BELOW:
             look = look._replace(tone=LINEAR)
-        if (before is not None or number > 1) and _as_before(look, best.look):
+        if (last_look is not None or round_number > 1) and _like_last_look(look, best.look):
             break
         best = _fit(ideal, piece, best.homography, look)
-        known = True
+        look_is_known = True
 
     return best._replace(look=best.look._replace(likeness=best.likeness))
 
@@ -206,14 +208,14 @@ def _fit(ideal: Pixels, piece: Pixels, homography: Pixels, look: Look) -> _Fit:
     """The homography for a blur and a tone."""
     blurred = _blurred(ideal, look.spot**2 * _spread(homography, ideal.shape))
     model = shown(blurred, _warped(piece, homography, ideal.shape), look.tone)
-    likeness, better = _fitted(model, piece, homography)
-    return _Fit(likeness, better, model, _warped(piece, better, ideal.shape), look)
+    likeness, refined = _find_homography(model, piece, homography)
+    return _Fit(likeness, refined, model, _warped(piece, refined, ideal.shape), look)
 
 
-def _fitted(model: Pixels, piece: Pixels, homography: Pixels) -> tuple[float, Pixels]:
+def _find_homography(model: Pixels, piece: Pixels, homography: Pixels) -> tuple[float, Pixels]:
     align: Any = cv2.findTransformECC  # its type requires a mask where None is allowed
-    likeness, better = align(model, piece, homography, cv2.MOTION_HOMOGRAPHY, _STOP, None, 1)
-    return float(likeness), better
+    likeness, refined = align(model, piece, homography, cv2.MOTION_HOMOGRAPHY, _STOP, None, 1)
+    return float(likeness), refined
 
 
 def _warped(piece: Pixels, homography: Pixels, shape: tuple[int, ...]) -> Pixels:
@@ -234,33 +236,33 @@ def _spot_and_tone(
         tones: That are tried.
         spots: That are tried, each larger than the one before by the same factor.
     """
-    every = max(len(seen) // _FEW, 1)
-    few = np.ascontiguousarray(seen[::every, ::every])
+    step = max(len(seen) // _FEW, 1)
+    samples = np.ascontiguousarray(seen[::step, ::step])
 
     def blurred(spot: float) -> Pixels:
-        return _blurred(ideal, spot**2 * spread)[::every, ::every]
+        return _blurred(ideal, spot**2 * spread)[::step, ::step]
 
-    place = _peak(likenesses([blurred(each) for each in spots], few, [look.tone]))
-    spot = float(spots[0] * (spots[1] / spots[0]) ** place)
+    peak = _peak(likenesses([blurred(each) for each in spots], samples, [look.tone]))
+    spot = float(spots[0] * (spots[1] / spots[0]) ** peak)
 
     if len(tones) == 1:
         return Look(spot, tones[0])
 
-    place = _peak(likenesses([blurred(spot)], few, list(tones)))
-    return Look(spot, float(np.clip(tones[0] + (tones[1] - tones[0]) * place, tones[0], tones[-1])))
+    peak = _peak(likenesses([blurred(spot)], samples, list(tones)))
+    return Look(spot, float(np.clip(tones[0] + (tones[1] - tones[0]) * peak, tones[0], tones[-1])))
 
 
 def _peak(values: Vector) -> float:
     """Where between the places of some values the parabola through the largest and its neighbours is largest."""
     best = int(np.clip(np.argmax(values), 1, len(values) - 2))
     low, middle, high = values[best - 1 : best + 2]
-    bend = low - 2.0 * middle + high
-    return best + (float(np.clip(0.5 * (low - high) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0)
+    curvature = low - 2.0 * middle + high
+    return best + (float(np.clip(0.5 * (low - high) / curvature, -1.0, 1.0)) if curvature < 0.0 else 0.0)
 
 
-def _as_before(look: Look, other: Look) -> bool:
-    near = abs(look.spot - other.spot) < _SPOT_TOLERANCE * other.spot
-    return near and abs(look.tone - other.tone) < _TONE_TOLERANCE
+def _like_last_look(look: Look, last_look: Look) -> bool:
+    similar_spot = abs(look.spot - last_look.spot) < _SPOT_TOLERANCE * last_look.spot
+    return similar_spot and abs(look.tone - last_look.tone) < _TONE_TOLERANCE
 
 
 def _spread(homography: Pixels, shape: tuple[int, ...]) -> Matrix:
@@ -270,8 +272,8 @@ def _spread(homography: Pixels, shape: tuple[int, ...]) -> Matrix:
     bottom = homography[2] @ middle
     slope = (homography[:2, :2] - np.outer([x, y], homography[2, :2]) / bottom) / bottom
 
-    back = np.linalg.inv(slope)
-    return np.asarray(back @ back.T, dtype=np.float64)
+    inverse_slope = np.linalg.inv(slope)
+    return np.asarray(inverse_slope @ inverse_slope.T, dtype=np.float64)
 
 
 def _blurred(picture: Pixels, spread: Matrix) -> Pixels:

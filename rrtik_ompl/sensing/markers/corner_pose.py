@@ -103,21 +103,27 @@ def pose_of_square(
     # Exactly in front of the camera the closed form fails: not a number, or a marker that faces away.
     guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE_SQUARE) or _guesses(camera, points, pixels)
 
-    refined = [_refined(camera, points, pixels, guess) for guess in guesses]
+    refined = [_levenberg(camera, points, pixels, guess) for guess in guesses]
     errors = [_error(camera, points, pixels, pose) for pose in refined]
-    best = int(np.argmin(errors))
-    first = refined[best]
-    error = errors[best]
+    best_index = int(np.argmin(errors))
+    best_pose = refined[best_index]
+    error = errors[best_index]
 
     other = None
     other_error = np.inf
     if len(guesses) > 1:
-        merged = turn_between(first, refined[1 - best]) < MIN_BRANCH_ANGLE
-        other = max(guesses, key=lambda guess: turn_between(first, guess)) if merged else refined[1 - best]
+        is_one_minimum = turn_between(best_pose, refined[1 - best_index]) < MIN_BRANCH_ANGLE
+        other = (
+            max(guesses, key=lambda guess: turn_between(best_pose, guess))
+            if is_one_minimum
+            else refined[1 - best_index]
+        )
         other_error = _error(camera, points, pixels, other)
 
-    known = _of_pixels(len(points), sigma, spread), _of_points(camera, points, first, shifts)
-    return CornerPose(first, other, error, other_error, *_covariance(camera, points, pixels, first, known))
+    covariances = _pixel_covariance(len(points), sigma, spread), _point_covariance(camera, points, best_pose, shifts)
+    return CornerPose(
+        best_pose, other, error, other_error, *_covariance(camera, points, pixels, best_pose, covariances)
+    )
 
 
 def pose_of_points(
@@ -133,20 +139,24 @@ def pose_of_points(
     ``sigma`` or ``spread``, shape (2 m, 2 m), as in `pose_of_square`; ``shifts``: by how much the points may be
     elsewhere on the object, one standard deviation of each independent reason, shape (m, 3) [m].
     """
-    best = _refined(camera, points, pixels, _guesses(camera, points, pixels)[0])
+    best = _levenberg(camera, points, pixels, _guesses(camera, points, pixels)[0])
     error = _error(camera, points, pixels, best)
-    known = _of_pixels(len(points), sigma, spread), _of_points(camera, points, best, shifts)
-    covariance, surprise = _covariance(camera, points, pixels, best, known)
-    return CornerPose(best, None, error, np.inf, covariance, surprise, _strain(camera, points, pixels, best, known))
+    covariances = _pixel_covariance(len(points), sigma, spread), _point_covariance(camera, points, best, shifts)
+    covariance, surprise = _covariance(camera, points, pixels, best, covariances)
+    return CornerPose(
+        best, None, error, np.inf, covariance, surprise, _strain(camera, points, pixels, best, covariances)
+    )
 
 
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
     """Poses in closed form that explain the pixels, best first."""
-    rows = np.ascontiguousarray(points)
-    seen = np.ascontiguousarray(pixels)
-    _, turns, shifts, _ = cv2.solvePnPGeneric(rows, seen, camera.matrix, camera.distortion, flags=method)
-    found = [pin.SE3(cv2.Rodrigues(r)[0], t.ravel()) for r, t in zip(turns, shifts, strict=True)]
-    return [T for T in found if _plausible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
+    object_points = np.ascontiguousarray(points)
+    image_points = np.ascontiguousarray(pixels)
+    _, turns, shifts, _ = cv2.solvePnPGeneric(
+        object_points, image_points, camera.matrix, camera.distortion, flags=method
+    )
+    poses = [pin.SE3(cv2.Rodrigues(r)[0], t.ravel()) for r, t in zip(turns, shifts, strict=True)]
+    return [T for T in poses if _plausible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
 
 
 def _plausible(pose: pin.SE3, facing: bool) -> bool:
@@ -156,24 +166,24 @@ def _plausible(pose: pin.SE3, facing: bool) -> bool:
     return not facing or float(pose.rotation[:, 2] @ pose.translation) < 0.0
 
 
-def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> pin.SE3:
+def _levenberg(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> pin.SE3:
     """The nearby pose of least error: Levenberg's steps about the axes of the camera, kept where they help."""
     damping = 1e-6
     error = _error(camera, points, pixels, pose)
 
     for _ in range(_MAX_STEPS):
-        turned = points @ pose.rotation.T
-        slopes = camera.jacobian(turned, pose.translation)
-        away = (pixels - camera.project(turned + pose.translation)).ravel()
-        normal = slopes.T @ slopes
-        step = np.linalg.solve(normal + damping * np.diag(normal.diagonal()), slopes.T @ away)
-        tried = pin.SE3(pin.exp3(step[3:]) @ pose.rotation, pose.translation + step[:3])
+        in_camera_axes = points @ pose.rotation.T
+        jacobian = camera.jacobian(in_camera_axes, pose.translation)
+        residuals = (pixels - camera.project(in_camera_axes + pose.translation)).ravel()
+        normal = jacobian.T @ jacobian
+        step = np.linalg.solve(normal + damping * np.diag(normal.diagonal()), jacobian.T @ residuals)
+        candidate = pin.SE3(pin.exp3(step[3:]) @ pose.rotation, pose.translation + step[:3])
 
-        better = _error(camera, points, pixels, tried)
-        gain = error - better
+        candidate_error = _error(camera, points, pixels, candidate)
+        gain = error - candidate_error
         if gain > 0.0:
-            pose = tried
-            error = better
+            pose = candidate
+            error = candidate_error
             damping = 0.1 * damping
         else:
             damping *= 100.0
@@ -185,60 +195,69 @@ def _refined(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> p
 
 
 def _error(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> float:
-    away = camera.project(points @ pose.rotation.T + pose.translation) - pixels
-    return float(np.sqrt((away**2).sum(axis=1).mean()))
+    residuals = camera.project(points @ pose.rotation.T + pose.translation) - pixels
+    return float(np.sqrt((residuals**2).sum(axis=1).mean()))
 
 
-def _of_pixels(count: int, sigma: float, spread: Matrix | None) -> Matrix:
+def _pixel_covariance(count: int, sigma: float, spread: Matrix | None) -> Matrix:
     """Covariance of the pixels as they were found. Shape (2 m, 2 m)."""
     return sigma**2 * np.eye(2 * count) if spread is None else spread
 
 
-def _of_points(camera: Camera, points: Matrix, pose: pin.SE3, shifts: Sequence[Matrix]) -> Matrix:
+def _point_covariance(camera: Camera, points: Matrix, pose: pin.SE3, shifts: Sequence[Matrix]) -> Matrix:
     """Covariance of the pixels of what is not known of lens and object. Shape (2 m, 2 m)."""
-    turned = points @ pose.rotation.T
-    found = camera.doubt(turned + pose.translation)
-    slopes = camera.jacobian(turned, pose.translation)[:, :3].reshape(-1, 2, 3)
+    in_camera_axes = points @ pose.rotation.T
+    covariance = camera.doubt(in_camera_axes + pose.translation)
+    jacobian = camera.jacobian(in_camera_axes, pose.translation)[:, :3].reshape(-1, 2, 3)
 
     for shift in shifts:
-        moved = np.einsum("kij,kj->ki", slopes, shift @ pose.rotation.T).ravel()
-        found = found + np.outer(moved, moved)
+        pixel_shift = np.einsum("kij,kj->ki", jacobian, shift @ pose.rotation.T).ravel()
+        covariance = covariance + np.outer(pixel_shift, pixel_shift)
 
-    return found
+    return covariance
 
 
 def _covariance(
-    camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, known: tuple[Matrix, Matrix]
+    camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, covariances: tuple[Matrix, Matrix]
 ) -> tuple[Matrix, float]:
     """Of (position, rotation), larger where the points deviate from their pixels by more than they should; how much."""
-    turned = points @ pose.rotation.T
-    found, doubted = known
-    slopes = camera.jacobian(turned, pose.translation)
-    back = np.linalg.pinv(slopes)
-    away = (camera.project(turned + pose.translation) - pixels).ravel()
+    in_camera_axes = points @ pose.rotation.T
+    of_pixels, of_points = covariances
+    jacobian = camera.jacobian(in_camera_axes, pose.translation)
+    pseudo_inverse = np.linalg.pinv(jacobian)
+    residuals = (camera.project(in_camera_axes + pose.translation) - pixels).ravel()
 
-    weighed = np.linalg.solve(found + doubted, np.c_[away, slopes])
-    lever = slopes.T @ weighed  # of a pose near this one that explains the pixels best by what is known of them
-    squares = float(away @ weighed[:, 0] - lever[:, 0] @ np.linalg.solve(lever[:, 1:], lever[:, 0]))
+    weighted = np.linalg.solve(of_pixels + of_points, np.c_[residuals, jacobian])
+    normal_rows = (
+        jacobian.T @ weighted
+    )  # of a pose near this one that explains the pixels best by what is known of them
+    squares = float(
+        residuals @ weighted[:, 0] - normal_rows[:, 0] @ np.linalg.solve(normal_rows[:, 1:], normal_rows[:, 0])
+    )
 
-    covariance = max(squares / MAX_SURPRISE, 1.0) * (back @ found @ back.T) + back @ doubted @ back.T
+    covariance = (
+        max(squares / MAX_SURPRISE, 1.0) * (pseudo_inverse @ of_pixels @ pseudo_inverse.T)
+        + pseudo_inverse @ of_points @ pseudo_inverse.T
+    )
     return frozen(covariance), max(squares, 0.0) / (2 * len(points) - 6)
 
 
-def _strain(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, known: tuple[Matrix, Matrix]) -> float:
+def _strain(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, covariances: tuple[Matrix, Matrix]) -> float:
     """Squared deviations that another focal length or another k1 would explain: their score tests [69]."""
-    turned = points @ pose.rotation.T
-    seen = turned + pose.translation
-    away = (camera.project(seen) - pixels).ravel()
-    slopes = camera.jacobian(turned, pose.translation)
+    in_camera_axes = points @ pose.rotation.T
+    in_camera = in_camera_axes + pose.translation
+    residuals = (camera.project(in_camera) - pixels).ravel()
+    jacobian = camera.jacobian(in_camera_axes, pose.translation)
 
-    own = camera.own_slopes(seen)
-    lens = np.c_[own[:, :2] @ camera.matrix[[0, 1], [0, 1]], own[:, 4]]
+    intrinsic_slopes = camera.own_slopes(in_camera)
+    lens_slopes = np.c_[intrinsic_slopes[:, :2] @ camera.matrix[[0, 1], [0, 1]], intrinsic_slopes[:, 4]]
 
-    weighed = np.linalg.solve(known[0] + known[1], np.c_[away, slopes, lens])
-    lever = slopes.T @ weighed
-    freed = weighed - weighed[:, 1:7] @ np.linalg.solve(lever[:, 1:7], lever)  # of what another pose explains
+    weighted = np.linalg.solve(covariances[0] + covariances[1], np.c_[residuals, jacobian, lens_slopes])
+    normal_rows = jacobian.T @ weighted
+    without_pose = weighted - weighted[:, 1:7] @ np.linalg.solve(
+        normal_rows[:, 1:7], normal_rows
+    )  # of what another pose explains
 
-    score = lens.T @ freed[:, 0]
-    told = np.einsum("ij,ij->j", lens, freed[:, 7:])
-    return float((score**2 / np.maximum(told, 1e-9)).max())
+    score = lens_slopes.T @ without_pose[:, 0]
+    information = np.einsum("ij,ij->j", lens_slopes, without_pose[:, 7:])
+    return float((score**2 / np.maximum(information, 1e-9)).max())

@@ -39,45 +39,49 @@ def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) 
         square: Corners of the marker in the model, shape (4, 2).
         corners: In the picture, shape (4, 2).
     """
-    every = max(len(model) // _FEW, 1)
-    columns = _columns(model, square, corners, every)
-    light = seen[::every, ::every].ravel().astype(np.float64)
+    step = max(len(model) // _FEW, 1)
+    columns = _columns(model, square, corners, step)
+    values = seen[::step, ::step].ravel().astype(np.float64)
     shape = columns.shape[:2]
-    columns = columns.reshape(len(light), -1)
-    repeated = max(_area(square) / _area(corners) / every**2, 1.0)  # samples of one pixel err alike
+    columns = columns.reshape(len(values), -1)
+    samples_per_pixel = max(_area(square) / _area(corners) / step**2, 1.0)  # samples of one pixel err alike
 
     normal = columns.T @ columns
-    right = columns.T @ light
+    right_side = columns.T @ values
     normal += np.diag(_TINY * normal.diagonal() + _TINY)
-    whole = np.linalg.inv(normal)
+    inverse = np.linalg.inv(normal)
 
-    found = whole @ right
-    rest = light - columns @ found
-    variance = repeated * float(rest @ rest) / max(len(light) - len(normal), 1)
+    solution = inverse @ right_side
+    residuals = values - columns @ solution
+    variance = samples_per_pixel * float(residuals @ residuals) / max(len(values) - len(normal), 1)
 
-    left_out = _left_out(shape, columns, rest, normal)
-    bent = float(found[_BENDS] @ found[_BENDS]) * _area(corners) / _area(square)  # by as much corners may lie off
-    cut = CUT_SHIFT * float((light >= CUT_OFF).mean())  # blocks err alike there, which the jackknife does not see
-    spread = left_out + variance * whole[:8, :8] + (bent + FLOOR**2) * np.eye(8) + cut**2 * _ALIKE
+    jackknife = _jackknife_covariance(shape, columns, residuals, normal)
+    bend_variance = (
+        float(solution[_BENDS] @ solution[_BENDS]) * _area(corners) / _area(square)
+    )  # by as much corners may lie off
+    cut_off_shift = CUT_SHIFT * float(
+        (values >= CUT_OFF).mean()
+    )  # blocks err alike there, which the jackknife does not see
+    spread = jackknife + variance * inverse[:8, :8] + (bend_variance + FLOOR**2) * np.eye(8) + cut_off_shift**2 * _ALIKE
 
-    return corners + found[:8].reshape(4, 2), frozen(spread)
+    return corners + solution[:8].reshape(4, 2), frozen(spread)
 
 
-def _columns(model: Pixels, square: Matrix, corners: Matrix, every: int) -> Matrix:
+def _columns(model: Pixels, square: Matrix, corners: Matrix, step: int) -> Matrix:
     """How the picture of the marker changes with what is fitted, eight numbers of corners first. Shape (h, w, k).
 
-    Of one sample among ``every`` along each side.
+    Of one sample among ``step`` along each side.
     """
     across = _slope(model, 1, 0)
     down = _slope(model, 0, 1)
     blurs = [_slope(across, 1, 0), _slope(across, 0, 1), _slope(down, 0, 1)]
 
-    across = across[::every, ::every]
-    down = down[::every, ::every]
-    model = model[::every, ::every]
-    blurs = [each[::every, ::every] for each in blurs]
+    across = across[::step, ::step]
+    down = down[::step, ::step]
+    model = model[::step, ::step]
+    blurs = [blur[::step, ::step] for blur in blurs]
 
-    x, y = _places(*model.shape, every)
+    x, y = _sample_places(*model.shape, step)
     low = square[0]
     high = square[2]
     u = (2.0 * x - low[0] - high[0]) / (high[0] - low[0])
@@ -85,8 +89,8 @@ def _columns(model: Pixels, square: Matrix, corners: Matrix, every: int) -> Matr
 
     # Motions of second order that no homography has: those of homographies are (u u, u v) and (u v, v v).
     bends = [across * v * v, down * u * u, across * u * u - down * u * v, across * u * v - down * v * v]
-    more = [np.ones(model.shape), model, np.hypot(across, down), *blurs, *bends]
-    return np.dstack([_slopes(across, down, (x, y), square, corners), *more])
+    light_and_bends = [np.ones(model.shape), model, np.hypot(across, down), *blurs, *bends]
+    return np.dstack([_slopes(across, down, (x, y), square, corners), *light_and_bends])
 
 
 def _slope(picture: NDArray[np.floating[Any]], across: int, down: int) -> Matrix:
@@ -94,24 +98,26 @@ def _slope(picture: NDArray[np.floating[Any]], across: int, down: int) -> Matrix
 
 
 @lru_cache(maxsize=64)
-def _places(height: int, width: int, every: int) -> tuple[Matrix, Matrix]:
+def _sample_places(height: int, width: int, step: int) -> tuple[Matrix, Matrix]:
     """Where the samples are, across and down. Each of shape (height, width)."""
-    y, x = np.mgrid[0.0:height, 0.0:width] * every
+    y, x = np.mgrid[0.0:height, 0.0:width] * step
     return x, y
 
 
 def _slopes(across: Matrix, down: Matrix, places: tuple[Matrix, Matrix], square: Matrix, corners: Matrix) -> Matrix:
     """How the model's grey values change with each number of the corners [1 / pixel]. Shape (h, w, 8)."""
-    x, y = (each.ravel() for each in places)
-    moved = corners.reshape(8) + _STEP * np.eye(8)
+    x, y = (coordinate.ravel() for coordinate in places)
+    moved_corners = corners.reshape(8) + _STEP * np.eye(8)
 
-    back = _perspectives(corners[None], square[None])[0]
-    turned = back @ _perspectives(np.broadcast_to(square, (8, 4, 2)), moved.reshape(8, 4, 2))
-    at = turned[..., 0, None] * x + (turned[..., 1, None] * y + turned[..., 2, None])
-    shift = (at[:, :2] / at[:, 2:] - [x, y]) * (-1.0 / _STEP)
+    to_square = _perspectives(corners[None], square[None])[0]
+    to_square_moved = to_square @ _perspectives(np.broadcast_to(square, (8, 4, 2)), moved_corners.reshape(8, 4, 2))
+    homogeneous = to_square_moved[..., 0, None] * x + (
+        to_square_moved[..., 1, None] * y + to_square_moved[..., 2, None]
+    )
+    shift = (homogeneous[:, :2] / homogeneous[:, 2:] - [x, y]) * (-1.0 / _STEP)
 
-    found = across.ravel() * shift[:, 0] + down.ravel() * shift[:, 1]
-    return np.asarray(found.T.reshape(*across.shape, 8), dtype=np.float64)
+    slopes = across.ravel() * shift[:, 0] + down.ravel() * shift[:, 1]
+    return np.asarray(slopes.T.reshape(*across.shape, 8), dtype=np.float64)
 
 
 def _perspectives(before: Matrix, after: Matrix) -> Matrix:
@@ -119,16 +125,16 @@ def _perspectives(before: Matrix, after: Matrix) -> Matrix:
     count = len(before)
     x, y = np.moveaxis(before, 2, 0)
     u, v = np.moveaxis(after, 2, 0)
-    one = np.ones((count, 4))
-    none = np.zeros((count, 4))
+    ones = np.ones((count, 4))
+    zeros = np.zeros((count, 4))
     # Two equations a point, for the eight numbers beside the last one, which is 1.
     rows = np.concatenate([
-        np.stack([x, y, one, none, none, none, -u * x, -u * y], axis=2),
-        np.stack([none, none, none, x, y, one, -v * x, -v * y], axis=2),
+        np.stack([x, y, ones, zeros, zeros, zeros, -u * x, -u * y], axis=2),
+        np.stack([zeros, zeros, zeros, x, y, ones, -v * x, -v * y], axis=2),
     ], axis=1)  # fmt: skip
 
-    found = np.linalg.solve(rows, np.concatenate([u, v], axis=1)[..., None])[..., 0]
-    return np.append(found, np.ones((count, 1)), axis=1).reshape(count, 3, 3)
+    coefficients = np.linalg.solve(rows, np.concatenate([u, v], axis=1)[..., None])[..., 0]
+    return np.append(coefficients, np.ones((count, 1)), axis=1).reshape(count, 3, 3)
 
 
 def _area(corners: Matrix) -> float:
@@ -137,14 +143,14 @@ def _area(corners: Matrix) -> float:
     return 0.5 * abs(float(a * d - b * c))
 
 
-def _left_out(shape: tuple[int, ...], slopes: Matrix, rest: Vector, normal: Matrix) -> Matrix:
+def _jackknife_covariance(shape: tuple[int, ...], slopes: Matrix, residuals: Vector, normal: Matrix) -> Matrix:
     """Covariance of the corners by how they move when one block after the other is left out. Shape (8, 8)."""
     order, ends = _blocks(*shape[:2])
-    both = np.column_stack([slopes, rest])[order]
-    own = np.stack([part.T @ part for part in np.split(both, ends)])
-    away = np.linalg.solve(normal - own[:, :-1, :-1], own[:, :-1, -1:])[:, :8, 0]
-    count = len(away)
-    return np.asarray((count - 1) / count * away.T @ away)
+    slopes_and_residuals = np.column_stack([slopes, residuals])[order]
+    block_normals = np.stack([part.T @ part for part in np.split(slopes_and_residuals, ends)])
+    corner_shifts = np.linalg.solve(normal - block_normals[:, :-1, :-1], block_normals[:, :-1, -1:])[:, :8, 0]
+    count = len(corner_shifts)
+    return np.asarray((count - 1) / count * corner_shifts.T @ corner_shifts)
 
 
 @lru_cache(maxsize=64)

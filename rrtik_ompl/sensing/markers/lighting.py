@@ -26,7 +26,7 @@ def shown(ideal: Pixels, seen: Pixels, tone: float) -> Pixels:
         seen: The picture in its frame, of the same shape.
         tone: Of the picture.
     """
-    return np.asarray(_shown([ideal], seen, [tone])[0].reshape(ideal.shape), dtype=np.float32)
+    return np.asarray(_shown_rows([ideal], seen, [tone])[0].reshape(ideal.shape), dtype=np.float32)
 
 
 def likenesses(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Vector:
@@ -37,50 +37,54 @@ def likenesses(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Vector
         seen: The picture, as for `shown`.
         tones: k of them, or one for all ideals.
     """
-    models = _shown(ideals, seen, tones)
+    models = _shown_rows(ideals, seen, tones)
     models -= models.mean(axis=1, keepdims=True)
-    middle = seen.ravel() - seen.mean()
-    found = models @ middle / np.sqrt(np.einsum("ij,ij->i", models, models) * (middle @ middle) + 1e-9)
-    return np.asarray(found, dtype=np.float64)
+    centred = seen.ravel() - seen.mean()
+    correlations = models @ centred / np.sqrt(np.einsum("ij,ij->i", models, models) * (centred @ centred) + 1e-9)
+    return np.asarray(correlations, dtype=np.float64)
 
 
-def _shown(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Pixels:
+def _shown_rows(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Pixels:
     """Of each ideal and its tone, as a row: all by one product of matrices, for markers are small. Shape (k, n)."""
-    even, pairs = _even(*seen.shape)
+    basis, basis_products = _even_light(*seen.shape)
     grey = seen.ravel()
-    whole = (grey < CUT_OFF).astype(np.float32)
-    shares = np.stack([ideal.ravel() for ideal in ideals]) / np.float32(255.0)
-    places = np.clip(np.rint(grey), 0, 255).astype(np.intp)
-    lights = np.stack([light_of(tone)[places] for tone in tones])
+    not_cut_off = (grey < CUT_OFF).astype(np.float32)
+    whiteness = np.stack([ideal.ravel() for ideal in ideals]) / np.float32(255.0)
+    grey_indices = np.clip(np.rint(grey), 0, 255).astype(np.intp)
+    lights = np.stack([light_of(tone)[grey_indices] for tone in tones])
 
     # Normal equations of three numbers for black and three for white, of what is not cut off.
-    known = (pairs * whole).T
-    squares = [np.ones((1, len(grey)), dtype=np.float32) @ known, shares @ known, (shares * shares) @ known]
-    normal = np.empty((len(shares), 6, 6))
-    for (row, column), product in zip(((0, 0), (0, 3), (3, 3)), squares, strict=True):
+    known_products = (basis_products * not_cut_off).T
+    products = [
+        np.ones((1, len(grey)), dtype=np.float32) @ known_products,
+        whiteness @ known_products,
+        (whiteness * whiteness) @ known_products,
+    ]
+    normal = np.empty((len(whiteness), 6, 6))
+    for (row, column), product in zip(((0, 0), (0, 3), (3, 3)), products, strict=True):
         normal[:, row : row + 3, column : column + 3] = product.reshape(-1, 3, 3)
     normal[:, 3:, :3] = normal[:, :3, 3:]
 
-    inside = (even * whole).T
-    right = np.empty((max(len(shares), len(tones)), 6))
-    right[:, :3] = lights @ inside
-    right[:, 3:] = (lights * shares) @ inside
+    known_basis = (basis * not_cut_off).T
+    right_sides = np.empty((max(len(whiteness), len(tones)), 6))
+    right_sides[:, :3] = lights @ known_basis
+    right_sides[:, 3:] = (lights * whiteness) @ known_basis
 
-    weights = np.linalg.solve(normal + 1e-3 * np.eye(6), right[..., None])[..., 0].astype(np.float32)
-    made = weights[:, :3] @ even + shares * (weights[:, 3:] @ even)
+    weights = np.linalg.solve(normal + 1e-3 * np.eye(6), right_sides[..., None])[..., 0].astype(np.float32)
+    linear_light = weights[:, :3] @ basis + whiteness * (weights[:, 3:] @ basis)
     if len(tones) == 1:
-        return coded_values(made, tones[0])
-    return np.stack([coded_values(row, tone) for row, tone in zip(made, tones, strict=True)])
+        return coded_values(linear_light, tones[0])
+    return np.stack([coded_values(row, tone) for row, tone in zip(linear_light, tones, strict=True)])
 
 
 @lru_cache(maxsize=64)
-def _even(height: int, width: int) -> tuple[Pixels, Pixels]:
+def _even_light(height: int, width: int) -> tuple[Pixels, Pixels]:
     """One, and what changes evenly across and down, shape (3, height * width); the products of each two, (9, ...)."""
     down, across = np.mgrid[-1.0 : 1.0 : height * 1j, -1.0 : 1.0 : width * 1j].astype(np.float32)
-    found = np.stack([np.ones(height * width, dtype=np.float32), across.ravel(), down.ravel()])
-    pairs = (found[:, None] * found).reshape(9, -1)
+    basis = np.stack([np.ones(height * width, dtype=np.float32), across.ravel(), down.ravel()])
+    products = (basis[:, None] * basis).reshape(9, -1)
 
-    for each in (found, pairs):
-        each.flags.writeable = False
+    for array in (basis, products):
+        array.flags.writeable = False
 
-    return found, pairs
+    return basis, products
