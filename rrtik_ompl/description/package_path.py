@@ -34,9 +34,9 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
     if scheme not in ("", "file", "package", "model"):
         raise InputError(f"{where}: mesh '{uri}' is not a file; use package://, file:// or a path")
 
-    if inside := _FIND.match(rest):
+    if find_expression := _FIND.match(rest):
         scheme = "package"
-        rest = f"{inside[1]}/{inside[2]}"
+        rest = f"{find_expression[1]}/{find_expression[2]}"
 
     roots = [Path(p) for p in packages]
     roots += [] if folder is None else [folder, *folder.parents]
@@ -44,15 +44,15 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
     name = name.lstrip("/") if scheme in ("package", "model") else name  # package:///NAME is a common slip
 
     candidates = _in_packages(name, roots) if scheme in ("package", "model") else _beside(name, folder)
-    found = next((path for path in candidates if os.path.isfile(path)), None)
-    if found is None:
+    file = next((path for path in candidates if os.path.isfile(path)), None)
+    if file is None:
         package = name.partition("/")[0]
         remedy = f"give packages=[the folder that holds '{package}']" if scheme in ("package", "model") else "check it"
         raise MissingFileError(f"{where}: mesh file '{uri}' does not exist; {remedy}")
 
-    if found.suffix.lower() not in MESH_SUFFIXES:
+    if file.suffix.lower() not in MESH_SUFFIXES:
         raise InputError(f"{where}: mesh '{uri}' is of no kind that can be read; export it as STL, OBJ or DAE")
-    return found.resolve()
+    return file.resolve()
 
 
 def _in_packages(name: str, roots: Iterable[Path]) -> Iterator[Path]:
@@ -74,5 +74,5 @@ def _beside(name: str, folder: Path | None) -> Iterator[Path]:
 def package_folder(name: str, folder: Path, packages: Iterable[Path]) -> Path | None:
     """The folder of a package: in ``packages`` or one of them, in ``folder`` or any above it; None if there is none."""
     roots = [*packages, folder, *folder.parents]
-    found = (root if root.name == name else root / name for root in roots)
-    return next((each for each in found if name and os.path.isdir(each)), None)
+    candidates = (root if root.name == name else root / name for root in roots)
+    return next((candidate for candidate in candidates if name and os.path.isdir(candidate)), None)

@@ -38,8 +38,8 @@ def padded(robot: Robot, padding: Padding) -> Robot:
     """
     require(robot, Robot, "robot to pad", "use load_robot(name or file)")
 
-    given = padding if isinstance(padding, Mapping) else dict.fromkeys(robot.link_names, padding)
-    thick = by_name(robot, "padding", "link", robot.link_names, given, not_negative)
-    source = dict(robot.source) | {"padding": dict(thick) if isinstance(padding, Mapping) else float(padding)}
-    kept = {link: value for link, value in thick.items() if value > 0.0}
-    return replace(robot, padding=MappingProxyType(kept), source=MappingProxyType(source))
+    padding_by_link = padding if isinstance(padding, Mapping) else dict.fromkeys(robot.link_names, padding)
+    checked = by_name(robot, "padding", "link", robot.link_names, padding_by_link, not_negative)
+    source = dict(robot.source) | {"padding": dict(checked) if isinstance(padding, Mapping) else float(padding)}
+    not_zero = {link: value for link, value in checked.items() if value > 0.0}
+    return replace(robot, padding=MappingProxyType(not_zero), source=MappingProxyType(source))

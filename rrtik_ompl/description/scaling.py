@@ -61,16 +61,16 @@ def scaled(robot: Robot, scale: Mapping[str, float]) -> Robot:
             )
         )
 
-    before = dict(robot.source.get("scale", {}))
-    kept = before | {link: factor * before.get(link, 1.0) for link, factor in factors.items()}
-    return replace(robot, collision=model, source=MappingProxyType(dict(robot.source) | {"scale": kept}))
+    earlier = dict(robot.source.get("scale", {}))
+    combined = earlier | {link: factor * earlier.get(link, 1.0) for link, factor in factors.items()}
+    return replace(robot, collision=model, source=MappingProxyType(dict(robot.source) | {"scale": combined}))
 
 
 def _scaled(geometry: coal.CollisionGeometry, factor: float, what: str) -> coal.CollisionGeometry:
     """A coal solid of another size, in the same place."""
-    known = resized(geometry, factor)
-    if known is not None:
-        return known
+    simple_solid = resized(geometry, factor)
+    if simple_solid is not None:
+        return simple_solid
     if is_mesh(geometry):
         vertices, triangles = mesh_arrays(geometry)
         middle = vertices.mean(axis=0)

@@ -202,8 +202,8 @@ def _limits_of_file(file: FilePath, tree: Tree) -> tuple[dict[str, JointLimits],
 
 def _outside(robot: Robot, others: Collection[str], semantics: Srdf, group: str | None) -> Iterator[str]:
     """A line for each state of an SRDF that is a posture, but not one of some others, outside the robot's limits."""
-    told = {name: values for name, values in semantics.postures(group).items() if name not in others}
-    for name, fault in postures_outside(robot, told):
+    own_postures = {name: values for name, values in semantics.postures(group).items() if name not in others}
+    for name, fault in postures_outside(robot, own_postures):
         yield f"{semantics.place_of(name, group)}: posture '{name}': {fault}"
 
 

@@ -49,10 +49,10 @@ class ArmCheck:
         if time - self.since < STILL_SECONDS:
             return self
 
-        away = float(np.linalg.norm(T_base_tip.translation - expected.translation))
+        distance = float(np.linalg.norm(T_base_tip.translation - expected.translation))
         sigma = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
-        if away <= TOLERANCE + SIGMAS * sigma:
+        if distance <= TOLERANCE + SIGMAS * sigma:
             return replace(self, off="")
 
-        far = f"{1e3 * away:.0f} mm"
-        return replace(self, off=f"the camera sees the gripper {far} from where the joints say; check both")
+        how_far = f"{1e3 * distance:.0f} mm"
+        return replace(self, off=f"the camera sees the gripper {how_far} from where the joints say; check both")

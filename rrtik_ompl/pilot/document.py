@@ -51,7 +51,7 @@ def state_document(session: Session) -> dict[str, Any]:
 
 def _joints(session: Session) -> list[dict[str, Any]]:
     robot = session.robot
-    found = []
+    joints = []
     for k, name in enumerate(robot.joint_names):
         unit = joint_unit(robot.prismatic[k])
         value, shown = reading(float(session.q[k]), unit)
@@ -66,8 +66,8 @@ def _joints(session: Session) -> list[dict[str, Any]]:
             "lower": None if endless else reading(low, unit)[0],
             "upper": None if endless else reading(high, unit)[0],
         }
-        found.append(joint)
-    return found
+        joints.append(joint)
+    return joints
 
 
 def _object(seen: SeenObject, unseen: float) -> dict[str, Any]:
@@ -91,24 +91,24 @@ def _joint_range(session: Session) -> dict[str, Any]:
 def _aim(session: Session) -> dict[str, Any]:
     """From the tip to the chosen grasp, or else to the chosen object: ahead along the tool, and in the world [m]."""
     tip = session.robot.fk(session.q)
-    found: dict[str, Any] = {"tip": np.round(tip.translation, 4).tolist(), "to": ""}
-    seen = None if session.target is None else session.surroundings.named(session.target)
-    if seen is None:
-        return found
+    aim: dict[str, Any] = {"tip": np.round(tip.translation, 4).tolist(), "to": ""}
+    target_seen = None if session.target is None else session.surroundings.named(session.target)
+    if target_seen is None:
+        return aim
 
     choice = session.state.choice
-    goal = seen.T_base_object if choice is None else seen.grasp_pose(*choice)
+    goal = target_seen.T_base_object if choice is None else target_seen.grasp_pose(*choice)
 
     offset = goal.translation - tip.translation
-    ahead = float(offset @ tip.rotation[:, 2])
-    aside = float(np.linalg.norm(offset - ahead * tip.rotation[:, 2]))
+    along_tool = float(offset @ tip.rotation[:, 2])
+    across_tool = float(np.linalg.norm(offset - along_tool * tip.rotation[:, 2]))
 
-    return found | {
-        "to": seen.object.name if choice is None else f"{choice[0]} {choice[1] + 1}",
+    return aim | {
+        "to": target_seen.object.name if choice is None else f"{choice[0]} {choice[1] + 1}",
         "distance": round(float(np.linalg.norm(offset)), 4),
         "xyz": np.round(offset, 4).tolist(),
-        "ahead": round(ahead, 4),
-        "aside": round(aside, 4),
+        "ahead": round(along_tool, 4),
+        "aside": round(across_tool, 4),
         "turn_deg": round(float(np.rad2deg(np.linalg.norm(pin.log3(tip.rotation.T @ goal.rotation)))), 1),
     }
 
@@ -121,17 +121,17 @@ def _route(session: Session) -> dict[str, Any] | None:
 
     if route.together:
         share = 0.0 if session.progress is None else session.progress.share
-        done = "done" if follower.current else "current"
-        whole = {
+        status = "done" if follower.current else "current"
+        single_move = {
             "joint": "all joints",
             "from": 0.0,
             "to": share,
             "unit": "",
             "text": "all joints at once",
-            "status": done,
+            "status": status,
             "at": 1.0,
         }
-        moves = [whole]
+        moves = [single_move]
     else:
         moves = _moves(follower)
 

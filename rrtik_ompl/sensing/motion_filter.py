@@ -42,16 +42,16 @@ class MotionFilter:
 
     def update(self, pose: pin.SE3, covariance: Matrix, seconds: float) -> pin.SE3:
         """The pose after a measurement, ``seconds`` after the one before."""
-        stay = np.exp(-seconds / STAY)
-        passing = np.array([[stay, 1.0 - stay], [1.0 - stay, stay]])
-        before, begin = self._mixed(passing)
+        stay_probability = np.exp(-seconds / STAY)
+        transition = np.array([[stay_probability, 1.0 - stay_probability], [1.0 - stay_probability, stay_probability]])
+        predicted_shares, mixed_states = self._mixed(transition)
 
-        seen = np.concatenate([pose.translation, pin.log3(pose.rotation @ self._reference.T)])
-        likely = np.array([
-            self._step(k, *begin[k], seen, covariance, seconds) for k in range(2)
+        measurement = np.concatenate([pose.translation, pin.log3(pose.rotation @ self._reference.T)])
+        log_likelihoods = np.array([
+            self._step(k, *mixed_states[k], measurement, covariance, seconds) for k in range(2)
         ])  # fmt: skip
 
-        shares = before * np.exp(likely - likely.max())
+        shares = predicted_shares * np.exp(log_likelihoods - log_likelihoods.max())
         self._shares = np.maximum(shares / shares.sum(), LEAST_LIKELY)
         self._shares /= self._shares.sum()
 
@@ -63,22 +63,22 @@ class MotionFilter:
         state = state[_MEASURED] + seconds * state[_RATES]
         return pin.SE3(pin.exp3(state[3:]) @ self._reference, state[:3])
 
-    def _mixed(self, passing: Matrix) -> tuple[Vector, list[tuple[Vector, Matrix]]]:
+    def _mixed(self, transition: Matrix) -> tuple[Vector, list[tuple[Vector, Matrix]]]:
         """What each model is likely to be before a measurement, and what it begins with."""
-        joint = passing * self._shares[:, None]
-        before = joint.sum(axis=0)
+        joint = transition * self._shares[:, None]
+        predicted_shares = joint.sum(axis=0)
 
-        begin = []
+        mixed_states = []
         for k in range(2):
-            weights = joint[:, k] / before[k]
+            weights = joint[:, k] / predicted_shares[k]
             state = weights @ self._states
-            away = self._states - state
-            spread = np.tensordot(weights, self._spreads + away[:, :, None] * away[:, None, :], 1)
-            begin.append((state, spread))
+            deviations = self._states - state
+            spread = np.tensordot(weights, self._spreads + deviations[:, :, None] * deviations[:, None, :], 1)
+            mixed_states.append((state, spread))
 
-        return before, begin
+        return predicted_shares, mixed_states
 
-    def _step(self, k: int, state: Vector, spread: Matrix, seen: Vector, noise: Matrix, seconds: float) -> float:
+    def _step(self, k: int, state: Vector, spread: Matrix, measurement: Vector, noise: Matrix, seconds: float) -> float:
         """Predict and correct one model; the logarithm of how well the measurement fits it."""
         forward = np.eye(12)
         forward[_MEASURED, _RATES] = seconds * np.eye(6)
@@ -88,15 +88,18 @@ class MotionFilter:
         state = forward @ state
         spread = forward @ spread @ forward.T + growth
 
-        away = seen - state[_MEASURED]
-        expected = spread[_MEASURED, _MEASURED] + noise
-        gain = np.linalg.solve(expected, spread[_MEASURED]).T
-        self._states[k] = state + gain @ away
+        innovation = measurement - state[_MEASURED]
+        innovation_covariance = spread[_MEASURED, _MEASURED] + noise
+        gain = np.linalg.solve(innovation_covariance, spread[_MEASURED]).T
+        self._states[k] = state + gain @ innovation
 
         spread = spread - gain @ spread[_MEASURED]
         self._spreads[k] = 0.5 * (spread + spread.T)  # rounding must not make it lopsided
 
-        return -0.5 * float(away @ np.linalg.solve(expected, away) + np.linalg.slogdet(expected)[1])
+        return -0.5 * float(
+            innovation @ np.linalg.solve(innovation_covariance, innovation)
+            + np.linalg.slogdet(innovation_covariance)[1]
+        )
 
     def _settle(self) -> pin.SE3:
         """The pose by both models; rotations are counted from it from now on."""

@@ -17,8 +17,8 @@ def scene_with(scene: Scene, solids: Iterable[Obstacle]) -> Scene:
     """A scene with more solids, which take the place of those of the same names."""
     more = tuple(solids)
     names = {solid.name for solid in more}
-    kept = tuple(obstacle for obstacle in scene.obstacles if obstacle.name not in names)
-    return replace(scene, obstacles=(*kept, *more))
+    other_obstacles = tuple(obstacle for obstacle in scene.obstacles if obstacle.name not in names)
+    return replace(scene, obstacles=(*other_obstacles, *more))
 
 
 def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind: str, level: int) -> Problem:
@@ -39,18 +39,18 @@ def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind:
         ProblemError: If the start touches something.
     """
     objects = tuple(seen)
-    wanted = next((each for each in objects if each.object.name == name), None)
-    if wanted is None:
-        names = ", ".join(each.object.name for each in objects) or "nothing"
+    target = next((object_seen for object_seen in objects if object_seen.object.name == name), None)
+    if target is None:
+        names = ", ".join(object_seen.object.name for object_seen in objects) or "nothing"
         raise InputError(f"object '{name}' was not seen; {names} was")
 
-    levels = len(wanted.object.grasp(kind).levels)
+    levels = len(target.object.grasp(kind).levels)
     if not 1 <= level <= levels:
         raise InputError(f"grasp type '{kind}' of '{name}' has levels 1 to {levels}, not {level}")
 
-    solids = [solid for each in objects for solid in each.solids()]
+    solids = [solid for object_seen in objects for solid in object_seen.solids()]
     scene = scene_with(problem.world.scene, solids)
     world = problem.world.with_accuracy("exact").with_scene(scene)
 
-    before = wanted.grasp_pose(kind, level - 1) * pose([0.0, 0.0, -wanted.object.grasp(kind).approach])
-    return Problem(world, problem.start, PoseGoal(before), name=f"{name}_{kind}_{level}")
+    approach_pose = target.grasp_pose(kind, level - 1) * pose([0.0, 0.0, -target.object.grasp(kind).approach])
+    return Problem(world, problem.start, PoseGoal(approach_pose), name=f"{name}_{kind}_{level}")

@@ -124,11 +124,11 @@ class Sensor:
             InputError: If there are not as many pictures as cameras, one does not have its camera's size, or times go
                 backwards.
         """
-        found = self._detected(picture, others)
-        self._before = found if self._trackers else ()
+        detected = self._detected(picture, others)
+        self._before = detected if self._trackers else ()
         self._count += 1
 
-        seen = tuple(self._tracked(each, picture.time) for each in found)
+        seen = tuple(self._tracked(sighting, picture.time) for sighting in detected)
         if not seen:
             self._blank = picture.pixels
 
@@ -159,12 +159,15 @@ class Sensor:
         if self._blank is None:
             return f"{source}: markers of the map are in view, but none that says where the arm's base is"
 
-        wanted = self.marker_map.dictionary
-        found = dictionaries_seen(as_gray(self._blank))
-        if wanted in found:
+        dictionary = self.marker_map.dictionary
+        dictionaries_found = dictionaries_seen(as_gray(self._blank))
+        if dictionary in dictionaries_found:
             return f"{source}: markers are in view, but none that the map knows; add their ids to the map"
-        if found:
-            return f"{source}: no marker of {wanted}, but of {found[0]}: print others, or change the map's 'dictionary'"
+        if dictionaries_found:
+            other = dictionaries_found[0]
+            return (
+                f"{source}: no marker of {dictionary}, but of {other}: print others, or change the map's 'dictionary'"
+            )
         return f"{source}: no marker in view; go nearer, add light, or check that the white rim of the marker is whole"
 
     def _tracked(self, sight: Sighting, time: float) -> Sighting:
@@ -172,17 +175,17 @@ class Sensor:
         if tracker is None or sight.refused:
             return sight
 
-        found = tracker.update(sight, time)
+        tracked = tracker.update(sight, time)
         pose = sight.pose
-        refused = "jumped: left out as an outlier" if found.outlier else ""
+        refused = "jumped: left out as an outlier" if tracked.outlier else ""
 
         first = (pose.T_camera_object, pose.error)
         second = (pose.other, pose.other_error)
-        taken, other = (second, first) if found.other_branch else (first, second)
-        if found.sure:  # by this picture or those before it
+        chosen, other = (second, first) if tracked.other_branch else (first, second)
+        if tracked.sure:  # by this picture or those before it
             other = (None, np.inf)
 
-        pose = CornerPose(found.T_camera_object, other[0], taken[1], other[1], found.covariance)
+        pose = CornerPose(tracked.T_camera_object, other[0], chosen[1], other[1], tracked.covariance)
         return replace(sight, pose=pose, refused=refused)
 
 

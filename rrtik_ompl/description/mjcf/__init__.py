@@ -63,32 +63,32 @@ def robot_from_mjcf(
     Raises:
         InputError: If anything in the file cannot be used; one line names file, element and remedy.
     """
-    found = read_mjcf(Path(path))
+    mjcf = read_mjcf(Path(path))
     options = {"joints": joints, "tip": tip, "joint_limits": joint_limits, "locked": locked, "base_pose": base_pose}
-    limits = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in found.tree.joints])
-    actuated = _actuated(found, joints, tip)
+    limits = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in mjcf.tree.joints])
+    actuated = _actuated(mjcf, joints, tip)
 
     with located(str(path)):
         robot = build_robot(
-            found.name or Path(path).stem,
-            found.tree,
+            mjcf.name or Path(path).stem,
+            mjcf.tree,
             joints=actuated,
-            mimics=found.mimics,
+            mimics=mjcf.mimics,
             locked=locked,
-            tip=next((site for site in TIP_SITES if site in found.sites), None) if tip is None else tip,
+            tip=next((site for site in TIP_SITES if site in mjcf.sites), None) if tip is None else tip,
             base_pose=base_pose,
             limits=limits,
-            postures=found.postures,
-            allowed_collisions=found.excluded,
-            checked_collisions=found.touchable,
-            unchecked_solids=found.apart,
+            postures=mjcf.postures,
+            allowed_collisions=mjcf.excluded,
+            checked_collisions=mjcf.touchable,
+            unchecked_solids=mjcf.apart,
             source={"mjcf": str(Path(path).resolve())} | source_entry(options),
         )
 
     tell(
         [
-            *(f"{path}: key '{name}': {fault}" for name, fault in postures_outside(robot, found.postures)),
-            *not_read(str(path), [*found.unread, *_other_trees(found, actuated, locked or {})]),
+            *(f"{path}: key '{name}': {fault}" for name, fault in postures_outside(robot, mjcf.postures)),
+            *not_read(str(path), [*mjcf.unread, *_other_trees(mjcf, actuated, locked or {})]),
             *not_read(str(joint_limits), [] if joint_limits is None else unread_limits(joint_limits)),
         ],
         strict,
@@ -96,30 +96,30 @@ def robot_from_mjcf(
     return robot
 
 
-def _actuated(found: Mjcf, joints: Iterable[str] | None, tip: str | None) -> tuple[str, ...]:
+def _actuated(mjcf: Mjcf, joints: Iterable[str] | None, tip: str | None) -> tuple[str, ...]:
     if joints is not None:
         return tuple(joints)
 
-    followers = {tie.joint for tie in found.mimics}
-    over = found.tree.walk() if tip is None else found.tree.chain(tip)
+    followers = {tie.joint for tie in mjcf.mimics}
+    over = mjcf.tree.walk() if tip is None else mjcf.tree.chain(tip)
     return tuple(joint.name for joint in over if joint.moves and joint.name not in followers)
 
 
-def _other_trees(found: Mjcf, actuated: Sequence[str], locked: Mapping[str, float]) -> list[str]:
+def _other_trees(mjcf: Mjcf, actuated: Sequence[str], locked: Mapping[str, float]) -> list[str]:
     """What stands beside the robot and could move by itself: joints that are held in trees without an actuated one."""
-    above = {joint.child: joint for joint in found.tree.joints}
+    joint_above = {joint.child: joint for joint in mjcf.tree.joints}
     roots: dict[str, str] = {}  # for each joint the body on the world that carries it
-    for joint in found.tree.walk():
+    for joint in mjcf.tree.walk():
         link = joint.child
-        while above[link].parent != WORLD:
-            link = above[link].parent
+        while joint_above[link].parent != WORLD:
+            link = joint_above[link].parent
         roots[joint.name] = link
 
-    moving = {roots[joint] for joint in actuated if joint in roots}
-    followers = {tie.joint for tie in found.mimics if tie.source in actuated}
-    held = [
+    robot_roots = {roots[joint] for joint in actuated if joint in roots}
+    followers = {tie.joint for tie in mjcf.mimics if tie.source in actuated}
+    held_joints = [
         f"'{joint.name}'"
-        for joint in found.tree.walk()
-        if joint.moves and roots[joint.name] not in moving and joint.name not in {*locked, *followers}
+        for joint in mjcf.tree.walk()
+        if joint.moves and roots[joint.name] not in robot_roots and joint.name not in {*locked, *followers}
     ]
-    return [f"joints beside the robot, held: {few(held)}"] if held else []
+    return [f"joints beside the robot, held: {few(held_joints)}"] if held_joints else []

@@ -104,8 +104,8 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
             raise UnknownNameError(f"link of robot '{robot.name}'", item.link, links, where=f"attached '{item.name}'")
         for name in item.allow:
             if name not in links and name not in scene.names:
-                known = (*links, *scene.names)
-                raise UnknownNameError("link or obstacle", name, known, where=f"allow of attached '{item.name}'")
+                known_names = (*links, *scene.names)
+                raise UnknownNameError("link or obstacle", name, known_names, where=f"allow of attached '{item.name}'")
 
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         mount = frame.placement * item.pose
@@ -144,12 +144,12 @@ def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body
     if not scene.contacts:
         return tuple(bodies)
 
-    known = {*robot.link_names, *scene.names}
+    known_names = {*robot.link_names, *scene.names}
     contacts_of: dict[str, list[tuple[str, float]]] = {}
     for contact in scene.contacts:
         for name in contact.names:
-            if name not in known:
-                raise UnknownNameError("link or obstacle", name, known, where="contacts of a scene")
+            if name not in known_names:
+                raise UnknownNameError("link or obstacle", name, known_names, where="contacts of a scene")
 
         if not contact.pair & set(scene.names):
             raise InputError(f"contacts of a scene: '{contact.first}' and '{contact.second}' are links; name an object")
@@ -220,11 +220,11 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
 
 
 def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
-    known = {*robot.link_names, *scene.names}
+    known_names = {*robot.link_names, *scene.names}
     for pair in scene.allowed_collisions:
         for name in pair:
-            if name not in known:
-                raise UnknownNameError("link or obstacle", name, known, where="allowed_collisions")
+            if name not in known_names:
+                raise UnknownNameError("link or obstacle", name, known_names, where="allowed_collisions")
 
     allowed = {frozenset(pair) for pair in scene.allowed_collisions}
     for item in scene.attached:

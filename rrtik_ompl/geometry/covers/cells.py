@@ -211,8 +211,8 @@ def _blocks(full: Flags) -> list[tuple[Matrix, int]]:
         is_full_cube = tiles.reshape(nx, size, ny, size, nz, size).all(axis=(1, 3, 5))
         cubes.append((np.argwhere(is_full_cube).astype(np.float64) * size, size))
 
-        taken = is_full_cube.repeat(size, axis=0).repeat(size, axis=1).repeat(size, axis=2)
-        remaining &= ~taken[: remaining.shape[0], : remaining.shape[1], : remaining.shape[2]]
+        covered = is_full_cube.repeat(size, axis=0).repeat(size, axis=1).repeat(size, axis=2)
+        remaining &= ~covered[: remaining.shape[0], : remaining.shape[1], : remaining.shape[2]]
     return cubes
 
 

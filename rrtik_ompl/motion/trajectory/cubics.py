@@ -97,8 +97,8 @@ def period_of(times: Vector) -> float:
     if len(times) < 3:
         return np.inf
     period = float(times[-2]) / (len(times) - 2)
-    late = np.abs(times[:-1] - period * np.arange(len(times) - 1)).max()
-    return period if late <= CLOCK_ERROR and times[-1] - times[-2] <= 1.002 * period else np.inf
+    clock_error = np.abs(times[:-1] - period * np.arange(len(times) - 1)).max()
+    return period if clock_error <= CLOCK_ERROR and times[-1] - times[-2] <= 1.002 * period else np.inf
 
 
 def are_set_points(times: Vector, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> bool:
@@ -106,15 +106,20 @@ def are_set_points(times: Vector, positions: Matrix, velocities: Matrix, acceler
     if period_of(times) > LONGEST_PERIOD + CLOCK_ERROR:
         return False
 
-    apart = np.abs(ends_of(times, positions, velocities, accelerations) - positions[1:]).max()
+    largest_misfit = np.abs(ends_of(times, positions, velocities, accelerations) - positions[1:]).max()
     h = np.diff(times)[:, None]
     rise = np.diff(velocities, axis=0)
-    most = np.maximum(np.abs(accelerations).max(axis=0), np.abs(rise / h).max(axis=0))
+    max_acceleration = np.maximum(np.abs(accelerations).max(axis=0), np.abs(rise / h).max(axis=0))
 
     # of any motion whose acceleration is nowhere larger, positions differ by less from these
-    gap = np.diff(positions, axis=0) - h * (velocities[:-1] + 0.5 * rise) + h**2 * np.diff(accelerations, axis=0) / 12.0
-    near = np.abs(gap) <= h**2 * most / 2.0 + CLOCK_ERROR * np.abs(velocities).max(axis=0) + EXACT
-    return bool(apart > EXACT * max(1.0, np.abs(positions).max()) and near.all())
+    position_residual = (
+        np.diff(positions, axis=0) - h * (velocities[:-1] + 0.5 * rise) + h**2 * np.diff(accelerations, axis=0) / 12.0
+    )
+    is_smooth = (
+        np.abs(position_residual)
+        <= h**2 * max_acceleration / 2.0 + CLOCK_ERROR * np.abs(velocities).max(axis=0) + EXACT
+    )
+    return bool(largest_misfit > EXACT * max(1.0, np.abs(positions).max()) and is_smooth.all())
 
 
 def in_thirds(times: Vector, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> list[Matrix]:

@@ -90,10 +90,10 @@ class DynamicLimits:
         mass = not_negative(payload, "payload")
         limits = np.full(robot.dof, np.inf) if torque is None or torque is False else _torques(robot, torque)
 
-        wanted = bool(np.isfinite(limits).any())
-        if mass > 0.0 and not wanted:
+        limits_torques = bool(np.isfinite(limits).any())
+        if mass > 0.0 and not limits_torques:
             raise InputError("payload: it counts only for torques; give torque=True, or their limits")
-        if not wanted and tip_speed is None and tip_acceleration is None:
+        if not limits_torques and tip_speed is None and tip_acceleration is None:
             return None
 
         speed = _of_tip(tip_speed, "tip speed", "m/s", FASTEST_TIP)
@@ -113,29 +113,29 @@ class DynamicLimits:
         """
         unit = self.measured(samples.positions, samples.slopes, samples.bends)
         speeds = np.linalg.norm(unit.tip_velocities, axis=1)
-        found = Bounds.capped((self.tip_speed / np.maximum(speeds, LEAST_SPEED)) ** 2)
+        limits = Bounds.capped((self.tip_speed / np.maximum(speeds, LEAST_SPEED)) ** 2)
         if np.isfinite(self.tip_acceleration):
-            found = found.and_also(self._tip_rows(unit))
+            limits = limits.and_also(self._tip_rows(unit))
         if self.moves_torques:
-            along = self.measured(samples.positions, np.zeros_like(samples.slopes), samples.slopes).torques
-            found = found.and_also(self._torque_rows(unit, along - unit.holding))
-        return found
+            slope_torques = self.measured(samples.positions, np.zeros_like(samples.slopes), samples.slopes).torques
+            limits = limits.and_also(self._torque_rows(unit, slope_torques - unit.holding))
+        return limits
 
     def slowing(self, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> float:
         """Factor by which a motion with these states, shape (k, n) each, has to be slowed; 1 or more."""
-        found = self.measured(positions, velocities, accelerations)
+        state = self.measured(positions, velocities, accelerations)
         shares = [
-            np.linalg.norm(found.tip_velocities, axis=1).max() / self.tip_speed,
-            np.sqrt(np.linalg.norm(found.tip_accelerations, axis=1).max() / self.tip_acceleration),
+            np.linalg.norm(state.tip_velocities, axis=1).max() / self.tip_speed,
+            np.sqrt(np.linalg.norm(state.tip_accelerations, axis=1).max() / self.tip_acceleration),
         ]
 
         if self.moves_torques:
-            moving = found.torques - found.holding
-            room = np.where(moving > 0.0, self.torque - found.holding, self.torque + found.holding)
-            shares.append(np.sqrt(max((np.abs(moving) / np.maximum(room, 1e-300)).max(), 0.0)))
+            moving_torques = state.torques - state.holding
+            available_torques = np.where(moving_torques > 0.0, self.torque - state.holding, self.torque + state.holding)
+            shares.append(np.sqrt(max((np.abs(moving_torques) / np.maximum(available_torques, 1e-300)).max(), 0.0)))
 
-        most = float(max(shares))
-        return most * (1.0 + 1e-12) if most > 1.0 else 1.0
+        factor = float(max(shares))
+        return factor * (1.0 + 1e-12) if factor > 1.0 else 1.0
 
     def measured(self, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> Measured:
         """What the arm has at states, shape (k, n) each; torques only where they are limited."""
@@ -148,14 +148,14 @@ class DynamicLimits:
         data = working_memory(model)
         tip = model.getFrameId(self.robot.tip)
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        none = np.zeros(self.robot.dof)
-        still = np.zeros(model.nv)
-        full = self.robot.pinocchio_configuration(states[0])
+        no_torques = np.zeros(self.robot.dof)
+        zero_rates = np.zeros(model.nv)
+        configurations = self.robot.pinocchio_configuration(states[0])
 
-        for q, v, a in zip(full, states[1] @ gain.T, states[2] @ gain.T, strict=True):
-            torques = holding = none
+        for q, v, a in zip(configurations, states[1] @ gain.T, states[2] @ gain.T, strict=True):
+            torques = holding = no_torques
             if self.moves_torques:
-                holding = gain.T @ pin.rnea(model, data, q, still, still)
+                holding = gain.T @ pin.rnea(model, data, q, zero_rates, zero_rates)
                 torques = gain.T @ pin.rnea(model, data, q, v, a)
             pin.forwardKinematics(model, data, q, v, a)
             pin.updateFramePlacement(model, data, tip)
@@ -165,19 +165,19 @@ class DynamicLimits:
 
     def _tip_rows(self, unit: Measured) -> Bounds:
         """The acceleration p' u + p'' x of the tip lies in the plane of p' and p'': its component in each direction."""
-        ahead = unit.tip_velocities
-        bow = unit.tip_accelerations
-        size = np.linalg.norm(ahead, axis=1)
-        along = ahead / np.maximum(size, LEAST_SPEED)[:, None]
-        straight = (bow * along).sum(axis=1)
-        aside = np.linalg.norm(bow - straight[:, None] * along, axis=1)
+        slopes = unit.tip_velocities
+        bends = unit.tip_accelerations
+        slope_norms = np.linalg.norm(slopes, axis=1)
+        directions = slopes / np.maximum(slope_norms, LEAST_SPEED)[:, None]
+        along_bend = (bends * directions).sum(axis=1)
+        across_bend = np.linalg.norm(bends - along_bend[:, None] * directions, axis=1)
 
-        first = np.outer(size, np.cos(ANGLES))
-        second = np.outer(straight, np.cos(ANGLES)) + np.outer(aside, np.sin(ANGLES))
-        most = np.full_like(first, INSIDE * self.tip_acceleration)
+        first = np.outer(slope_norms, np.cos(ANGLES))
+        second = np.outer(along_bend, np.cos(ANGLES)) + np.outer(across_bend, np.sin(ANGLES))
+        limit = np.full_like(first, INSIDE * self.tip_acceleration)
 
-        cap = self.tip_acceleration / np.maximum(np.where(size < LEAST_SPEED, aside, 0.0), 1e-200)
-        return Bounds(Rows(first, second, -most, most), np.minimum(cap, MOST))
+        cap = self.tip_acceleration / np.maximum(np.where(slope_norms < LEAST_SPEED, across_bend, 0.0), 1e-200)
+        return Bounds(Rows(first, second, -limit, limit), np.minimum(cap, MOST))
 
     def _torque_rows(self, unit: Measured, along: Matrix) -> Bounds:
         high = self.torque - unit.holding
@@ -192,8 +192,8 @@ class DynamicLimits:
                 f"limit is {self.torque[joint]:.3g} {newtons}; carry less, or choose another path"
             )
 
-        used = np.isfinite(self.torque)
-        rows = Rows(*(part[:, used] for part in (along, unit.torques - unit.holding, low, high)))
+        is_limited = np.isfinite(self.torque)
+        rows = Rows(*(part[:, is_limited] for part in (along, unit.torques - unit.holding, low, high)))
         return Bounds(rows, np.full(len(along), MOST))
 
 
@@ -214,16 +214,18 @@ def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
     if sum(inertia.mass for inertia in robot.model.inertias) <= 0.0:
         raise InputError(f"torque limits: robot '{robot.name}' has no inertias; its description must give them")
     if torque is True:
-        places = [robot.model.joints[robot.model.getJointId(name)].idx_v for name in robot.joint_names]
-        own: Vector = np.array(robot.model.upperEffortLimit, dtype=np.float64)[places]
-        if not np.isfinite(own).any():
+        velocity_indices = [robot.model.joints[robot.model.getJointId(name)].idx_v for name in robot.joint_names]
+        efforts: Vector = np.array(robot.model.upperEffortLimit, dtype=np.float64)[velocity_indices]
+        if not np.isfinite(efforts).any():
             raise InputError(
                 f"torque limits: robot '{robot.name}' states no efforts; its URDF needs them, or give torque=[...]"
             )
-        return own
+        return efforts
 
-    given: Any = torque
-    row = finite_array(given, () if dimensions(given) == 0 else (robot.dof,), f"torque limits of robot '{robot.name}'")
+    written: Any = torque
+    row = finite_array(
+        written, () if dimensions(written) == 0 else (robot.dof,), f"torque limits of robot '{robot.name}'"
+    )
     if (row <= 0.0).any():
         raise InputError(f"torque limits: expected numbers greater than 0, got {np.min(row):g}")
     return np.broadcast_to(row, (robot.dof,)).astype(np.float64)

@@ -45,11 +45,11 @@ def along_lines(corners: Matrix, limits: RateLimits) -> list[Pieces]:
         speeds[:, k + 1] = v + h * (a + 0.5 * h * j)
         travelled[:, k + 1] = travelled[:, k] + h * (v + h * (0.5 * a + h * j / 6.0))
 
-    kept = phases > MIN_PHASE_SECONDS
+    is_used = phases > MIN_PHASE_SECONDS
     return [
-        Pieces(h[used], a + np.outer(s[used], d), np.outer(v[used], d), np.outer(p[used], d))
-        for h, used, a, d, s, v, p in zip(
-            phases, kept, corners[:-1], directions, travelled, speeds, pushes, strict=True
+        Pieces(h[phase_used], a + np.outer(s[phase_used], d), np.outer(v[phase_used], d), np.outer(p[phase_used], d))
+        for h, phase_used, a, d, s, v, p in zip(
+            phases, is_used, corners[:-1], directions, travelled, speeds, pushes, strict=True
         )
     ]
 

@@ -43,12 +43,14 @@ def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) ->
     ending = known_ending(file, FORMATS, "trajectory")
     try:
         document = loads(read_text(file), ending)
-        found = _from_document(document, robot)
-        if robot is not None and found.joint_names != robot.joint_names:
-            own = ", ".join(found.joint_names)
-            wanted = ", ".join(robot.joint_names)
-            raise InputError(f"the trajectory moves {own}, but robot '{robot.name}' has the joints {wanted}")
-        return found
+        motion = _from_document(document, robot)
+        if robot is not None and motion.joint_names != robot.joint_names:
+            motion_joints = ", ".join(motion.joint_names)
+            robot_joints = ", ".join(robot.joint_names)
+            raise InputError(
+                f"the trajectory moves {motion_joints}, but robot '{robot.name}' has the joints {robot_joints}"
+            )
+        return motion
     except InputError as error:
         raise in_file(file, error) from None
 

@@ -78,12 +78,12 @@ def _from_csv(text: str) -> dict[str, Any]:
     count = (len(names or ()) - 1) // 3
     joints = (names or [])[1 : 1 + count]
     if count < 1 or names != _header(joints):
-        wanted = "time,<joint>...,<joint> velocity...,<joint> acceleration..."
-        raise InputError(f"line 1: expected the columns {wanted}; is this a trajectory file?")
-    found: dict[str, Any] = {"times": [row[0] for row in rows], "joint_names": joints, "units": None, "robot": ""}
+        expected_columns = "time,<joint>...,<joint> velocity...,<joint> acceleration..."
+        raise InputError(f"line 1: expected the columns {expected_columns}; is this a trajectory file?")
+    document: dict[str, Any] = {"times": [row[0] for row in rows], "joint_names": joints, "units": None, "robot": ""}
     for k, field in enumerate(FIELDS):
-        found[field] = [row[1 + k * count : 1 + (k + 1) * count] for row in rows]
-    return found
+        document[field] = [row[1 + k * count : 1 + (k + 1) * count] for row in rows]
+    return document
 
 
 def _from_message(document: dict[str, Any]) -> dict[str, Any]:

@@ -113,16 +113,16 @@ class SimulatedArm:
     def advance(self, seconds: float) -> None:
         """Let simulated time pass [s]: what was sent on its way moves on."""
         if self._course is not None:
-            most = self._rates * seconds
-            self._q = self._q + np.clip(self._course - self._q, -most, most)
+            max_step = self._rates * seconds
+            self._q = self._q + np.clip(self._course - self._q, -max_step, max_step)
         if self._goal is None:
             return
 
         joint, target = self._goal
         step = self._rates[joint] * seconds
-        away = target - self._q[joint]
-        if abs(away) <= step:
+        to_go = target - self._q[joint]
+        if abs(to_go) <= step:
             self._q[joint] = target
             self._goal = None
         else:
-            self._q[joint] += np.sign(away) * step
+            self._q[joint] += np.sign(to_go) * step

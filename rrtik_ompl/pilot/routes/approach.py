@@ -42,15 +42,15 @@ def approaches(
         For each beginning the orders of its joints that are free, shape (moves + 1, dof) each; the last row is the
         grasp.
     """
-    found = []
+    parts_by_beginning = []
     for begin in _beginnings(world, grasp, stages):
         parts = (_in_order(begin, grasp, order) for order in permutations(np.flatnonzero(begin != grasp).tolist()))
         free = [rows for rows in parts if holding.motion_valid_batch(rows[:-1], rows[1:]).all()]
         if free:
-            found.append(free)
-        if len(found) == max_count:
+            parts_by_beginning.append(free)
+        if len(parts_by_beginning) == max_count:
             break
-    return found
+    return parts_by_beginning
 
 
 def _in_order(begin: Vector, end: Vector, order: tuple[int, ...]) -> Matrix:
@@ -64,30 +64,34 @@ def _in_order(begin: Vector, end: Vector, order: tuple[int, ...]) -> Matrix:
 def _beginnings(world: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3]) -> Matrix:
     """Free configurations before the object that differ from the grasp in few joints, best first. Shape (k, dof)."""
     joints = range(world.robot.dof)
-    sets = [np.isin(joints, some) for size in range(1, MAX_JOINTS + 1) for some in combinations(joints, size)]
+    joint_choices = [
+        np.isin(joints, moving_joints)
+        for size in range(1, MAX_JOINTS + 1)
+        for moving_joints in combinations(joints, size)
+    ]
 
-    at = stages[1].translation
-    back = stages[0].translation - stages[1].translation
-    places = np.repeat([at + far * back for far in STANDOFF_FACTORS], len(sets), axis=0)
+    grasp_point = stages[1].translation
+    to_approach = stages[0].translation - stages[1].translation
+    places = np.repeat([grasp_point + factor * to_approach for factor in STANDOFF_FACTORS], len(joint_choices), axis=0)
 
-    small = slack(JointPath.of(world.robot, grasp[None]))
-    rows = _moved_to_places(world.robot, grasp, np.tile(sets, (len(STANDOFF_FACTORS), 1)), places)
-    rows = np.where(np.abs(rows - grasp) <= small, grasp, rows)  # no move for a difference too small to notice
+    small_errors = slack(JointPath.of(world.robot, grasp[None]))
+    rows = _moved_to_places(world.robot, grasp, np.tile(joint_choices, (len(STANDOFF_FACTORS), 1)), places)
+    rows = np.where(np.abs(rows - grasp) <= small_errors, grasp, rows)  # no move for a difference too small to notice
 
-    _, first = np.unique(rows, axis=0, return_index=True)
-    rows = rows[first]
-    places = places[first]
+    _, distinct_rows = np.unique(rows, axis=0, return_index=True)
+    rows = rows[distinct_rows]
+    places = places[distinct_rows]
 
     poses = world.robot.fk_batch(rows)
-    aside = np.linalg.norm(poses[:, :3, 3] - places, axis=1)
+    offsets = np.linalg.norm(poses[:, :3, 3] - places, axis=1)
     cosine = 0.5 * (np.einsum("ij,mij->m", stages[1].rotation, poses[:, :3, :3]) - 1.0)
 
-    near = (aside < MAX_OFFSET) & (cosine > np.cos(MAX_TILT))
-    near[near] = world.valid_batch(rows[near])
+    is_before_object = (offsets < MAX_OFFSET) & (cosine > np.cos(MAX_TILT))
+    is_before_object[is_before_object] = world.valid_batch(rows[is_before_object])
 
-    rows = rows[near]
+    rows = rows[is_before_object]
     moving = (rows != grasp).sum(axis=1)
-    order = np.lexsort((-cosine[near], moving, _touching(world, rows, small)))
+    order = np.lexsort((-cosine[is_before_object], moving, _touching(world, rows, small_errors)))
     return np.asarray(rows[order])
 
 
@@ -100,15 +104,15 @@ def _moved_to_places(robot: Robot, grasp: Vector, chosen: Mask, places: Matrix) 
     for _ in range(ITERATIONS):
         poses, jacobians = robot.fk_jacobian_batch(rows)
         turning = jacobians[:, :3] * chosen[:, None, :]
-        square = turning @ turning.transpose(0, 2, 1) + DAMPING * np.eye(3)
-        step = turning.transpose(0, 2, 1) @ np.linalg.solve(square, (places - poses[:, :3, 3])[..., None])
+        normal = turning @ turning.transpose(0, 2, 1) + DAMPING * np.eye(3)
+        step = turning.transpose(0, 2, 1) @ np.linalg.solve(normal, (places - poses[:, :3, 3])[..., None])
         rows = robot.clamp(rows + step[..., 0])
     return rows
 
 
-def _touching(world: World, rows: Matrix, small: Vector) -> Vector:
+def _touching(world: World, rows: Matrix, small_errors: Vector) -> Vector:
     """Tenths of small errors that make a configuration touch something. Shape (m,)."""
-    errors = np.random.default_rng(0).uniform(-small, small, (ERROR_SAMPLES, len(small)))
-    tried = world.robot.clamp((rows[:, None] + errors).reshape(-1, len(small)))
-    tenths: Vector = np.rint(10.0 * (1.0 - world.valid_batch(tried).reshape(len(rows), ERROR_SAMPLES).mean(axis=1)))
+    errors = np.random.default_rng(0).uniform(-small_errors, small_errors, (ERROR_SAMPLES, len(small_errors)))
+    perturbed = world.robot.clamp((rows[:, None] + errors).reshape(-1, len(small_errors)))
+    tenths: Vector = np.rint(10.0 * (1.0 - world.valid_batch(perturbed).reshape(len(rows), ERROR_SAMPLES).mean(axis=1)))
     return tenths

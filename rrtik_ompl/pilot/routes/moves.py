@@ -51,13 +51,13 @@ def detours(world: World, start: Vector, goal: Vector, order: Sequence[int], rng
 
     lower, upper = turning_limits(world.robot, ends)
 
-    found: list[Matrix] = []
+    routes: list[Matrix] = []
     for joint in range(world.robot.dof):
         values = values_of(ends)
         further = spread_values(float(lower[joint]), float(upper[joint]), FURTHER_VALUES, rng)
         values[joint] = np.union1d(values[joint], further)
-        found += _routes(world, start, goal, values, [order])
-    return found
+        routes += _routes(world, start, goal, values, [order])
+    return routes
 
 
 def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | NoRoute:
@@ -68,8 +68,8 @@ def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | No
         InputError: If no package offers a planner that suits.
     """
     planner, options = _planner()
-    found = plan(Problem(world, start, goal), planner, seconds=PLANNER_SECONDS, seed=seed, parameters=options)
-    return NoRoute(found.reason) if found.path is None else found.path.waypoints
+    result = plan(Problem(world, start, goal), planner, seconds=PLANNER_SECONDS, seed=seed, parameters=options)
+    return NoRoute(result.reason) if result.path is None else result.path.waypoints
 
 
 def moved_aside(world: World, route: Matrix, slack: Vector) -> Iterator[Matrix]:
@@ -103,7 +103,7 @@ def _planner() -> tuple[str, dict[str, Any]]:
 
 def _routes(world: World, start: Vector, goal: Vector, values: Values, orders: Sequence[Sequence[int]]) -> list[Matrix]:
     lattice = MoveLattice(values, world.motion_valid_batch, np.ones(world.robot.dof))
-    found = [lattice.best_route(start, goal, order) for order in orders]
+    best_routes = [lattice.best_route(start, goal, order) for order in orders]
 
-    different = {route.tobytes(): route for route in found if route is not None}
+    different = {route.tobytes(): route for route in best_routes if route is not None}
     return list(different.values())

@@ -100,30 +100,30 @@ def find_markers(
         near: Search only where those were, unless one of them is not there any more; and where nothing is found,
             not for what is blurred most, which costs as much again.
     """
-    known = {marker.number: marker.look for marker in before}
+    last_looks = {marker.number: marker.look for marker in before}
     corners, numbers = _detected(gray, dictionary, before, near)
     if numbers is None:
         return ()
 
-    found: list[SeenMarker] = []
+    markers: list[SeenMarker] = []
     for k in np.argsort(np.ravel(numbers), kind="stable"):
         number = int(np.ravel(numbers)[k])
         rough = corners[k].reshape(4, 2).astype(np.float64)
         rough = np.roll(rough, 2 if _is_turned(dictionary) else 0, axis=0)
 
         if not align:
-            found.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
+            markers.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
             continue
 
-        fit = aligned_corners(gray, rough, marker_cells(dictionary, number), tone, known.get(number))
-        found.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.look))
+        fit = aligned_corners(gray, rough, marker_cells(dictionary, number), tone, last_looks.get(number))
+        markers.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.look))
 
-    return tuple(found)
+    return tuple(markers)
 
 
 def _detected(gray: NDArray[np.uint8], dictionary: str, before: Sequence[SeenMarker], near: bool) -> tuple[Any, Any]:
     """Corners and numbers by the cheapest try that finds any, OpenCV's way: numbers are None where none does."""
-    corners, numbers = _again(gray, before) if near and before else ([], None)
+    corners, numbers = _near_last_places(gray, before) if near and before else ([], None)
     if numbers is None:
         corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
     if numbers is None:
@@ -133,23 +133,23 @@ def _detected(gray: NDArray[np.uint8], dictionary: str, before: Sequence[SeenMar
     return corners, numbers
 
 
-def _again(gray: NDArray[np.uint8], before: Sequence[SeenMarker]) -> tuple[Any, Any]:
+def _near_last_places(gray: NDArray[np.uint8], before: Sequence[SeenMarker]) -> tuple[Any, Any]:
     """Corners and numbers of what the picture before showed, searched for around its place; None where one is not."""
     corners = []
     numbers = []
 
     for marker in before:
-        around = int(_NEAR_SIDES * marker.side) + _NEAR_PIXELS
-        low = np.maximum(np.floor(marker.corners.min(axis=0)).astype(int) - around, 0)
-        high = np.ceil(marker.corners.max(axis=0)).astype(int) + around
-        window = np.ascontiguousarray(gray[low[1] : high[1], low[0] : high[0]])
+        margin = int(_NEAR_SIDES * marker.side) + _NEAR_PIXELS
+        origin = np.maximum(np.floor(marker.corners.min(axis=0)).astype(int) - margin, 0)
+        high = np.ceil(marker.corners.max(axis=0)).astype(int) + margin
+        window = np.ascontiguousarray(gray[origin[1] : high[1], origin[0] : high[0]])
 
-        found, seen, _ = _detector(marker.dictionary, _NEAR_OUTLINE_SHARE).detectMarkers(window)
-        own = [] if seen is None else np.flatnonzero(np.ravel(seen) == marker.number)
-        if len(own) != 1:
+        window_corners, window_numbers, _ = _detector(marker.dictionary, _NEAR_OUTLINE_SHARE).detectMarkers(window)
+        matches = [] if window_numbers is None else np.flatnonzero(np.ravel(window_numbers) == marker.number)
+        if len(matches) != 1:
             return [], None
 
-        corners.append(found[own[0]] + low)
+        corners.append(window_corners[matches[0]] + origin)
         numbers.append(marker.number)
 
     return corners, np.array(numbers)
@@ -176,9 +176,11 @@ def _further_tries(gray: NDArray[np.uint8], dictionary: str, tries: int) -> tupl
 
 def _evened(picture: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
     """The same light and contrast everywhere."""
-    around = cv2.boxFilter(picture, -1, (_AROUND, _AROUND))
-    spread = np.sqrt(np.maximum(cv2.boxFilter(picture * picture, -1, (_AROUND, _AROUND)) - around * around, _FAINT**2))
-    return np.clip(128.0 + _CONTRAST * (picture - around) / spread, 0.0, 255.0).astype(np.uint8)
+    local_mean = cv2.boxFilter(picture, -1, (_AROUND, _AROUND))
+    local_deviation = np.sqrt(
+        np.maximum(cv2.boxFilter(picture * picture, -1, (_AROUND, _AROUND)) - local_mean * local_mean, _FAINT**2)
+    )
+    return np.clip(128.0 + _CONTRAST * (picture - local_mean) / local_deviation, 0.0, 255.0).astype(np.uint8)
 
 
 def dictionaries_seen(gray: NDArray[np.uint8]) -> tuple[str, ...]:
@@ -212,8 +214,8 @@ def charuco_corners(gray: NDArray[np.uint8], board: cv2.aruco.CharucoBoard) -> t
         return np.zeros((0, 3)), np.zeros((0, 2))
 
     match: Any = board.matchImagePoints  # its type requires a sequence where an array is allowed
-    points, seen = match(np.asarray(pixels).reshape(-1, 1, 2), np.ravel(numbers))
-    return np.reshape(points, (-1, 3)).astype(np.float64), np.reshape(seen, (-1, 2)).astype(np.float64)
+    points, matched_pixels = match(np.asarray(pixels).reshape(-1, 1, 2), np.ravel(numbers))
+    return np.reshape(points, (-1, 3)).astype(np.float64), np.reshape(matched_pixels, (-1, 2)).astype(np.float64)
 
 
 def _is_turned(dictionary: str) -> bool:
