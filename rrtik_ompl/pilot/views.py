@@ -107,14 +107,14 @@ class OutsideView:
     def draw(self) -> NDArray[np.uint8]:
         """The picture. Shape (height, width, 3), blue, green, red."""
         session = self._session
-        eye = orbit_pose(self.centre, self.distance, self.azimuth, self.elevation)
-        shown = session.q if self.share is None else along(session, self.share)
-        around = session.surroundings
+        T_base_camera = orbit_pose(self.centre, self.distance, self.azimuth, self.elevation)
+        configuration = session.q if self.share is None else along(session, self.share)
+        surroundings = session.surroundings
 
-        obstacles = (*around.world.scene.obstacles, *around.held_solids(session.robot.fk(shown)))
+        obstacles = (*surroundings.world.scene.obstacles, *surroundings.held_solids(session.robot.fk(configuration)))
         return self._arm.draw(
-            self._sky, eye, shown, ghosts=ghosts(session), obstacles=obstacles,
-            trail=trail(session), frames=[session.robot.fk(shown), *_objects(session)], opacity=1.0,
+            self._sky, T_base_camera, configuration, ghosts=ghosts(session), obstacles=obstacles,
+            trail=trail(session), frames=[session.robot.fk(configuration), *_objects(session)], opacity=1.0,
         )  # fmt: skip
 
 
@@ -149,16 +149,16 @@ def along(session: Session, share: float) -> Vector:
 
     rows = session.follower.path.waypoints
     lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).sum(axis=1))])
-    at = float(np.clip(share, 0.0, 1.0)) * lengths[-1]
-    return np.array([np.interp(at, lengths, column) for column in rows.T])
+    travel = float(np.clip(share, 0.0, 1.0)) * lengths[-1]
+    return np.array([np.interp(travel, lengths, column) for column in rows.T])
 
 
 def _chosen(session: Session) -> list[pin.SE3]:
     """``T_base_tip`` of the grasp that is chosen, in reach or not."""
-    seen = None if session.target is None else session.surroundings.named(session.target)
-    if seen is None or session.state.choice is None:
+    target_seen = None if session.target is None else session.surroundings.named(session.target)
+    if target_seen is None or session.state.choice is None:
         return []
-    return [seen.grasp_pose(*session.state.choice)]
+    return [target_seen.grasp_pose(*session.state.choice)]
 
 
 def _objects(session: Session) -> Sequence[pin.SE3]:

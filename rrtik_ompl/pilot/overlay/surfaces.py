@@ -67,22 +67,24 @@ class ShapeSurfaces:
 
     def of(self, shape: Shape) -> Surface:
         """The surface of a bounded shape in the colour of obstacles."""
-        found = self._made.get(id(shape))
-        if found is None:
+        shape_and_surface = self._made.get(id(shape))
+        if shape_and_surface is None:
             if len(self._made) >= MAX_SHAPES:
                 self._made.clear()
-            found = self._made[id(shape)] = (
+            shape_and_surface = self._made[id(shape)] = (
                 shape,
                 surface_of_shape(shape, palette.OBSTACLE),
             )
-        return found[1]
+        return shape_and_surface[1]
 
 
 def obstacle_surfaces(obstacles: Sequence[Obstacle], made: ShapeSurfaces | None = None) -> tuple[Surface, ...]:
     """Bounded obstacles in the frame of the world, by surfaces that may be made already; half-spaces are left out."""
-    known = ShapeSurfaces() if made is None else made
-    bounded = [each for each in obstacles if each.shape.bounded]
-    return tuple(moved(known.of(each.shape), each.pose.rotation, each.pose.translation) for each in bounded)
+    surfaces = ShapeSurfaces() if made is None else made
+    bounded = [obstacle for obstacle in obstacles if obstacle.shape.bounded]
+    return tuple(
+        moved(surfaces.of(obstacle.shape), obstacle.pose.rotation, obstacle.pose.translation) for obstacle in bounded
+    )
 
 
 def moved(surface: Surface, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> Surface:
@@ -93,12 +95,12 @@ def moved(surface: Surface, rotation: NDArray[np.float64], translation: NDArray[
 
 def _link_surfaces(bodies: Sequence[object], triangles: int) -> tuple[Surface, ...]:
     counts = [int(b.geometry.num_tris) if is_mesh(b.geometry) else 0 for b in bodies]  # type: ignore[attr-defined]
-    found = []
+    surfaces = []
     for body, count in zip(bodies, counts, strict=True):
         surface = _link_surface(body, max(triangles * count // max(sum(counts), 1), 200))
         if surface is not None:
-            found.append(surface)
-    return tuple(found)
+            surfaces.append(surface)
+    return tuple(surfaces)
 
 
 def _link_surface(body: object, limit: int) -> Surface | None:
@@ -128,11 +130,11 @@ def _triangles(shape: Shape, limit: int) -> tuple[Matrix, Faces]:
 
 def _welded(vertices: Matrix, faces: Faces) -> tuple[Matrix, Faces]:
     """The same with vertices at one place made one, and without triangles that lose their area by that."""
-    _, first, index = np.unique(np.round(vertices, 12), axis=0, return_index=True, return_inverse=True)
-    merged = np.asarray(index).reshape(-1)[faces]
+    _, first_rows, merged_number = np.unique(np.round(vertices, 12), axis=0, return_index=True, return_inverse=True)
+    merged = np.asarray(merged_number).reshape(-1)[faces]
 
-    whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
-    return vertices[first], merged[whole].astype(np.int64)
+    has_area = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    return vertices[first_rows], merged[has_area].astype(np.int64)
 
 
 def _normals(vertices: Matrix, faces: Faces) -> Matrix:

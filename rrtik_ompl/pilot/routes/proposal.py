@@ -37,8 +37,8 @@ def propose(
         seed: Of the random numbers.
     """
     world = surroundings.world_at(q, target)
-    seen = None if target is None else surroundings.named(target)
-    if seen is None or lamp is None:
+    target_seen = None if target is None else surroundings.named(target)
+    if target_seen is None or lamp is None:
         if problem.goal.q is None:
             return NoRoute("choose an object and a grasp first")
         return route_to(world, q, np.array(problem.goal.q), rates, seed)
@@ -46,13 +46,13 @@ def propose(
         return NoRoute(lamp.reason)
 
     nearest_first = np.argsort(np.linalg.norm(joint_difference(problem.robot, lamp.grasps, q), axis=1), kind="stable")
-    stages = stage_poses(seen.T_base_object, seen.object.grasp(lamp.type), lamp.level)
+    stages = stage_poses(target_seen.T_base_object, target_seen.object.grasp(lamp.type), lamp.level)
 
-    holding = surroundings.holding(seen.object.name)
-    none = NoRoute(lamp.reason)
+    holding = surroundings.holding(target_seen.object.name)
+    reason_for_none = NoRoute(lamp.reason)
     for number, grasp in enumerate(lamp.grasps[nearest_first]):
-        found = route_to_grasp(world, holding, q, stages, grasp, rates, seed)
-        if isinstance(found, Route):
-            return found
-        none = found if number == 0 else none
-    return none
+        route = route_to_grasp(world, holding, q, stages, grasp, rates, seed)
+        if isinstance(route, Route):
+            return route
+        reason_for_none = route if number == 0 else reason_for_none
+    return reason_for_none

@@ -52,25 +52,25 @@ class Chessboard:
         """Points on the board [m], shape (k, 3), and their pixels, shape (k, 2); none if the board is not found."""
         pattern = (self.columns - 1, self.rows - 1)
         try:
-            found, pixels = cv2.findChessboardCornersSB(gray, pattern, flags=cv2.CALIB_CB_ACCURACY)
+            is_found, pixels = cv2.findChessboardCornersSB(gray, pattern, flags=cv2.CALIB_CB_ACCURACY)
         except cv2.error:  # its copies take more memory than there is
             size = " x ".join(map(str, gray.shape[::-1]))
             raise InputError(f"a picture of {size} pixels is too large to find a chessboard in; scale it") from None
 
-        if not found or pixels is None:
+        if not is_found or pixels is None:
             return np.zeros((0, 3)), np.zeros((0, 2))
 
-        found_at = np.reshape(pixels, (-1, 2)).astype(np.float64)
-        if (self.columns + self.rows) % 2 == 1 and self._first_is_white(gray, found_at):
-            found_at = found_at[::-1].copy()
-        return self.points, found_at
+        corner_pixels = np.reshape(pixels, (-1, 2)).astype(np.float64)
+        if (self.columns + self.rows) % 2 == 1 and self._first_is_white(gray, corner_pixels):
+            corner_pixels = corner_pixels[::-1].copy()
+        return self.points, corner_pixels
 
     def _first_is_white(self, gray: NDArray[np.uint8], pixels: Matrix) -> bool:
         """Whether the square after the first corner is white: lighter than its neighbour."""
         grid = pixels.reshape(self.rows - 1, self.columns - 1, 2)
         middles = [np.rint(grid[:2, k : k + 2].reshape(4, 2).mean(axis=0)).astype(int) for k in (0, 1)]
-        here, beside = (int(gray[down, across]) for across, down in middles)
-        return here > beside
+        first, neighbour = (int(gray[down, across]) for across, down in middles)
+        return first > neighbour
 
     def pieces(self, gray: NDArray[np.uint8], pixels: Matrix) -> Iterator[tuple[Matrix, NDArray[np.uint8]]]:
         """Pieces of the board, each of `PIECE` squares or fewer a side, without gaps and none over another.
@@ -86,15 +86,15 @@ class Chessboard:
         side = min(PIECE, self.columns - 2, self.rows - 2)
         for row in range(0, self.rows - 1 - side, side):
             for column in range(0, self.columns - 1 - side, side):
-                ends = (row, column), (row, column + side), (row + side, column + side), (row + side, column)
-                odd = np.indices((side + 2, side + 2)).sum(axis=0) % 2 == 1
+                end_cells = (row, column), (row, column + side), (row + side, column + side), (row + side, column)
+                is_odd = np.indices((side + 2, side + 2)).sum(axis=0) % 2 == 1
                 middles = 0.25 * sum(
                     grid[row + a : row + a + side, column + b : column + b + side] for a in (0, 1) for b in (0, 1)
                 )
 
                 # Which colour comes first is told by the picture.
                 across, down = np.rint(middles).astype(np.intp).reshape(-1, 2).T
-                seen = gray[down, across]
-                inner = odd[1:-1, 1:-1].ravel()
-                white = odd == bool(seen[inner].mean() > seen[~inner].mean())
-                yield np.array([grid[end] for end in ends]), np.where(white, 255, 0).astype(np.uint8)
+                grey_values = gray[down, across]
+                inner = is_odd[1:-1, 1:-1].ravel()
+                is_white = is_odd == bool(grey_values[inner].mean() > grey_values[~inner].mean())
+                yield np.array([grid[end] for end in end_cells]), np.where(is_white, 255, 0).astype(np.uint8)
