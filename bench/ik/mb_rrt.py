@@ -14,9 +14,9 @@ from bench.shared.clocks import least
 from bench.shared.run import Run
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
-from rrtik_ompl.ik.mb_rrt.arc import arc_chains, grow_on_arcs
-from rrtik_ompl.ik.mb_rrt.growth import grow
+from rrtik_ompl.ik.mb_rrt.exact import arc_chains, grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, sunflower
+from rrtik_ompl.ik.mb_rrt.published import grow
 from rrtik_ompl.viewer.plots.mb_rrt_tree import plot_tree
 
 TIGHT = 1e-3  # [cm]

@@ -10,8 +10,8 @@ from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.ik.mb_rrt.aims import tree_aims
 from rrtik_ompl.ik.mb_rrt.axes import misfit
+from rrtik_ompl.ik.mb_rrt.search import tree_aims
 from rrtik_ompl.model.goal import Goal, TipGoal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world.world import World

@@ -97,13 +97,14 @@ def _genetic(request: IkRequest) -> IkResponse:
 
 
 def _mb_rrt_misfit(robot: Robot, target: Target) -> str:
-    from rrtik_ompl.ik.mb_rrt.method import mb_rrt_misfit
+    from rrtik_ompl.ik.mb_rrt.axes import misfit
 
-    return mb_rrt_misfit(robot, target)
+    del target
+    return misfit(robot)
 
 
 def _mb_rrt(request: IkRequest) -> IkResponse:
-    from rrtik_ompl.ik.mb_rrt.method import mb_rrt
+    from rrtik_ompl.ik.mb_rrt.search import mb_rrt
 
     return mb_rrt(request)
 

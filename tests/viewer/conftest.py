@@ -10,8 +10,8 @@ import pytest
 
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links
+from rrtik_ompl.ik.mb_rrt.published import grow
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere

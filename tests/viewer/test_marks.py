@@ -8,8 +8,8 @@ import pytest
 
 from rrtik_ompl import Scene, load_robot, view
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.ik.mb_rrt.growth import grow
 from rrtik_ompl.ik.mb_rrt.links import Links
+from rrtik_ompl.ik.mb_rrt.published import grow
 from rrtik_ompl.viewer.drawing.marks import balls, tubes
 from rrtik_ompl.viewer.drawing.tree_marks import tree_marks
 from rrtik_ompl.viewer.page import page

@@ -9,10 +9,8 @@ import numpy as np
 from rrtik_bench.mb_rrt.runs import GOALS, PRECISION, arm, precise
 from rrtik_bench.report.figures import Figure
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.ik.mb_rrt.c_space import grow_in_joint_space
-from rrtik_ompl.ik.mb_rrt.growth import grow, one_link
 from rrtik_ompl.ik.mb_rrt.links import Links, sunflower
-from rrtik_ompl.ik.mb_rrt.variants import projected, square, surface
+from rrtik_ompl.ik.mb_rrt.published import grow, grow_in_joint_space, one_link, projected, square, surface
 from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, sunflower
-from rrtik_ompl.ik.mb_rrt.variants import Draw, projected, square, square_then_goal, surface
+from rrtik_ompl.ik.mb_rrt.published import Draw, projected, square, square_then_goal, surface
 
 SOURCE = "[3, section 2.1 and future work]"
 RING = 35.0 * np.array([[np.cos(a), np.sin(a)] for a in 2.0 * np.pi * np.arange(7) / 7.0])  # centres of discs [cm]

@@ -8,11 +8,8 @@ from multiprocessing import Pool
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.ik.mb_rrt.c_space import grow_in_joint_space
-from rrtik_ompl.ik.mb_rrt.growth import grow, one_link
 from rrtik_ompl.ik.mb_rrt.links import Links, sunflower
-from rrtik_ompl.ik.mb_rrt.run import TreeSearch, first_hit
-from rrtik_ompl.ik.mb_rrt.variants import surface
+from rrtik_ompl.ik.mb_rrt.published import TreeSearch, first_hit, grow, grow_in_joint_space, one_link, surface
 
 C_SPACE = "c-space"
 NAMES = {

@@ -8,18 +8,25 @@ polished by Levenberg-Marquardt.
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.base.errors import DescriptionWarning
 from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of, misfit
-from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
 from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.numeric.descent import descend
-from rrtik_ompl.model.goal import Target
+from rrtik_ompl.ik.numeric.restarts import nearest_posture
+from rrtik_ompl.ik.targets import targets
+from rrtik_ompl.model.goal import Target, TipGoal, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits, poses
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.world import World
 
 WIDTH = 16  # passes at a time
@@ -27,6 +34,67 @@ MAX_ROUNDS = 64  # after which it gives up
 FIRST_STEPS = 12  # of the polish, after which most branches that get to the goal at all are there
 POLISHED = 0.1  # of the tolerances, within which few steps have brought a branch to the goal
 POSTURE_ONLY_ROUNDS = 2  # that check whole postures alone; where free ones are common, that is faster
+ROUNDS_FOR_ALL = 8  # of the workspace tree if every solution is requested
+DRAWS = 16  # targets of a planner's goal that leaves freedom
+MAX_CONFIGURATIONS = 16  # that a planner gets
+
+
+def mb_rrt(request: IkRequest) -> IkResponse:
+    """A tree in the workspace for one target after the other, until a solution will do."""
+    robot = request.robot
+    count = len(request.targets)
+    rows = np.zeros((0, robot.dof))
+    passes = 0
+    for target in request.targets:
+        found = search(
+            robot,
+            target,
+            near=request.near,
+            accept=request.accept,
+            rng=request.rng,
+            deadline=request.deadline,
+            world=request.world,
+            collect_all=request.all,
+            rounds=max(1, (ROUNDS_FOR_ALL if request.all else MAX_ROUNDS) // count),
+        )
+        rows = np.vstack([rows, found.q])
+        passes += found.passes
+        if found.timed_out or (request.accept(found.q).any() and not request.all):
+            break
+    return IkResponse(rows, request.near if len(rows) else nearest_posture(request), passes, found.timed_out)
+
+
+def tree_aims(world: World, goal: TipGoal, near: Vector, rng: np.random.Generator, *, seconds: float) -> Matrix:
+    """Free configurations at a goal, nearest to a posture first.
+
+    Args:
+        world: The robot, which `rrtik_ompl.ik.mb_rrt.axes.misfit` accepts, and its scene.
+        goal: A goal of the tip.
+        near: Shape (dof,).
+        rng: Random numbers.
+        seconds: Time limit.
+
+    Returns:
+        Shape (k, dof), k <= `MAX_CONFIGURATIONS`, none if none was found in time.
+    """
+    deadline = time.monotonic() + seconds
+    robot = world.robot
+    rows = np.zeros((0, robot.dof))
+
+    def accept(Q: Matrix) -> Mask:
+        return world.valid_batch(robot.clamp(Q))
+
+    for target in targets(goal, DRAWS, rng):
+        found = search(robot, target, near=near, accept=accept, rng=rng, deadline=deadline, world=world)
+        rows = np.vstack([rows, robot.clamp(found.q)])
+        rows = rows[goal.satisfied(robot, rows) & world.valid_batch(rows)] if len(rows) else rows
+        if found.timed_out or len(rows) >= MAX_CONFIGURATIONS:
+            break
+
+    differences = joint_difference(robot, rows, near)
+    order = np.argsort(np.linalg.norm(differences, axis=1), kind="stable")[:MAX_CONFIGURATIONS]
+    nearest: Matrix = np.where(robot.continuous, near + differences[order], rows[order])
+    return nearest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,3 +210,63 @@ def _last_turned(robot: Robot, axes: Axes, target: Target, ends: Matrix) -> Matr
     turn += TAU * np.ceil((axes.lower[-1] - turn) / TAU - 1e-9)  # the first full turn inside the limits
     angles[:, joint] = np.clip(turn, axes.lower[-1], axes.upper[-1]) - axes.offset[-1]
     return angles
+
+
+class LinkWorlds:
+    """Checks by World the links up to one joint, with all that they hold.
+
+    Args:
+        world: The whole arm and its scene.
+        axes: Its joints, base first.
+    """
+
+    def __init__(self, world: World, axes: Axes) -> None:
+        self._world = world
+        order = _joint_order(world.robot, axes)
+        self._worlds = [_first_links(world, set(order[level + 1 :])) for level in range(len(order) - 1)] + [world]
+
+    def free(self, level: int, q: Matrix) -> Mask:
+        """Which rows, shape (m, dof), are free as far as the link of a level."""
+        return self._worlds[level].valid_batch(self._world.robot.clamp(q))
+
+
+def _joint_order(robot: Robot, axes: Axes) -> list[int]:
+    """Pinocchio's numbers of the joints that move the tip, base first."""
+    number = int(robot.model.frames[robot.model.getFrameId(robot.tip)].parentJoint)
+    numbers: list[int] = []
+    while number > 0:
+        numbers.insert(0, number)
+        number = int(robot.model.parents[number])
+    return numbers[-axes.count :]
+
+
+def _first_links(world: World, later: set[int]) -> World:
+    """The world without the bodies that one of the ``later`` joints moves."""
+    robot = world.robot
+    scene = world.scene
+    early_geometry: Any = pin.GeometryModel()
+    for item in robot.collision.geometryObjects:
+        if not _moves(robot, item.parentJoint, later):
+            early_geometry.addGeometryObject(item)
+
+    early_attached = tuple(item for item in scene.attached if not _moves(robot, _joint(robot, item.link), later))
+    names = {*(each.name for each in scene.obstacles), *(each.name for each in early_attached), *robot.link_names}
+    allowed = tuple(pair for pair in scene.allowed_collisions if set(pair) <= names)
+    early_scene = Scene(scene.obstacles, attached=early_attached, allowed_collisions=allowed)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DescriptionWarning)  # said where the whole world was made
+        return world.unheld.with_settings(robot=replace(robot, collision=early_geometry), scene=early_scene)
+
+
+def _moves(robot: Robot, joint: int, later: set[int]) -> bool:
+    """Whether a joint is one of the ``later`` ones, by Pinocchio's numbers, or hangs on one of them."""
+    while joint > 0:
+        if joint in later:
+            return True
+        joint = int(robot.model.parents[joint])
+    return False
+
+
+def _joint(robot: Robot, link: str) -> int:
+    return int(robot.model.frames[robot.model.getFrameId(link, pin.FrameType.BODY)].parentJoint)

@@ -6,7 +6,7 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import require
-from rrtik_ompl.ik.mb_rrt.run import TreeSearch
+from rrtik_ompl.ik.mb_rrt.published import TreeSearch
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.marks import Mark, balls, tubes
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.files.text import known_ending
-from rrtik_ompl.ik.mb_rrt.run import TreeSearch
+from rrtik_ompl.ik.mb_rrt.published import TreeSearch
 from rrtik_ompl.viewer.plots.joints import COLORS, FORMATS, save_figure, tidy
 
 if TYPE_CHECKING:

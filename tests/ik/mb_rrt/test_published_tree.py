@@ -6,12 +6,18 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.ik.mb_rrt.arc import arc_chains, grow_on_arcs
-from rrtik_ompl.ik.mb_rrt.c_space import grow_in_joint_space
-from rrtik_ompl.ik.mb_rrt.closing import grow_and_close
-from rrtik_ompl.ik.mb_rrt.growth import best_parents, grow, one_link
+from rrtik_ompl.ik.mb_rrt.exact import arc_chains, grow_and_close, grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, headings_to_joints, joints_to_chain, sunflower
-from rrtik_ompl.ik.mb_rrt.variants import VARIANTS, nearest, one_link_away, surface
+from rrtik_ompl.ik.mb_rrt.published import (
+    VARIANTS,
+    best_parents,
+    grow,
+    grow_in_joint_space,
+    nearest,
+    one_link,
+    one_link_away,
+    surface,
+)
 from rrtik_ompl.viewer.plots.mb_rrt_tree import plot_tree
 
 THREE, TEN = Links([10.0] * 3), Links([10.0] * 10)

@@ -10,10 +10,8 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.ik.mb_rrt.axes import axes_of
-from rrtik_ompl.ik.mb_rrt.axis_rule_b import grow_by_rule_b
-from rrtik_ompl.ik.mb_rrt.link_worlds import LinkWorlds
-from rrtik_ompl.ik.mb_rrt.search import search
-from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
+from rrtik_ompl.ik.mb_rrt.search import LinkWorlds, search
+from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree, grow_by_rule_b
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.shapes import Cylinder
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information

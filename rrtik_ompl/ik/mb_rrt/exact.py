@@ -1,8 +1,12 @@
-"""Sampling on the arc of intersection: every node inside its solution region, every pass exactly at the goal.
+"""Trees of free links that end exactly on the goal: grown on arcs of intersection, or the last two links closed.
 
-[3] proposes it and leaves it open. A node is useful if and only if the rest of the chain can span its
-distance from the goal, ``min_span[i] <= |x - g| <= max_span[i]``. By the law of cosines that is an interval of the
-cosine of the angle between the edge and the direction to the goal, in the plane and in space alike.
+[3] proposes the arcs and leaves them open. A node is useful if and only if the rest of the chain can span its distance
+from the goal, ``min_span[i] <= |x - g| <= max_span[i]``. By the law of cosines that is an interval of the cosine of the
+angle between the edge and the direction to the goal, in the plane and in space alike: every node is inside its
+solution region, every pass ends at the goal.
+
+Or a tree in the plane grows by surface sampling and rule B up to index n - 2, and the elbow of the last two links is
+where the two circles about node and goal meet.
 """
 
 from __future__ import annotations
@@ -11,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.mb_rrt.links import Links, directions
-from rrtik_ompl.ik.mb_rrt.run import TreeSearch
+from rrtik_ompl.ik.mb_rrt.published import PASSES, TreeSearch, best_parents, one_link, one_link_away, surface
 
 MIN_DISTANCE = 1e-150  # a direction over a shorter distance loses digits: squares smaller than 1e-300 vanish
 
@@ -99,3 +104,67 @@ def _perpendicular(axis: Matrix, rng: np.random.Generator) -> Matrix:
     turn = rng.uniform(-np.pi, np.pi, len(axis))[:, None]
     perpendicular: Matrix = np.cos(turn) * first + np.sin(turn) * second
     return perpendicular
+
+
+def grow_and_close(
+    links: Links, goal: ArrayLike, *, rng: np.random.Generator, passes: int = PASSES
+) -> tuple[Matrix | None, int]:
+    """Grow until the last two links reach from a new node to the goal.
+
+    Args:
+        links: A planar chain of at least two links.
+        goal: Shape (2,).
+        rng: Random numbers.
+        passes: Limit.
+
+    Returns:
+        The chain of nodes, shape (n + 1, 2), or None; and the number of passes done.
+
+    Raises:
+        InputError: If the goal is out of reach, or the chain is of another kind.
+    """
+    target = links.reachable(goal)
+    if links.dimension != 2 or links.count < 2:
+        raise InputError("closing the last two links needs a planar chain of at least two")
+
+    levels: list[list[Vector]] = [[np.zeros(2)]] + [[] for _ in range(links.count - 2)]
+    parents: list[list[int]] = [[] for _ in range(links.count - 2)]
+
+    for done in range(1, passes + 1):
+        for index in range(1, links.count - 1):
+            sample = surface(links, target, index, 1, rng)
+            length = float(links.lengths[index - 1])
+            before = np.array(levels[index - 1])
+            chosen = best_parents(before, sample, length, one_link_away)
+            levels[index].append(one_link(before[chosen], sample, length, rng)[0])
+            parents[index - 1].append(int(chosen[0]))
+
+        elbow = _elbow(levels[-1][-1], target, float(links.lengths[-2]), float(links.lengths[-1]), rng)
+        if elbow is not None:
+            return np.array([*_walk(levels, parents), elbow, target]), done
+
+    return None, passes
+
+
+def _elbow(node: Vector, goal: Vector, first: float, second: float, rng: np.random.Generator) -> Vector | None:
+    """A point ``first`` away from the node and ``second`` from the goal, on a random side; None if there is none."""
+    towards = goal - node
+    distance = float(np.linalg.norm(towards))
+    if not abs(first - second) <= distance <= first + second or distance == 0.0:
+        return None
+
+    along = (distance**2 + first**2 - second**2) / (2.0 * distance)
+    across = rng.choice([-1.0, 1.0]) * np.sqrt(max(first**2 - along**2, 0.0))
+    unit = towards / distance
+    elbow: Vector = node + along * unit + across * np.array([-unit[1], unit[0]])
+    return elbow
+
+
+def _walk(levels: list[list[Vector]], parents: list[list[int]]) -> list[Vector]:
+    """Nodes from the base to the newest of the last level."""
+    row = len(levels[-1]) - 1
+    found = []
+    for index in range(len(levels) - 1, 0, -1):
+        found.append(levels[index][row])
+        row = parents[index - 1][row]
+    return [levels[0][0], *reversed(found)]
