@@ -166,7 +166,7 @@ def test_what_a_page_links_to_is_there(page):
     assert [file for file in files if not (PLACES[page] / file).exists()] == []
 
 
-@pytest.mark.parametrize("page", ["ARCHITECTURE", "CONTRIBUTING"])
+@pytest.mark.parametrize("page", ["ARCHITECTURE", "CONTRIBUTING", "REFERENCES"])
 def test_the_files_and_folders_that_a_page_names_are_there(page):
     named = {word for span in re.findall(r"`([^`\n]+)`", _prose(page)) for word in span.split()}
     named = {name for name in named if re.fullmatch(r"[\w/.-]+(\.py|\.js|/)", name) and not name.startswith(".")}
