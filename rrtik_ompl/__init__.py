@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from rrtik_ompl.description.catalog import list_problems as list_problems
     from rrtik_ompl.description.catalog import list_robots as list_robots
     from rrtik_ompl.description.catalog import load_robot as load_robot
-    from rrtik_ompl.description.joint_ranges import narrowed as narrowed
-    from rrtik_ompl.description.joint_weights import weighted as weighted
-    from rrtik_ompl.description.padding import padded as padded
-    from rrtik_ompl.description.scaling import scaled as scaled
     from rrtik_ompl.description.shapes.cloud import load_cloud as load_cloud
     from rrtik_ompl.description.shapes.cloud import save_cloud as save_cloud
     from rrtik_ompl.description.shapes.heights import load_height_field as load_height_field
     from rrtik_ompl.description.shapes.mesh import load_mesh as load_mesh
     from rrtik_ompl.description.shapes.octree import load_octree as load_octree
+    from rrtik_ompl.description.variants import narrowed as narrowed
+    from rrtik_ompl.description.variants import padded as padded
+    from rrtik_ompl.description.variants import scaled as scaled
+    from rrtik_ompl.description.variants import weighted as weighted
     from rrtik_ompl.ik.batch import IkBatch as IkBatch
     from rrtik_ompl.ik.batch import solve_ik_batch as solve_ik_batch
     from rrtik_ompl.ik.reach.grid_map import ReachMap as ReachMap
@@ -142,10 +142,7 @@ else:
         "model.certificate": ("Certificate", "load_certificate"),
         "world.certificates.checked": ("verify_certificate",),
         "world.certificates.write": ("certificate_of",),
-        "description.joint_ranges": ("narrowed",),
-        "description.joint_weights": ("weighted",),
-        "description.padding": ("padded",),
-        "description.scaling": ("scaled",),
+        "description.variants": ("narrowed", "padded", "scaled", "weighted"),
         "constraints.shorthands": ("inside", "on_line", "on_plane", "orientation_of", "upright"),
         "base.errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
         "motion.following.follower": ("Followed", "Follower"),

@@ -13,6 +13,8 @@ from __future__ import annotations
 import inspect
 import json
 import os
+import threading
+from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -25,13 +27,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError
-from rrtik_ompl.description.joint_ranges import narrowed
-from rrtik_ompl.description.joint_weights import weighted
-from rrtik_ompl.description.padding import padded
-from rrtik_ompl.description.robot_cache import RobotCache
 from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
-from rrtik_ompl.description.scaling import scaled
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
+from rrtik_ompl.description.variants import narrowed, padded, scaled, weighted
 from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.robot import Robot
@@ -54,9 +52,8 @@ COMMON_OPTIONS: Mapping[str, Callable[..., Robot]] = {  # of any robot, each wit
     "joint_ranges": narrowed,
     "joint_weights": weighted,
 }
+CACHED_ROBOTS = 64
 MOUNTING = ("base_pose", "tip", *COMMON_OPTIONS)  # keys that stand beside that group
-
-_cache = RobotCache()
 
 
 def list_robots() -> tuple[str, ...]:
@@ -245,6 +242,50 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
     if path.parent != Path() or os.path.exists(path):  # which takes a name of any length
         raise InputError(f"{text}: not a robot file; expected a URDF (.urdf, .xacro), a DH table (.yaml) or a folder")
     raise UnknownNameError("robot", text, list_robots())
+
+
+_Stamp = tuple[str, int, int]  # of a file: its path, time and size
+
+
+class _RobotCache:
+    """The robots loaded last, each with the size and time of the files it came from."""
+
+    def __init__(self) -> None:
+        self._robots: OrderedDict[str, tuple[Robot, tuple[_Stamp, ...]]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, key: str) -> Robot | None:
+        """The robot kept under ``key``, unless a file of it has changed since."""
+        with self._lock:
+            found = self._robots.get(key)
+            if found is None or _stamps(path for path, _, _ in found[1]) != found[1]:
+                return None
+            self._robots.move_to_end(key)
+            return found[0]
+
+    def put(self, key: str, robot: Robot, files: Iterable[str]) -> Robot:
+        """Keep a robot that was made from ``files`` (and from the meshes that it names); returns it."""
+        meshes = (solid.meshPath for solid in robot.collision.geometryObjects)
+        stamps = _stamps({*files, *meshes, *getattr(robot.looks, "files", ())})
+        with self._lock:
+            self._robots[key] = (robot, stamps)
+            if len(self._robots) > CACHED_ROBOTS:
+                self._robots.popitem(last=False)
+        return robot
+
+
+def _stamps(paths: Iterable[str]) -> tuple[_Stamp, ...]:
+    found = []
+    for path in sorted(paths):
+        try:
+            state = os.stat(path)
+        except (OSError, ValueError):  # a name, or a file that is gone: then the next load says so
+            continue
+        found.append((path, state.st_mtime_ns, state.st_size))
+    return tuple(found)
+
+
+_cache = _RobotCache()
 
 
 def _absolute(key: str, value: object) -> object:

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import coal
+import pinocchio as pin
 
 from rrtik_ompl.base.arrays import finite_number
 from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.robot_build import Mimic
+from rrtik_ompl.description.srdf import Srdf
+from rrtik_ompl.description.tree import Tree
+from rrtik_ompl.description.tree_model import build_models
 
 STATES = ("open", "closed")
+NAMES = {"open": ("open", "opened"), "closed": ("closed", "close")}  # of states, in lower case
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,3 +71,86 @@ class GripperJoints:
         share = wanted / self.width
         values = (shut + share * (wide - shut) for shut, wide in zip(self.closed, self.opened, strict=True))
         return dict(zip(self.joints, values, strict=True))
+
+
+def srdf_gripper(semantics: Srdf, tree: Tree, mimics: Iterable[Mimic], actuated: Iterable[str]) -> GripperJoints | None:
+    """The gripper at the end of the actuated joints, if there is one and no more.
+
+    Its width is how much farther its fingers' solids are apart where it is open than where it is closed.
+    """
+    mimics_read = tuple(mimics)
+    arm = set(actuated)
+    followers = {tie.joint for tie in mimics_read}
+    gripper_by_joints: dict[tuple[str, ...], GripperJoints] = {}
+
+    for end in semantics.end_effectors:
+        if end.group not in semantics.groups or not _carries(tree, end.parent_link, arm):
+            continue
+        try:
+            joints = tuple(joint for joint in semantics.movable(end.group, tree) if joint not in followers)
+        except InputError:  # an SRDF for several forms of a robot, of which this one has no such hand
+            continue
+
+        states = [_named_state(semantics, end.group, joints, names) for names in NAMES.values()]
+        if joints and not arm & set(joints) and None not in states:
+            opened, closed = (dict(zip(joints, state or (), strict=True)) for state in states)
+            width = max(_finger_distance(tree, mimics_read, opened) - _finger_distance(tree, mimics_read, closed), 0.0)
+            gripper_by_joints[joints] = GripperJoints(joints, tuple(opened.values()), tuple(closed.values()), width)
+
+    return next(iter(gripper_by_joints.values())) if len(gripper_by_joints) == 1 else None
+
+
+def _carries(tree: Tree, link: str, arm: set[str]) -> bool:
+    """Whether a link is there and any of some joints moves it."""
+    return any(link == candidate.name for candidate in tree.links) and any(
+        joint.name in arm for joint in tree.chain(link)
+    )
+
+
+def _named_state(
+    semantics: Srdf, group: str, joints: tuple[str, ...], names: tuple[str, ...]
+) -> tuple[float, ...] | None:
+    """Values of the joints in the state of a group that has one of the names, or the only one with a name inside its.
+
+    A state that does not have all joints counts for none.
+    """
+    complete_states = {
+        state.lower(): values
+        for (owner, state), values in semantics.states.items()
+        if owner == group and all(joint in values for joint in joints)
+    }
+    similar_names = [state for state in complete_states if names[-1] in state or names[0] in state]
+    state = next(
+        (name for name in names if name in complete_states), similar_names[0] if len(similar_names) == 1 else None
+    )
+    return None if state is None else tuple(complete_states[state][joint] for joint in joints)
+
+
+def _finger_distance(tree: Tree, mimics: tuple[Mimic, ...], values: Mapping[str, float]) -> float:
+    """Least distance of the solids of different fingers where the gripper's joints have values [m]; 0 if unknown."""
+    joint_values = dict(values) | {
+        tie.joint: tie.multiplier * values[tie.source] + tie.offset for tie in mimics if tie.source in values
+    }
+
+    carrying_joint: dict[str, str] = {}  # for each link of a finger the joint that carries the finger
+    for joint in tree.walk():
+        if joint.parent in carrying_joint or joint.name in joint_values:
+            carrying_joint[joint.child] = carrying_joint.get(joint.parent, joint.name)
+
+    links = [link if link.name in carrying_joint else replace(link, collision=()) for link in tree.links]
+    fingers_only = Tree(tree.where, links, tree.joints)
+    all_values = {joint.name: joint_values.get(joint.name, 0.0) for joint in tree.joints if joint.moves}
+    model, solids, _ = build_models(fingers_only.hold(all_values))
+
+    fingers: dict[str, list[Any]] = {}
+    for solid in solids.geometryObjects:
+        fingers.setdefault(carrying_joint[model.frames[solid.parentFrame].name], []).append(solid)
+
+    pairs = [(a, b) for first, second in combinations(fingers.values(), 2) for a in first for b in second]
+    return max(min((_distance(a, b) for a, b in pairs), default=0.0), 0.0)
+
+
+def _distance(first: pin.GeometryObject, second: pin.GeometryObject) -> float:
+    poses = [coal.Transform3s(each.placement.rotation, each.placement.translation) for each in (first, second)]
+    result = coal.DistanceResult()
+    return float(coal.distance(first.geometry, poses[0], second.geometry, poses[1], coal.DistanceRequest(), result))

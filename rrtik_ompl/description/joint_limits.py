@@ -9,17 +9,16 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.base.errors import UnknownNameError, few
-from rrtik_ompl.description.robot_build import JointLimits
-from rrtik_ompl.description.ros_parameters import parameters
+from rrtik_ompl.description.robot_build import RATES, JointLimits
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe, read_yaml
 
-RATES = ("velocity", "acceleration", "jerk")
 _FLAGS = ("position", "velocity", "acceleration", "deceleration", "jerk", "effort", "soft")
 _NUMBERS = ("min_position", "max_position", "max_velocity", "max_acceleration", "max_jerk")
 _UNUSED = ("max_deceleration", "min_jerk", "max_effort", "angle_wraparound", "k_position", "k_velocity")
 _SOFT = ("soft_lower_limit", "soft_upper_limit")
 _NARROWING = {"max_deceleration": "deceleration", "min_jerk": "jerk", **dict.fromkeys(_SOFT, "soft")}  # of _UNUSED
 _KEYS = (*(f"has_{flag}_limits" for flag in _FLAGS), *_NUMBERS, *_UNUSED, *_SOFT)
+ROS = ("/**", "ros__parameters")  # around the parameters of a node of ROS 2
 
 
 def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> dict[str, JointLimits]:
@@ -93,3 +92,20 @@ def unread_limits(path: str | os.PathLike[str]) -> list[str]:
             if values.get(key) is not None and values.get(f"has_{flag}_limits") is not False:
                 joints_of_key.setdefault(key, []).append(f"'{joint}'")
     return [f"{key} of {few(joints, 3)}" for key, joints in joints_of_key.items()]
+
+
+def parameters(document: YamlDocument, name: str) -> tuple[Location, Mapping[str, Any]]:
+    """Where the parameters of a file stand, and what they are.
+
+    Args:
+        document: The file.
+        name: What they are called on ROS's parameter server, such as "robot_description_planning".
+    """
+    location: Location = ()
+    found: Mapping[str, Any] = document.data
+    for key in (*ROS, name):
+        below = found.get(key)
+        if isinstance(below, Mapping):
+            location = (*location, key)
+            found = below
+    return location, found

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.joint_limits import parameters
 from rrtik_ompl.description.package_path import package_folder
-from rrtik_ompl.description.ros_parameters import parameters
 from rrtik_ompl.description.srdf import Srdf, read_srdf
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf import URDF_OPTIONS, package_roots, robot_from_urdf

@@ -12,11 +12,10 @@ import numpy as np
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
-from rrtik_ompl.description.gripper import GripperJoints
+from rrtik_ompl.description.gripper import GripperJoints, srdf_gripper
 from rrtik_ompl.description.robot_build import JointLimits, build_robot, merge_limits
 from rrtik_ompl.description.robot_source import source_entry
 from rrtik_ompl.description.srdf import Srdf, read_srdf
-from rrtik_ompl.description.srdf_gripper import srdf_gripper
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.description.xacro_text import robot_text

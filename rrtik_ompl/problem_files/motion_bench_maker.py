@@ -15,9 +15,7 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError, UnknownNameError, few
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.faults import nearest_name
-from rrtik_ompl.description.joint_ranges import narrowed
-from rrtik_ompl.description.padding import padded
-from rrtik_ompl.description.scaling import scaled
+from rrtik_ompl.description.variants import narrowed, padded, scaled
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.model.goal import Goal, JointGoal

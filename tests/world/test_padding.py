@@ -10,7 +10,7 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.description.padding import padded
+from rrtik_ompl.description.variants import padded
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Sphere
 from rrtik_ompl.planning.plan import plan

@@ -9,8 +9,7 @@ from pathlib import Path
 from rrtik_ompl.base.errors import InputError, few
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
 from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits
-from rrtik_ompl.description.mjcf.bodies import WORLD
-from rrtik_ompl.description.mjcf.read import Mjcf, read_mjcf
+from rrtik_ompl.description.mjcf.read import WORLD, Mjcf, read_mjcf
 from rrtik_ompl.description.robot_build import build_robot
 from rrtik_ompl.description.robot_source import BasePose, source_entry
 from rrtik_ompl.description.urdf_read import located

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, product
 from pathlib import Path
@@ -11,11 +11,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.description.mjcf.bodies import WORLD, Body, joined_bodies, meet, solids_apart, touchable
-from rrtik_ompl.description.mjcf.geoms import OF_THE_SCENE, masks, meshes_of, solid_of
-from rrtik_ompl.description.mjcf.unread import unread_of_mjcf
-from rrtik_ompl.description.mjcf.values import MAIN, Settings
+from rrtik_ompl.base.errors import InputError, UnknownNameError, few
+from rrtik_ompl.description.mjcf.elements import MAIN, OF_THE_SCENE, Settings, masks, meshes_of, solid_of
 from rrtik_ompl.description.robot_build import Mimic
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.description.urdf_read import attribute, flattened, located, numbers, parse_xml
@@ -24,6 +21,12 @@ from rrtik_ompl.files.text import read_text
 MOST_FILES = 100  # that include each other
 UNREAD = ("composite", "flexcomp", "replicate", "attach", "frame")  # what makes bodies out of other bodies
 SIZES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}  # numbers of a joint in a keyframe
+WORLD = "world"
+HELD = ("free",)  # kinds of joints that are held still
+DEFORMABLE = ("flex", "flexcomp", "skin", "composite")
+OF_JOINTS = ("joint", "jointinparent")  # attributes of an actuator that name a joint
+
+Mask = tuple[int, int]  # contype and conaffinity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,6 +111,14 @@ def _include(root: Element, folder: Path) -> None:
             stack.append(element)
         else:
             stack += list(element)
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A body: the one that it hangs on, and the kinds of the joints between the two."""
+
+    parent: str
+    joints: tuple[str, ...]
 
 
 @dataclass(slots=True, eq=False)
@@ -282,3 +293,145 @@ def _keys(root: Element, reader: _Reader) -> dict[str, dict[str, float]]:
         }
         postures[key.get("name") or f"key{number}"] = values_by_joint
     return postures
+
+
+def meet(first: Mask, second: Mask) -> bool:
+    """Whether geoms with these masks may collide."""
+    return bool(first[0] & second[1] or second[0] & first[1])
+
+
+def solids_apart(masks: Mapping[str, Sequence[Mask]]) -> frozenset[frozenset[str]]:
+    """Pairs of solids whose masks do not meet.
+
+    Args:
+        masks: Of the solids of each body, in their order.
+    """
+    return frozenset(
+        frozenset((f"{first_body}_{i}", f"{second_body}_{j}"))
+        for (first_body, first_masks), (second_body, second_masks) in combinations(masks.items(), 2)
+        for (i, first_mask), (j, second_mask) in product(enumerate(first_masks), enumerate(second_masks))
+        if not meet(first_mask, second_mask)
+    )
+
+
+def joined_bodies(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
+    """Pairs of bodies that joints join, and what is welded to one of the two: neighbours, to MuJoCo.
+
+    Here each of several joints has a link of its own behind it, and what is welded to a link is another link.
+    """
+    rigid_parts: dict[str, list[str]] = {}
+    for name in bodies:
+        rigid_parts.setdefault(_carrier(name, bodies), []).append(name)
+    moving = [name for name, body in bodies.items() if _moving_joint_kinds(body)]
+    pairs = {
+        frozenset(pair)
+        for name in moving
+        for pair in product(rigid_parts[name], rigid_parts[_carrier(bodies[name].parent, bodies)])
+    }
+
+    return frozenset(pairs) - touchable(bodies)
+
+
+def touchable(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
+    """Pairs of bodies that may collide though one joint joins them: one stands still, the other moves.
+
+    Bodies that are welded to the world are no neighbours of others to MuJoCo. What is rigidly part of a free body is.
+    """
+    standing = [name for name in bodies if _carrier(name, bodies) == WORLD]
+    pairs = set()
+    for name in bodies:
+        base = bodies[_carrier(name, bodies)].parent
+        if base in standing:
+            base_anchor = _welded(base, bodies)
+            pairs |= {
+                frozenset((name, other))
+                for other in standing
+                if base_anchor == WORLD or _welded(other, bodies) != base_anchor
+            }
+    return frozenset(pairs)
+
+
+def _moving_joint_kinds(body: Body) -> tuple[str, ...]:
+    """Kinds of the joints that move a body against the one that it hangs on."""
+    return tuple(kind for kind in body.joints if kind not in HELD)
+
+
+def _ancestry(name: str, bodies: Mapping[str, Body]) -> Iterator[str]:
+    """A body, the one that it hangs on, and so on to the world."""
+    while name:
+        yield name
+        name = bodies[name].parent
+
+
+def _carrier(name: str, bodies: Mapping[str, Body]) -> str:
+    """The nearest body towards the world, itself among them, that a joint moves; the world if there is none."""
+    return next((ancestor for ancestor in _ancestry(name, bodies) if _moving_joint_kinds(bodies[ancestor])), WORLD)
+
+
+def _welded(name: str, bodies: Mapping[str, Body]) -> str:
+    """As `_carrier`, where a free joint counts as one that moves."""
+    return next((ancestor for ancestor in _ancestry(name, bodies) if bodies[ancestor].joints), WORLD)
+
+
+def unread_of_mjcf(
+    root: Element, bodies: Mapping[str, Body], scenery: Sequence[str], joints: Collection[str]
+) -> Iterator[str]:
+    """What is left out, each kind of thing once, with the names of the first few.
+
+    Args:
+        root: Of the file.
+        bodies: By name.
+        scenery: Geoms that are left out.
+        joints: Names of all joints.
+    """
+    free = [name for name, body in bodies.items() if "free" in body.joints]
+    acting = [item for item in root.findall("actuator/*") if not any(item.get(key) in joints for key in OF_JOINTS)]
+    tendons = [item for item in root.findall("tendon/*") if item.get("range") or item.get("limited") == "true"]
+    kinds = {
+        "of the scene (add it as obstacles)": scenery,
+        "free bodies, held where they are:": _quoted(free),
+        "mocap bodies, held where they are:": _names(each for each in root.iter("body") if each.get("mocap") == "true"),
+        "loops, left open:": _loops(root),
+        "joints held by <equality>:": _held(root),
+        "actuators of no joint:": _names(acting),
+        "limits of tendons:": _names(tendons),
+        "pairs of <contact>:": _names(root.findall("contact/pair")),
+        "flags:": _flags(root),
+        "deformable bodies:": _names(item for tag in DEFORMABLE for item in root.iter(tag)),
+        "other files of <asset>:": _names(root.findall("asset/model")),
+    }
+    for kind, names in kinds.items():
+        if names:
+            yield f"{kind} {few(names)}"
+
+
+def _flags(root: Element) -> list[str]:
+    """Switches of what MuJoCo compares, where they do not have their usual position."""
+    flags = [flag for flag in root.findall("option/flag") if flag.get("filterparent") == "disable"]
+    return ["filterparent"] if flags else []
+
+
+def _quoted(names: Sequence[str]) -> list[str]:
+    return [f"'{name}'" for name in names]
+
+
+def _names(elements: Iterable[Element]) -> list[str]:
+    """How elements are called: by name, else by their tag."""
+    return [f"'{item.get('name') or item.tag}'" for item in elements]
+
+
+def _loops(root: Element) -> list[str]:
+    """Equalities that are in force, other than those of two joints, by kind and by what they tie together."""
+    found = []
+    for item in root.findall("equality/*"):
+        if item.tag == "joint" or item.get("active", "true") != "true":
+            continue
+        ends = [item.get(f"{kind}{number}") for kind in ("body", "site", "tendon") for number in (1, 2)]
+        found.append(f"{item.tag} of {' and '.join(repr(end) for end in ends if end) or item.get('name', '')}")
+    return found
+
+
+def _held(root: Element) -> list[str]:
+    """Joints that an equality in force holds at a value."""
+    ties = (item for item in root.findall("equality/joint") if item.get("active", "true") == "true")
+    return [f"'{item.get('joint1', '')}'" for item in ties if item.get("joint2") is None]

@@ -1,1 +1,0 @@
-"""What MoveIt says of a robot: SRDF, joint limits, configuration folders."""
