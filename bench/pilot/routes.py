@@ -15,10 +15,8 @@ from bench.shared.problems import goal_joints
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.devices.wrong_arm import Faults, WrongArm
-from rrtik_ompl.pilot.routes.clearance import executions, free_rows
-from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route, route_to
-from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS
+from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, NoRoute, executions, free_rows
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 

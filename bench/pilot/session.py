@@ -14,8 +14,7 @@ from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, RED, lamps, stage_poses
 from rrtik_ompl.pilot.routes.manoeuvre import check_move
-from rrtik_ompl.pilot.routes.proposal import propose
-from rrtik_ompl.pilot.routes.route import Route
+from rrtik_ompl.pilot.routes.route import Route, propose
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.surroundings import Surroundings
 

@@ -9,8 +9,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.pilot.interlock import STALE_SECONDS
-from rrtik_ompl.pilot.routes.follower import Follower
-from rrtik_ompl.pilot.routes.track import Track
+from rrtik_ompl.pilot.routes.follower import Follower, Track
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.planning.moves.text import spoken_moves
 from rrtik_ompl.sensing.scene_from_view import SeenObject

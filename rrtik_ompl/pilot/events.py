@@ -15,8 +15,8 @@ import pinocchio as pin
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.pilot.answers import Answer
 from rrtik_ompl.pilot.interlock import Sight
-from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route
+from rrtik_ompl.pilot.routes.route_search import NoRoute
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.world import World
 

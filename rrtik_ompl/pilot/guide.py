@@ -18,13 +18,10 @@ from rrtik_ompl.pilot.answers import alarm, news, refused
 from rrtik_ompl.pilot.events import FindRoute, Read, Stop
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED, Verb
 from rrtik_ompl.pilot.queries import grasp_fault, world_by_hand
-from rrtik_ompl.pilot.routes import track
-from rrtik_ompl.pilot.routes.follower import Follower, path_fault
+from rrtik_ompl.pilot.routes.follower import Follower, Track, path_fault
 from rrtik_ompl.pilot.routes.manoeuvre import escape_advice
-from rrtik_ompl.pilot.routes.no_route import NoRoute
-from rrtik_ompl.pilot.routes.proposal import propose
-from rrtik_ompl.pilot.routes.route import MAX_END_OFFSET, MAX_END_TURN, Route
-from rrtik_ompl.pilot.routes.track import Track
+from rrtik_ompl.pilot.routes.route import MAX_END_OFFSET, MAX_END_TURN, Route, all_at_once, propose
+from rrtik_ompl.pilot.routes.route_search import NoRoute
 from rrtik_ompl.pilot.state import Means, State, Way
 from rrtik_ompl.pilot.surroundings import MAX_SHIFT, MAX_TURN
 from rrtik_ompl.sensing.scene_from_view import SeenObject
@@ -90,7 +87,7 @@ def together(means: Means, state: State) -> State:
     if route.together:
         return proposed(means, state, list_of_moves, state.way.aimed)
 
-    search = partial(track.together, route, world_by_hand(state), means.rates, means.seed)
+    search = partial(all_at_once, route, world_by_hand(state), means.rates, means.seed)
     return state.do(FindRoute(search, _put_together))
 
 

@@ -28,11 +28,10 @@ from rrtik_ompl.pilot.machine import handle
 from rrtik_ompl.pilot.motion.leading import GraspServo
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
 from rrtik_ompl.pilot.records.record import Record
-from rrtik_ompl.pilot.routes.follower import Follower, Progress
+from rrtik_ompl.pilot.routes.follower import Follower, Progress, Track
 from rrtik_ompl.pilot.routes.lamps import Lamp
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange
 from rrtik_ompl.pilot.routes.route import Route
-from rrtik_ompl.pilot.routes.track import Track
 from rrtik_ompl.pilot.state import Means, State
 from rrtik_ompl.pilot.surroundings import Structure, Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject

@@ -15,9 +15,8 @@ from rrtik_ompl.pilot.drive import Drive, Press
 from rrtik_ompl.pilot.events import Effect, Stop
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.interlock import MANOEUVRE, Sight
-from rrtik_ompl.pilot.routes.follower import Follower, Progress
+from rrtik_ompl.pilot.routes.follower import Follower, Progress, Track
 from rrtik_ompl.pilot.routes.route import Route
-from rrtik_ompl.pilot.routes.track import Track
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.problem import Problem

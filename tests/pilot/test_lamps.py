@@ -8,8 +8,7 @@ from rrtik_ompl.base.poses import pose
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, RED, lamps, stage_poses
-from rrtik_ompl.pilot.routes.proposal import propose
-from rrtik_ompl.pilot.routes.route import Route
+from rrtik_ompl.pilot.routes.route import Route, propose
 from rrtik_ompl.pilot.surroundings import Surroundings, gripper_links
 from rrtik_tests.pilot_session import PLACE, PROBLEM, ROBOT, VALVE, WORLD, seen_at, session
 

@@ -8,8 +8,8 @@ from rrtik_ompl.base.poses import pose
 from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.routes.lamps import AMBER, GREEN, RED, STAGES, diagnose, lamps, stage_poses
-from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import route_to_grasp
+from rrtik_ompl.pilot.routes.route_search import NoRoute
 
 PROBLEM = load_problem("titan4_sdu")
 VEHICLE = load_vehicle(find_vehicle("titan4_sdu"))

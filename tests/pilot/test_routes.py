@@ -12,13 +12,10 @@ from rrtik_ompl.pilot.devices.arm import joint_rates
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.routes import route_search
 from rrtik_ompl.pilot.routes.approach import MAX_JOINTS, MAX_OFFSET, MAX_TILT, STANDOFF_FACTORS, approaches
-from rrtik_ompl.pilot.routes.clearance import executions, forgiving, free_rows
 from rrtik_ompl.pilot.routes.follower import slack
 from rrtik_ompl.pilot.routes.lamps import lamps, stage_poses
-from rrtik_ompl.pilot.routes.no_route import NoRoute
-from rrtik_ompl.pilot.routes.route import route_to, route_to_grasp
-from rrtik_ompl.pilot.routes.route_search import GraspRoute, RouteSearch
-from rrtik_ompl.pilot.routes.track import together
+from rrtik_ompl.pilot.routes.route import all_at_once, route_to, route_to_grasp
+from rrtik_ompl.pilot.routes.route_search import GraspRoute, NoRoute, RouteSearch, executions, forgiving, free_rows
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world import proof
@@ -162,7 +159,7 @@ def test_of_several_ways_one_that_forgives_errors_is_taken():
 @pytest.mark.parametrize(("kind", "level"), [("straight", 1), ("straight", 2), ("aslant", 2)])
 def test_a_route_is_as_far_from_everything_as_it_says_one_joint_at_a_time_and_all_at_once(kind, level):
     world, holding, _, route = grasp(kind, level)
-    for made in (route, together(route, world, RATES, 1)):
+    for made in (route, all_at_once(route, world, RATES, 1)):
         assert made.proven
         said = re.search(r"at least (\d+) mm away|less than 1 mm to spare", made.summary())
         assert 1e-3 * int(said[1] or 0) == pytest.approx(made.clearance)

@@ -20,8 +20,8 @@ from rrtik_ompl.pilot import guide
 from rrtik_ompl.pilot.answers import alarm, news, refused
 from rrtik_ompl.pilot.events import FindRoute, Grip, Stop
 from rrtik_ompl.pilot.interlock import BY_HAND, MANOEUVRE, ON_A_ROUTE, Verb
-from rrtik_ompl.pilot.routes.no_route import NoRoute
 from rrtik_ompl.pilot.routes.route import Route, route_to
+from rrtik_ompl.pilot.routes.route_search import NoRoute
 from rrtik_ompl.pilot.state import Gripper, Means, State
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject

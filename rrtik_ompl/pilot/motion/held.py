@@ -17,9 +17,8 @@ from rrtik_ompl.pilot.events import Give, SetPoint
 from rrtik_ompl.pilot.interlock import BY_HAND, FOLLOWING, ON_A_ROUTE, Verb
 from rrtik_ompl.pilot.motion.supervisor import FOLLOW_SECONDS, amount, slack_of
 from rrtik_ompl.pilot.queries import joint_range, out_of_view, world_by_hand
-from rrtik_ompl.pilot.routes.follower import MADE, Follower
+from rrtik_ompl.pilot.routes.follower import MADE, Follower, Track
 from rrtik_ompl.pilot.routes.manoeuvre import check_move, move_refusal, way_out
-from rrtik_ompl.pilot.routes.track import Track
 from rrtik_ompl.pilot.state import Means, State
 
 STUCK_SECONDS = 0.8  # an arm that comes no nearer to the end of a move for as long does not get there

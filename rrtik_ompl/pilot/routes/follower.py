@@ -1,6 +1,7 @@
-"""Following a list of single-joint moves: the next move, what remains of it, when to stop, when the arm is off it.
+"""Where the arm is on its route, what remains of it, when to stop, and when the arm is off it.
 
-Source: [1, ch. 6].
+A `Follower` tracks it along a list of single-joint moves, a `Track` along a path of all joints at once, for an arm
+under position control. Both are asked the same. Source: [1, ch. 6] (flow chart; comparison of the two).
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ MADE = np.deg2rad(0.005)  # [rad or m]; a move is made this close to its end: th
 TOLERANCE = np.deg2rad(1.0)  # [rad]; farther from its value a joint is off the route
 SLIDING_TOLERANCE = 0.002  # [m]
 REACTION_SECONDS = 0.3  # from the advice to stop until the pilot does
+AHEAD_SECONDS = 0.5  # within which an arm that moves all joints is looked for on its path
+PLACES = 51  # at which it is looked for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,6 +167,114 @@ class Follower:
         shown_planned, _ = reading(planned, joint_unit(self.path.prismatic[joint]))
         fault = f"{self.path.joint_names[joint]} is at {shown_value:.2f} {unit} instead of {shown_planned:.2f}"
         return Progress(self.current, 0.0, 0.0, "lost", fault)
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Tracks an arm along a path, as a value: `update` gives the next one.
+
+    Attributes:
+        path: The path.
+        rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
+        tolerance: Largest error of a joint [rad].
+        current: 0 until the end is reached, then 1.
+        at: Where on the path the arm is, in seconds from its start.
+    """
+
+    path: JointPath
+    rates: Vector
+    tolerance: float = TOLERANCE
+    current: int = 0
+    at: float = 0.0
+
+    @property
+    def moves(self) -> tuple[Move, ...]:
+        """None: it has no moves of single joints."""
+        return ()
+
+    @cached_property
+    def slack(self) -> Vector:
+        """How far each joint may be off the path, shape (dof,) [rad or m]."""
+        return slack(self.path, self.tolerance)
+
+    @cached_property
+    def _times(self) -> Vector:
+        """When the arm is at each waypoint if the slowest joint of each piece goes at its rate."""
+        times = (np.abs(np.diff(self.path.waypoints, axis=0)) / self.rates).max(axis=1)
+        return np.concatenate([[0.0], np.cumsum(times)])
+
+    @property
+    def seconds(self) -> float:
+        """That the whole path takes."""
+        return float(self._times[-1])
+
+    @property
+    def done(self) -> bool:
+        """Whether the end is reached."""
+        return self.current == 1
+
+    @property
+    def target(self) -> Vector:
+        """Where it ends. Shape (dof,)."""
+        return self.path.end
+
+    def joint(self) -> int | None:
+        """None: no single joint is due."""
+        return None
+
+    def update(self, q: Vector) -> tuple[Track, Progress]:
+        """The track with the place that an arm at q has reached, and the arm's progress."""
+        places = np.linspace(self.at, min(self.at + AHEAD_SECONDS, self.seconds), PLACES)
+        errors = np.abs(np.array([self._place(seconds) for seconds in places]) - q) / self.slack
+
+        nearest = int(errors.max(axis=1).argmin())
+        if errors[nearest].max() > 1.0:
+            return self, Progress(0, self.share, 0.0, "lost", self._fault(q, int(errors[nearest].argmax())))
+
+        if self.done or np.abs(q - self.path.end).max() <= MADE:
+            return replace(self, current=1, at=self.seconds), Progress(1, 1.0, 0.0, "done")
+
+        advanced = replace(self, at=float(places[nearest]))
+        return advanced, Progress(0, advanced.share, advanced.seconds - advanced.at, "move")
+
+    def ahead(self, seconds: float) -> Vector:
+        """The place on the path that is so much ahead of the arm. Shape (dof,)."""
+        return self._place(min(self.at + seconds, self.seconds))
+
+    def pass_on(self, q: Vector) -> tuple[Track, str, str]:
+        """There is no move that could be passed over.
+
+        Raises:
+            InputError: Always.
+        """
+        raise InputError("no move is due")
+
+    def rest(self, q: Vector) -> JointPath:
+        """What remains, from q."""
+        waypoints_ahead = self.path.waypoints[np.searchsorted(self._times, self.at, side="right") :]
+        return self.path.with_waypoints(
+            np.vstack([q, waypoints_ahead if len(waypoints_ahead) else self.path.end[None]])
+        )
+
+    def back(self, q: Vector) -> JointPath:
+        """The path back to the beginning."""
+        waypoints_behind = self.path.waypoints[: np.searchsorted(self._times, self.at, side="right")]
+        return self.path.with_waypoints(np.vstack([q, waypoints_behind[::-1]]))
+
+    def _place(self, seconds: float) -> Vector:
+        return np.array([np.interp(seconds, self._times, column) for column in self.path.waypoints.T])
+
+    @property
+    def share(self) -> float:
+        """Of the path that is behind the arm, 0 to 1."""
+        return self.at / self.seconds if self.seconds > 0.0 else 1.0
+
+    def _fault(self, q: Vector, joint: int) -> str:
+        unit = joint_unit(self.path.prismatic[joint])
+        (shown_value, unit_name), (shown_planned, _) = (
+            reading(float(row[joint]), unit) for row in (q, self._place(self.at))
+        )
+        return f"{self.path.joint_names[joint]} is at {shown_value:.2f} {unit_name} instead of {shown_planned:.2f}"
 
 
 def slack(path: JointPath, tolerance: float = TOLERANCE) -> Vector:

@@ -13,15 +13,16 @@ from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
+from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.pilot.routes.clearance import closest_pair
 from rrtik_ompl.pilot.routes.follower import slack
 from rrtik_ompl.world.world import World
 
 SINGULARITY_THRESHOLD = 0.05  # sine of an angle, or metres of a lever arm, that vanish in a singular posture
 CLEARANCE_WARNING = 0.02  # [m]; a smaller clearance is warned of
 CLEARANCE_SAMPLES = 20  # along a move
+CLEARANCE_ERROR = 0.002  # [m]; the least distance that is found is at most this much too large
 SINGULARITY_SAMPLES = 60  # along the range of a joint
 ESCAPE_STEPS = (1, 2, 3, 4, 6, 8)  # multiples of a small error, by which a joint is driven to get out of contact
 
@@ -253,6 +254,33 @@ def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
     value, unit = reading(float(first[joint]), joint_unit(world.robot.prismatic[joint]))
     why = world.explain(first) or "too close to tell"
     return f"{world.robot.joint_names[joint]} at {value:.3g} {unit}: {why}"
+
+
+def closest_pair(world: World, rows: Matrix) -> Contact | None:
+    """The pair that is nearest to its margin or to contact at some free configuration; None if nothing can collide.
+
+    Few rows have to be measured. The next one is that with the lowest bound from the rows before it: two bodies
+    approach each other by no more than twice the bound on the arm's displacement (``World.weights``).
+
+    Args:
+        world: Robot and surroundings.
+        rows: Configurations that are free, shape (m, dof), m > 0.
+    """
+    lower_bounds = np.full(len(rows), -np.inf)
+    best = None
+    while True:
+        row = int(np.argmin(lower_bounds))
+        if best is not None and lower_bounds[row] >= best.clearance - CLEARANCE_ERROR:
+            return best
+
+        closest = world.closest(rows[row], known_free=True)
+        if closest is None:
+            return None
+        if best is None or closest.clearance < best.clearance:
+            best = closest
+
+        lower_bounds = np.maximum(lower_bounds, closest.clearance - 2.0 * np.abs(rows - rows[row]) @ world.weights)
+        lower_bounds[row] = np.inf
 
 
 def _singular(world: World, q: Vector) -> list[str]:

@@ -1,12 +1,14 @@
 """Routes to a grasp, one joint at a time: to a configuration in front of the object, then on to the object.
 
-Source: [1, ch. 6]; a list of single-joint moves takes the place of RRT-Connect's path.
+`propose` leads to the grasp that is chosen, or else to the goal of the problem. The postures at the grasp are those of
+its lamp, so that a lamp promises what the search for a route begins with. `all_at_once` makes a
+path of all joints of a list of moves. Source: [1, ch. 6]; the list takes the place of RRT-Connect's path.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -15,18 +17,25 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import ProblemError
 from rrtik_ompl.base.poses import apart
 from rrtik_ompl.ik.batch import solve_ik_batch
+from rrtik_ompl.model.goal import joint_difference
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.pilot.routes.approach import approaches
-from rrtik_ompl.pilot.routes.moves import planned
-from rrtik_ompl.pilot.routes.no_route import NoRoute
-from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, RouteSearch, Tail
+from rrtik_ompl.pilot.routes.follower import Track
+from rrtik_ompl.pilot.routes.lamps import Lamp, stage_poses
+from rrtik_ompl.pilot.routes.route_search import MIN_ROBUSTNESS, NoRoute, RouteSearch, Tail, planned, proven_clearance
+from rrtik_ompl.pilot.surroundings import Surroundings
+from rrtik_ompl.planning.plan import plan
+from rrtik_ompl.planning.shortening import shorten
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
 END_OFFSET = 2e-4  # [m] of the tip from its grasp, at the end of a route
 END_TURN = np.deg2rad(0.04)
 MAX_END_OFFSET = 5e-4  # [m]; the same of an arm that has followed it
 MAX_END_TURN = np.deg2rad(0.1)
+STAGE = "with all joints at once"
+PLANNER_SECONDS = 5.0  # for all joints at once
 MAX_BEGINNINGS = 6  # configurations in front of the object that are tried
 
 
@@ -44,7 +53,7 @@ class Route:
         joints: Names of the joints that move.
         robustness: Share of executions that touch nothing although every move ends with an error of up to a degree.
         proven: Whether every move is proven free for its whole length; else some are checked in steps.
-        together: Whether all joints move at once, for an arm under position control (`routes.track`).
+        together: Whether all joints move at once, for an arm under position control (`all_at_once`).
         contacts: Of what is held with what it has not parted from.
     """
 
@@ -77,6 +86,48 @@ class Route:
         if np.isinf(self.clearance):
             return "nothing near"
         return f"at least {1e3 * self.clearance:.0f} mm away" if self.clearance > 0.0 else "less than 1 mm to spare"
+
+
+def propose(
+    problem: Problem,
+    surroundings: Surroundings,
+    target: str | None,
+    lamp: Lamp | None,
+    q: Vector,
+    rates: Vector,
+    seed: int,
+) -> Route | NoRoute:
+    """A route from where the arm is, or why there is none.
+
+    Args:
+        problem: Its goal serves where no grasp is chosen.
+        surroundings: What is around.
+        target: Name of the object to grasp.
+        lamp: Of the grasp that is chosen; None if none is.
+        q: Where the arm is, shape (dof,).
+        rates: Of the joints, shape (dof,).
+        seed: Of the random numbers.
+    """
+    world = surroundings.world_at(q, target)
+    target_seen = None if target is None else surroundings.named(target)
+    if target_seen is None or lamp is None:
+        if problem.goal.q is None:
+            return NoRoute("choose an object and a grasp first")
+        return route_to(world, q, np.array(problem.goal.q), rates, seed)
+    if not len(lamp.grasps):
+        return NoRoute(lamp.reason)
+
+    nearest_first = np.argsort(np.linalg.norm(joint_difference(problem.robot, lamp.grasps, q), axis=1), kind="stable")
+    stages = stage_poses(target_seen.T_base_object, target_seen.object.grasp(lamp.type), lamp.level)
+
+    holding = surroundings.holding(target_seen.object.name)
+    reason_for_none = NoRoute(lamp.reason)
+    for number, grasp in enumerate(lamp.grasps[nearest_first]):
+        route = route_to_grasp(world, holding, q, stages, grasp, rates, seed)
+        if isinstance(route, Route):
+            return route
+        reason_for_none = route if number == 0 else reason_for_none
+    return reason_for_none
 
 
 def route_to(world: World, q: Vector, goal: Vector, rates: Vector, seed: int) -> Route | NoRoute:
@@ -166,4 +217,41 @@ def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates
     return Route(
         path, route.grasp_from, travel, float(seconds), clearance, moving_joints, robustness, proven,
         contacts=world.scene.contacts,
+    )  # fmt: skip
+
+
+def all_at_once(route: Route, world: World, rates: Vector, seed: int) -> Route | NoRoute:
+    """The same route with all joints at once, up to its last moves to the object, which stay as they are.
+
+    Args:
+        route: Of single-joint moves.
+        world: In which nothing may be touched.
+        rates: Of the joints, shape (dof,).
+        seed: Of the random numbers.
+    """
+    rows = route.path.waypoints
+    before = rows[route.grasp_from]
+    last = rows[route.grasp_from + 1 :]
+    if route.grasp_from == 0:
+        return NoRoute("only moves of single joints are left", STAGE)
+
+    problem = Problem(world, rows[0], before)
+    planned = plan(problem, "rrtconnect", seconds=PLANNER_SECONDS, seed=seed)
+    if planned.path is None:
+        return NoRoute(planned.reason, STAGE)
+
+    path = shorten(planned.path, problem, seed=seed)
+    whole_path = path.with_waypoints(np.vstack([path.waypoints, last]))
+
+    moving_joints = tuple(
+        name
+        for name, travel in zip(whole_path.joint_names, np.ptp(whole_path.waypoints, axis=0), strict=True)
+        if travel > 0
+    )
+    return replace(
+        route, path=whole_path, grasp_from=len(path.waypoints) - 1, joints=moving_joints,
+        seconds=Track(whole_path, rates).seconds,
+        travel=float(np.abs(np.diff(whole_path.waypoints, axis=0)).sum()),
+        clearance=min(proven_clearance([(world, path.waypoints)]), route.clearance),
+        proven=bool(world.prove(path.waypoints).proven) and route.proven, together=True,
     )  # fmt: skip
