@@ -18,7 +18,7 @@ from rrtik_ompl.cli.terminal import stoppable
 from rrtik_ompl.ik.reach.grid_map import load_reach_map
 from rrtik_ompl.model.certificate import load_certificate
 from rrtik_ompl.pilot.overlay.film import write_film
-from rrtik_ompl.pilot.records.record import read_record
+from rrtik_ompl.pilot.record import read_record
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer

@@ -16,9 +16,7 @@ from rrtik_bench.report.page import Report
 from rrtik_ompl import load_problem, load_robot
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.overlay.augment import Augmenter, Ghost
-from rrtik_ompl.pilot.overlay.canvas import FARTHEST_DRAWN, Canvas
-from rrtik_ompl.pilot.overlay.figure import figure_of, placed
-from rrtik_ompl.pilot.overlay.surfaces import robot_surfaces
+from rrtik_ompl.pilot.overlay.rasterizer import FARTHEST_DRAWN, Canvas, figure_of, placed, robot_surfaces
 from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.pilot.overlay.canvas import FARTHEST_DRAWN
-from rrtik_ompl.pilot.overlay.figure import Placed
+from rrtik_ompl.pilot.overlay.rasterizer import FARTHEST_DRAWN, Placed
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 ROUNDING = 1e-3  # of a vertex's pixel in single precision, with what is folded into the matrix [pixels]

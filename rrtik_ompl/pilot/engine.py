@@ -21,7 +21,7 @@ from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera
 from rrtik_ompl.pilot.document import state_document
 from rrtik_ompl.pilot.interlock import PROPOSED, Sight
 from rrtik_ompl.pilot.perception import Perception
-from rrtik_ompl.pilot.records.pictures import PictureRecord
+from rrtik_ompl.pilot.record import PictureRecord
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.views import PRESETS, CameraView, OutsideView
 

@@ -13,8 +13,7 @@ from rrtik_ompl.base.arrays import Vector, finite_array
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
-from rrtik_ompl.pilot.records.pictures import RecordedPictures
-from rrtik_ompl.pilot.records.record import read_record
+from rrtik_ompl.pilot.record import RecordedPictures, read_record
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import Structure
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap

@@ -16,8 +16,7 @@ from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
 from rrtik_ompl.pilot.interlock import Sight
 from rrtik_ompl.pilot.machine import VERBS
-from rrtik_ompl.pilot.web.handlers import MAX_PAGES
-from rrtik_ompl.pilot.web.server import PilotServer
+from rrtik_ompl.pilot.web.server import MAX_PAGES, PilotServer
 
 PERIOD_SECONDS = 1.0 / 32.0  # a little less than a camera's, so that none of its pictures is left out
 CAMERA = "C"  # kinds of pictures, see `web.server`

@@ -27,7 +27,7 @@ from rrtik_ompl.pilot.interlock import UNSEEN_SECONDS, Knowledge, Sight
 from rrtik_ompl.pilot.machine import handle
 from rrtik_ompl.pilot.motion.leading import GraspServo
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
-from rrtik_ompl.pilot.records.record import Record
+from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.routes.follower import Follower, Progress, Track
 from rrtik_ompl.pilot.routes.lamps import Lamp
 from rrtik_ompl.pilot.routes.manoeuvre import JointRange

@@ -20,8 +20,7 @@ from rrtik_ompl.pilot.devices.wrong_arm import WrongArm
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.perception import CameraOfRig, LivePerception, SimulatedSource
-from rrtik_ompl.pilot.records.pictures import PictureRecord, RecordedPictures, beside
-from rrtik_ompl.pilot.records.record import Record
+from rrtik_ompl.pilot.record import PictureRecord, Record, RecordedPictures, beside
 from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for, start_of
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import Structure

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.pilot.aids import Aids
-from rrtik_ompl.pilot.records.pictures import SUFFIX
+from rrtik_ompl.pilot.record import SUFFIX
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
+from rrtik_ompl.pilot.views import Aids
 from rrtik_ompl.world.world import World
 from rrtik_tests.pilot_session import PROBLEM, follow, session
 

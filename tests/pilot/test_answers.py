@@ -14,7 +14,7 @@ from rrtik_ompl.pilot.answers import Answer, Level
 from rrtik_ompl.pilot.interlock import MODES
 from rrtik_ompl.pilot.machine import VERBS
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
-from rrtik_ompl.pilot.web.handlers import PAGE
+from rrtik_ompl.pilot.web.server import PAGE
 from rrtik_tests.pilot_session import session
 
 FOLDER = Path(rrtik_ompl.pilot.__file__).parent

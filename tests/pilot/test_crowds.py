@@ -39,7 +39,7 @@ def test_a_page_that_floods_and_reads_nothing_is_closed_and_the_others_are_serve
 
 
 def test_more_pages_than_anybody_opens_are_refused(server, monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.pilot.web.handlers.MAX_PAGES", 2)
+    monkeypatch.setattr("rrtik_ompl.pilot.web.server.MAX_PAGES", 2)
     pages = [Page(server, "one"), Page(server, "two")]
     assert [page.role() for page in pages] == ["pilot", "watching"]
     assert answer(server, "/ws", **UPGRADE).status == 503

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import pytest
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.pilot.records.record import Record, read_record
+from rrtik_ompl.pilot.record import Record, read_record
 from rrtik_tests.pilot_session import alarmed, session
 
 

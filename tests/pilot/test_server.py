@@ -14,8 +14,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.clients import Client, Clients, Lane
-from rrtik_ompl.pilot.web.exposure import all_addresses
-from rrtik_ompl.pilot.web.server import MAX_MESSAGE_BYTES, MAX_QUEUED_COMMANDS, PilotServer
+from rrtik_ompl.pilot.web.server import MAX_MESSAGE_BYTES, MAX_QUEUED_COMMANDS, PilotServer, all_addresses
 from rrtik_tests import tls
 from rrtik_tests.page_by_hand import UPGRADE, Page, answer
 from rrtik_tests.pilot_session import alarmed

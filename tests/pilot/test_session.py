@@ -12,7 +12,7 @@ from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED
-from rrtik_ompl.pilot.records.record import Record, read_record
+from rrtik_ompl.pilot.record import Record, read_record
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import SeenObject

@@ -19,9 +19,20 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle
-from rrtik_ompl.pilot.overlay.canvas import FARTHEST_DRAWN, NEAREST_DRAWN, Canvas, half_as_fine
-from rrtik_ompl.pilot.overlay.figure import Figure, figure_of, placed, tinted
-from rrtik_ompl.pilot.overlay.surfaces import ROBOT_TRIANGLES, ShapeSurfaces, obstacle_surfaces, robot_surfaces
+from rrtik_ompl.pilot.overlay.rasterizer import (
+    FARTHEST_DRAWN,
+    NEAREST_DRAWN,
+    ROBOT_TRIANGLES,
+    Canvas,
+    Figure,
+    ShapeSurfaces,
+    figure_of,
+    half_as_fine,
+    obstacle_surfaces,
+    placed,
+    robot_surfaces,
+    tinted,
+)
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 

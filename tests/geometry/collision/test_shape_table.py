@@ -30,7 +30,7 @@ from rrtik_ompl.model.shapes import (
     Sphere,
     same_shape,
 )
-from rrtik_ompl.pilot.overlay.surfaces import surface_of_shape
+from rrtik_ompl.pilot.overlay.rasterizer import surface_of_shape
 from rrtik_ompl.problem_files.scene import load_scene, save_scene
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin, look_of_shape
 
@@ -199,7 +199,7 @@ import numpy as np
 
 import cone
 import rrtik_ompl as rrtik
-from rrtik_ompl.pilot.overlay.surfaces import obstacle_surfaces
+from rrtik_ompl.pilot.overlay.rasterizer import obstacle_surfaces
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape
 
 problem = rrtik.load_problem("task.yaml")

@@ -13,9 +13,15 @@ from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.pilot.overlay import augment
 from rrtik_ompl.pilot.overlay.augment import MAX_LAYERS, Augmenter, Ghost
-from rrtik_ompl.pilot.overlay.canvas import FARTHEST_DRAWN, Canvas
-from rrtik_ompl.pilot.overlay.figure import figure_of, placed
-from rrtik_ompl.pilot.overlay.surfaces import obstacle_surfaces, robot_surfaces, surface_of_shape
+from rrtik_ompl.pilot.overlay.rasterizer import (
+    FARTHEST_DRAWN,
+    Canvas,
+    figure_of,
+    obstacle_surfaces,
+    placed,
+    robot_surfaces,
+    surface_of_shape,
+)
 from rrtik_ompl.pilot.overlay.virtual_camera import background, orbit_pose, pinhole_camera
 from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
 

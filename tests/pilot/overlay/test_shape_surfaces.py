@@ -6,7 +6,7 @@ from rrtik_ompl.base.poses import pose
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box, Cylinder
 from rrtik_ompl.pilot.overlay import surfaces
-from rrtik_ompl.pilot.overlay.surfaces import ShapeSurfaces, obstacle_surfaces
+from rrtik_ompl.pilot.overlay.rasterizer import ShapeSurfaces, obstacle_surfaces
 
 
 def test_an_obstacle_that_moves_is_made_once_and_drawn_where_it_is(monkeypatch):

@@ -1,0 +1,345 @@
+"""Solids as triangles, placed before a camera, and drawn into a picture by OpenCV's rasteriser.
+
+From shapes to pixels: a `Surface` is the triangles of one solid; a `Figure` many of them as one set of arrays, sorted
+by the frame that carries them; `placed` puts it before a camera in a few calls, the work of every frame; a `Canvas` holds
+the colours and depths of a picture. The rasteriser takes an opening angle alone: focal lengths, the centre of the
+picture and half a pixel go into the matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.geometry.collision.shape_table import shape_of
+from rrtik_ompl.geometry.collision.solids import is_mesh
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle
+from rrtik_ompl.model.shapes import Shape
+from rrtik_ompl.model.shapes.surfaces import Faces
+from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out
+
+ROBOT_TRIANGLES = 20_000
+OBSTACLE_TRIANGLES = 5_000
+MAX_SHAPES = 4_000  # whose surfaces are kept
+AMBIENT = 0.35  # share of ambient light; the rest comes from the camera
+NEAREST_DRAWN = 0.05  # [m]
+FARTHEST_DRAWN = 50.0  # [m]
+
+
+# --- solids as triangles ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """Triangles of one colour in one frame.
+
+    Attributes:
+        vertices: Shape (n, 3) [m].
+        normals: Unit vectors out of the solid, shape (n, 3).
+        faces: Counter-clockwise seen from outside, shape (m, 3).
+        color: Red, green, blue from 0 to 1, shape (3,).
+        frame: Number of the frame that carries it: Pinocchio's joint for a link.
+    """
+
+    vertices: Matrix
+    normals: Matrix
+    faces: Faces
+    color: NDArray[np.float64]
+    frame: int = 0
+
+
+def surface_of_shape(shape: Shape, color: str, frame: int = 0, triangles: int = OBSTACLE_TRIANGLES) -> Surface:
+    """The surface of a bounded shape.
+
+    Raises:
+        InputError: For a half-space, which has no end.
+    """
+    vertices, faces = split_creases(*_triangles(shape, triangles))
+    return Surface(vertices, _normals(vertices, faces), faces, np.array(palette.fractions(color)), frame)
+
+
+def robot_surfaces(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> tuple[Surface, ...]:
+    """The links in at most about so many triangles: what is to be seen of them, else what collides."""
+    drawn = _link_surfaces(robot.visual.geometryObjects, triangles)
+    return drawn or _link_surfaces(robot.collision.geometryObjects, triangles)
+
+
+class ShapeSurfaces:
+    """Surfaces of obstacles' shapes, each made once: what moves from picture to picture keeps its shape."""
+
+    def __init__(self) -> None:
+        self._made: dict[int, tuple[Shape, Surface]] = {}  # with the shape, so that no other gets its identity
+
+    def of(self, shape: Shape) -> Surface:
+        """The surface of a bounded shape in the colour of obstacles."""
+        shape_and_surface = self._made.get(id(shape))
+        if shape_and_surface is None:
+            if len(self._made) >= MAX_SHAPES:
+                self._made.clear()
+            shape_and_surface = self._made[id(shape)] = (
+                shape,
+                surface_of_shape(shape, palette.OBSTACLE),
+            )
+        return shape_and_surface[1]
+
+
+def obstacle_surfaces(obstacles: Sequence[Obstacle], made: ShapeSurfaces | None = None) -> tuple[Surface, ...]:
+    """Bounded obstacles in the frame of the world, by surfaces that may be made already; half-spaces are left out."""
+    surfaces = ShapeSurfaces() if made is None else made
+    bounded = [obstacle for obstacle in obstacles if obstacle.shape.bounded]
+    return tuple(
+        moved(surfaces.of(obstacle.shape), obstacle.pose.rotation, obstacle.pose.translation) for obstacle in bounded
+    )
+
+
+def moved(surface: Surface, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> Surface:
+    """The same surface elsewhere."""
+    vertices = surface.vertices @ rotation.T + translation
+    return Surface(vertices, surface.normals @ rotation.T, surface.faces, surface.color, surface.frame)
+
+
+def _link_surfaces(bodies: Sequence[object], triangles: int) -> tuple[Surface, ...]:
+    counts = [int(b.geometry.num_tris) if is_mesh(b.geometry) else 0 for b in bodies]  # type: ignore[attr-defined]
+    surfaces = []
+    for body, count in zip(bodies, counts, strict=True):
+        surface = _link_surface(body, max(triangles * count // max(sum(counts), 1), 200))
+        if surface is not None:
+            surfaces.append(surface)
+    return tuple(surfaces)
+
+
+def _link_surface(body: object, limit: int) -> Surface | None:
+    geometry = body.geometry  # type: ignore[attr-defined]
+    joint = body.parentJoint  # type: ignore[attr-defined]
+    placement = body.placement  # type: ignore[attr-defined]
+
+    color = palette.ROBOT_ALTERNATE if joint % 2 else palette.ROBOT
+    if body.overrideMaterial:  # type: ignore[attr-defined]
+        color = palette.hexadecimal(body.meshColor[:3])  # type: ignore[attr-defined]
+
+    try:
+        shape = shape_of(geometry)
+    except InputError:  # a mesh without area: nothing to see
+        return None
+    if shape is None or not shape.bounded:
+        return None
+    return moved(surface_of_shape(shape, color, joint, limit), placement.rotation, placement.translation)
+
+
+def _triangles(shape: Shape, limit: int) -> tuple[Matrix, Faces]:
+    surface = shape.surface()
+    if shape.fine:
+        return thin_out(*surface, limit)
+    return _welded(*surface) if shape.smooth else surface
+
+
+def _welded(vertices: Matrix, faces: Faces) -> tuple[Matrix, Faces]:
+    """The same with vertices at one place made one, and without triangles that lose their area by that."""
+    _, first_rows, merged_number = np.unique(np.round(vertices, 12), axis=0, return_index=True, return_inverse=True)
+    merged = np.asarray(merged_number).reshape(-1)[faces]
+
+    has_area = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    return vertices[first_rows], merged[has_area].astype(np.int64)
+
+
+def _normals(vertices: Matrix, faces: Faces) -> Matrix:
+    """Means of the normals of the triangles at each vertex, weighted by their area."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+
+    total = np.zeros_like(vertices)
+    for k in range(3):
+        np.add.at(total, faces[:, k], across)
+
+    unit: Matrix = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    return unit
+
+
+# --- many surfaces before a camera -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Figure:
+    """Surfaces put together, sorted by frame.
+
+    Attributes:
+        vertices: In the frames that carry them [m], shape (n, 3).
+        normals: Unit vectors out of the solids, in the same frames, shape (n, 3).
+        faces: Shape (m, 3).
+        colors: Of the vertices: red, green, blue from 0 to 1, shape (n, 3).
+        frames: Numbers of the frames.
+        bounds: Vertices of ``frames[k]`` are those from ``bounds[k]`` to ``bounds[k + 1]``.
+    """
+
+    vertices: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    faces: NDArray[np.int32]
+    colors: NDArray[np.float32]
+    frames: tuple[int, ...]
+    bounds: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A figure before a camera, ready to be drawn.
+
+    Attributes:
+        points: Vertices in the frame of the camera [m], shape (n, 3).
+        faces: Shape (m, 3).
+        colors: What the light makes of those of the vertices: red, green, blue from 0 to 1, shape (n, 3).
+    """
+
+    points: NDArray[np.float32]
+    faces: NDArray[np.int32]
+    colors: NDArray[np.float32]
+
+
+def figure_of(surfaces: Sequence[Surface]) -> Figure:
+    """Put surfaces together."""
+    ranked = sorted(surfaces, key=lambda surface: surface.frame)
+    counts = [len(surface.vertices) for surface in ranked]
+    starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
+    frames = sorted({surface.frame for surface in ranked})
+    ends = [max(starts[k + 1] for k, s in enumerate(ranked) if s.frame == frame) for frame in frames]
+
+    empty = np.zeros((0, 3))
+    return Figure(
+        np.concatenate([empty, *(s.vertices for s in ranked)]).astype(np.float32),
+        np.concatenate([empty, *(s.normals for s in ranked)]).astype(np.float32),
+        np.concatenate([empty, *(s.faces + start for s, start in zip(ranked, starts, strict=False))]).astype(np.int32),
+        np.concatenate([empty, *(np.tile(s.color, (len(s.vertices), 1)) for s in ranked)]).astype(np.float32),
+        tuple(frames),
+        (0, *(int(end) for end in ends)),
+    )
+
+
+def placed(figure: Figure, T_camera_frames: Sequence[ArrayLike] | NDArray[np.float64]) -> Placed:
+    """A figure in the frame of a camera, lit by a lamp at the camera.
+
+    Args:
+        figure: What is drawn.
+        T_camera_frames: Pose of frame k in the frame of the camera, shape (frames, 4, 4).
+    """
+    poses = np.asarray(T_camera_frames, dtype=np.float32)
+    points = np.empty_like(figure.vertices)
+    normals = np.empty_like(figure.normals)
+
+    for frame, low, high in zip(figure.frames, figure.bounds, figure.bounds[1:], strict=False):
+        turn = poses[frame, :3, :3].T
+        np.matmul(figure.vertices[low:high], turn, out=points[low:high])
+        points[low:high] += poses[frame, :3, 3]
+        np.matmul(figure.normals[low:high], turn, out=normals[low:high])
+
+    lengths = np.sqrt(np.einsum("ij,ij->i", points, points))
+    facing = np.abs(np.einsum("ij,ij->i", normals, points)) / np.maximum(lengths, 1e-9)
+    colors = figure.colors * (AMBIENT + (1.0 - AMBIENT) * facing)[:, None]
+    return Placed(points, figure.faces, colors.astype(np.float32))
+
+
+def tinted(figure: Placed, color: Sequence[float]) -> Placed:
+    """The same figure in shades of one colour: red, green, blue from 0 to 1. The brightest stay the brightest."""
+    shades = AMBIENT + (1.0 - AMBIENT) * figure.colors.max(axis=1)
+    return Placed(figure.points, figure.faces, np.outer(shades, color).astype(np.float32))
+
+
+# --- drawn into a picture --------------------------------------------------------------------------------------------
+
+
+class Canvas:
+    """A picture that figures are drawn into, from the view of a camera.
+
+    Attributes:
+        colors: Red, green, blue from 0 to 1, of something else where nothing was drawn. Shape (height, width, 3).
+        depths: Along the optical axis [m]; `FARTHEST_DRAWN` where nothing was drawn. Shape (height, width).
+    """
+
+    def __init__(self, camera: Camera) -> None:
+        self.camera = camera
+        self._view, self._angle = _matrix(camera)
+        self.colors: NDArray[np.float32] = np.zeros((camera.height, camera.width, 3), dtype=np.float32)
+        self.depths: NDArray[np.float32] = np.full((camera.height, camera.width), FARTHEST_DRAWN, dtype=np.float32)
+
+    def clear(self) -> None:
+        """Empty it again."""
+        self.depths.fill(FARTHEST_DRAWN)
+
+    @property
+    def drawn(self) -> NDArray[np.bool_]:
+        """Where something was drawn. Shape (height, width)."""
+        return np.asarray(self.depths < 0.999 * FARTHEST_DRAWN)
+
+    def draw(self, figure: Placed, both_sides: bool = False) -> None:
+        """Draw a figure; what lies behind what is there already stays hidden.
+
+        Args:
+            figure: What to draw.
+            both_sides: Draw triangles that are seen from inside, too: for surfaces that are not closed.
+        """
+        if len(figure.faces) == 0:
+            return
+
+        culling = cv2.RASTERIZE_CULLING_NONE if both_sides else cv2.RASTERIZE_CULLING_CW
+        settings: Any = cv2.TriangleRasterizeSettings()
+        settings = settings.setShadingType(cv2.RASTERIZE_SHADING_SHADED).setCullingMode(culling)
+
+        points = np.ascontiguousarray(_bent(figure.points, self.camera), dtype=np.float32)
+        rasterize: Any = cv2.triangleRasterize
+        self.colors, self.depths = rasterize(
+            points,
+            figure.faces,
+            figure.colors,
+            self.colors,
+            self.depths,
+            self._view,
+            self._angle,
+            NEAREST_DRAWN,
+            FARTHEST_DRAWN,
+            settings,
+        )
+
+
+def half_as_fine(camera: Camera) -> Camera:
+    """The same view with half as many pixels a side."""
+    matrix = np.array(camera.matrix)
+    matrix[:2, :2] *= 0.5
+    matrix[:2, 2] = 0.5 * (matrix[:2, 2] + 0.5) - 0.5
+    return Camera(matrix, (camera.width + 1) // 2, (camera.height + 1) // 2, camera.distortion)
+
+
+def _matrix(camera: Camera) -> tuple[NDArray[np.float64], float]:
+    """World to OpenGL's camera (y up, looking along -z), the intrinsics folded in, and the opening angle [rad]."""
+    (fx, _, cx), (_, fy, cy), _ = camera.matrix
+
+    fold = np.eye(4)
+    fold[0, 0] = fx / fy
+    fold[0, 2] = (cx + 0.5 - 0.5 * camera.width) / fy
+    fold[1, 2] = (cy + 0.5 - 0.5 * camera.height) / fy
+    return np.diag([1.0, -1.0, -1.0, 1.0]) @ fold, float(2.0 * np.arctan(0.5 * camera.height / fy))
+
+
+def _bent(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
+    """Points moved aside so that a pinhole shows them where the lens does; edges between them stay straight."""
+    if not camera.distortion.any():
+        return points
+
+    k1, k2, p1, p2, k3 = camera.distortion.astype(np.float32)
+    depth = np.maximum(points[:, 2], NEAREST_DRAWN)
+    x = points[:, 0] / depth
+    y = points[:, 1] / depth
+    square = np.minimum(x * x + y * y, 4.0)  # far outside the picture the polynomial turns back
+    radial = 1.0 + square * (k1 + square * (k2 + square * k3))
+
+    bent = points.copy()
+    bent[:, 0] = depth * (x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x))
+    bent[:, 1] = depth * (y * radial + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y)
+    return bent

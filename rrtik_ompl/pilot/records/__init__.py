@@ -1,1 +1,0 @@
-"""Records of sessions: written as they happen, and shown again."""
