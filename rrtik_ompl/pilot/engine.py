@@ -16,8 +16,7 @@ from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.arguments import number
-from rrtik_ompl.pilot.devices.camera_feed import ENDED
-from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera
+from rrtik_ompl.pilot.devices.camera_feed import ENDED, FurtherCamera
 from rrtik_ompl.pilot.document import state_document
 from rrtik_ompl.pilot.interlock import PROPOSED, Sight
 from rrtik_ompl.pilot.perception import Perception

@@ -9,10 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.errors import RrtikError
-from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
-from rrtik_ompl.pilot.devices.base_motion import BaseMotion
 from rrtik_ompl.pilot.devices.camera_feed import ENDED, Feed, PictureSource
-from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
 from rrtik_ompl.pilot.devices.watchdog import Report
 from rrtik_ompl.pilot.interlock import STALE_SECONDS
 from rrtik_ompl.pilot.session import Session
@@ -22,7 +19,6 @@ from rrtik_ompl.sensing.frames import base_from_camera, tip_seen
 from rrtik_ompl.sensing.sensor import Sensor, View
 
 REPEATS = "the camera repeats its last picture"
-FINGERS = 0.02  # [m]; a gripper that closes this near to a grasp takes the object
 EXPLANATION_SECONDS = 5.0  # between two searches for unknown markers
 
 
@@ -151,74 +147,3 @@ class CameraOfRig:
 
     def close(self) -> None:
         """Nothing to release: the perception has it."""
-
-
-class SimulatedSource:
-    """Pictures of a simulated camera, made on demand.
-
-    Attributes:
-        camera: Makes them.
-        arm: That they show.
-    """
-
-    def __init__(self, camera: SimulatedCamera, arm: Arm, motion: BaseMotion | None = None) -> None:
-        """Take camera and arm, and how their base moves."""
-        self.camera = camera
-        self.arm = arm
-        self._motion = motion
-        self._count = 0
-        self._time = 0.0
-        self._was_closed = False
-        self._carried: tuple[str, pin.SE3] | None = None  # an object that the gripper has taken, and T_tip_object
-
-    def advance(self, seconds: float) -> None:
-        """Advance the simulated time: the base moves."""
-        self._time += seconds
-        if self._motion is not None:
-            self.camera.T_start_base = self._motion.at(self._time)
-
-    def latest(self) -> Picture:
-        """A picture with the arm at its present configuration."""
-        self._count += 1
-        arm = self.arm
-        q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
-        if isinstance(arm, SimulatedArm):
-            self._carry(arm, arm.robot.fk(q))
-
-        tip = self.camera.T_start_base * self.camera.robot.fk(q)
-        on_arm = (marked_object for marked_object in self.camera.marker_map.objects if marked_object.role == "arm")
-        places_on_arm = {marked_object.name: tip for marked_object in on_arm}
-        if places_on_arm:
-            self.camera.places = {**self.camera.places, **places_on_arm}
-
-        return self.camera.picture(q, float(self._count))
-
-    def _carry(self, arm: SimulatedArm, T_base_tip: pin.SE3) -> None:
-        """Objects that can be carried move with a closed gripper, if it was closed where they can be grasped."""
-        tip = self.camera.T_start_base * T_base_tip
-        camera = self.camera
-        if arm.closed and not self._was_closed:
-            grasp_distances = [
-                (
-                    float(np.linalg.norm(tip.actInv(camera.places[marked_object.name] * level).translation)),
-                    marked_object.name,
-                )
-                for marked_object in camera.marker_map.objects
-                if marked_object.loose and marked_object.name in camera.places
-                for grasp in marked_object.grasps
-                for level in grasp.levels
-            ]
-
-            if grasp_distances and min(grasp_distances)[0] <= FINGERS:
-                name = min(grasp_distances)[1]
-                self._carried = (name, tip.actInv(camera.places[name]))
-
-        if self._carried is not None:
-            camera.places = {**camera.places, self._carried[0]: tip * self._carried[1]}
-
-        if not arm.closed:  # it was laid where the gripper has opened
-            self._carried = None
-        self._was_closed = arm.closed
-
-    def close(self) -> None:
-        """Nothing to release."""

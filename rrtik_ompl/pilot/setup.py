@@ -10,16 +10,15 @@ import numpy as np
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
-from rrtik_ompl.pilot.devices.camera_feed import Feed
-from rrtik_ompl.pilot.devices.further_cameras import FurtherCamera, LiveCamera, SimulatedFurtherCamera
+from rrtik_ompl.pilot.devices.camera_feed import Feed, FurtherCamera, LiveCamera
 from rrtik_ompl.pilot.devices.line_arm import LineArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import SimulatedVehicle, find_vehicle, load_vehicle
-from rrtik_ompl.pilot.devices.simulation import SimulatedCamera
+from rrtik_ompl.pilot.devices.simulation import SimulatedCamera, SimulatedFurtherCamera, SimulatedSource
 from rrtik_ompl.pilot.devices.watchdog import Report
 from rrtik_ompl.pilot.devices.wrong_arm import WrongArm
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
-from rrtik_ompl.pilot.perception import CameraOfRig, LivePerception, SimulatedSource
+from rrtik_ompl.pilot.perception import CameraOfRig, LivePerception
 from rrtik_ompl.pilot.record import PictureRecord, Record, RecordedPictures, beside
 from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for, start_of
 from rrtik_ompl.pilot.session import Session

@@ -6,8 +6,8 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose_from_rpy
-from rrtik_ompl.pilot.devices.base_motion import BaseMotion
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
+from rrtik_ompl.pilot.devices.simulation import BaseMotion
 from rrtik_ompl.pilot.interlock import PROPOSED
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.surroundings import Structure, Surroundings

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError, Picture
@@ -116,3 +117,37 @@ class Feed:
     def _lose(self, reason: str) -> None:
         with self._lock:
             self._lost = reason
+
+
+class FurtherCamera(Protocol):
+    """A camera that is shown beside the first one."""
+
+    def picture(self) -> NDArray[np.uint8] | None:
+        """The newest picture, shape (height, width, 3); None if there is none yet."""
+
+    def close(self) -> None:
+        """Release the camera."""
+
+
+class LiveCamera:
+    """A camera, or a film."""
+
+    def __init__(self, source: PictureSource) -> None:
+        self._source = source
+        self._last: NDArray[np.uint8] | None = None
+
+    def picture(self) -> NDArray[np.uint8] | None:
+        """The newest picture, darkened where the camera is lost; None if there was none yet."""
+        try:
+            taken = self._source.latest()
+        except RrtikError:
+            return None if self._last is None else np.asarray(self._last // 3, dtype=np.uint8)
+
+        if taken is not None:
+            grey = taken.pixels.ndim == 2
+            self._last = np.repeat(taken.pixels[..., None], 3, axis=2) if grey else taken.pixels
+        return self._last
+
+    def close(self) -> None:
+        """Release the camera."""
+        self._source.close()

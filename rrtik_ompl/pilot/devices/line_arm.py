@@ -400,3 +400,18 @@ class LineServer:
         elif action != "read":
             return "do must be read, move, grip or stop, or follow"
         return ""
+
+
+class ArmLink:
+    """A simulated arm, or one on the other side of a connection, that follows a trajectory."""
+
+    def __init__(self, arm: SimulatedArm | LineArm) -> None:
+        self.arm = arm
+
+    def positions(self) -> Vector:
+        """Joint values now, shape (dof,)."""
+        return self.arm.read()
+
+    def command(self, q: Vector, t: float) -> None:
+        """Send all joints to a set point."""
+        self.arm.follow(q)

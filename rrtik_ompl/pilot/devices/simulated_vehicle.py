@@ -16,8 +16,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import problem_folders
 from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml
-from rrtik_ompl.pilot.devices.base_motion import BaseMotion
-from rrtik_ompl.pilot.devices.further_cameras import Mount
+from rrtik_ompl.pilot.devices.simulation import BaseMotion, Mount
 from rrtik_ompl.pilot.devices.wrong_arm import Faults
 from rrtik_ompl.pilot.interlock import UNSEEN_SECONDS
 from rrtik_ompl.problem_files.scene import PoseEntry

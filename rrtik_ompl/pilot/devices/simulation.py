@@ -1,4 +1,4 @@
-"""The camera of a simulated vehicle: pictures of marked objects, surroundings and the arm.
+"""The cameras of a simulated vehicle, and how it moves: pictures of marked objects, surroundings and the arm.
 
 Pictures are made at the rate of a camera: solids by the rasteriser, markers as images warped into their plane.
 For measurements of the markers themselves use `sensing.synthetic_camera`, which is exact and slow.
@@ -7,18 +7,20 @@ For measurements of the markers themselves use `sensing.synthetic_camera`, which
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, frozen
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import pose_from_rpy, rigid
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.overlay.augment import Augmenter
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
@@ -31,6 +33,10 @@ NOISE = 2.0  # grey levels
 NOISE_PICTURES = 4  # taken in turn
 PICTURE_RATE = 30.0  # pictures a second
 TRIANGLES = 8_000  # of the arm
+MIN_PERIOD = 0.2  # [s] of the sway of a base
+MAX_SPEED = 2.0  # [m/s]
+MAX_AMPLITUDE = 2.0  # [m]
+FINGERS = 0.02  # [m]; a gripper that closes this near to a grasp takes the object
 
 
 class SimulatedCamera:
@@ -180,3 +186,169 @@ def _water(camera: Camera) -> NDArray[np.uint8]:
     share = np.linspace(0.0, 1.0, camera.height)[:, None]
     rows = (1.0 - share) * np.array(WATER[0]) + share * np.array(WATER[1])
     return np.repeat(np.rint(rows).astype(np.uint8)[:, None], camera.width, axis=1)
+
+
+class SimulatedSource:
+    """Pictures of a simulated camera, made on demand.
+
+    Attributes:
+        camera: Makes them.
+        arm: That they show.
+    """
+
+    def __init__(self, camera: SimulatedCamera, arm: Arm, motion: BaseMotion | None = None) -> None:
+        """Take camera and arm, and how their base moves."""
+        self.camera = camera
+        self.arm = arm
+        self._motion = motion
+        self._count = 0
+        self._time = 0.0
+        self._was_closed = False
+        self._carried: tuple[str, pin.SE3] | None = None  # an object that the gripper has taken, and T_tip_object
+
+    def advance(self, seconds: float) -> None:
+        """Advance the simulated time: the base moves."""
+        self._time += seconds
+        if self._motion is not None:
+            self.camera.T_start_base = self._motion.at(self._time)
+
+    def latest(self) -> Picture:
+        """A picture with the arm at its present configuration."""
+        self._count += 1
+        arm = self.arm
+        q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
+        if isinstance(arm, SimulatedArm):
+            self._carry(arm, arm.robot.fk(q))
+
+        tip = self.camera.T_start_base * self.camera.robot.fk(q)
+        on_arm = (marked_object for marked_object in self.camera.marker_map.objects if marked_object.role == "arm")
+        places_on_arm = {marked_object.name: tip for marked_object in on_arm}
+        if places_on_arm:
+            self.camera.places = {**self.camera.places, **places_on_arm}
+
+        return self.camera.picture(q, float(self._count))
+
+    def _carry(self, arm: SimulatedArm, T_base_tip: pin.SE3) -> None:
+        """Objects that can be carried move with a closed gripper, if it was closed where they can be grasped."""
+        tip = self.camera.T_start_base * T_base_tip
+        camera = self.camera
+        if arm.closed and not self._was_closed:
+            grasp_distances = [
+                (
+                    float(np.linalg.norm(tip.actInv(camera.places[marked_object.name] * level).translation)),
+                    marked_object.name,
+                )
+                for marked_object in camera.marker_map.objects
+                if marked_object.loose and marked_object.name in camera.places
+                for grasp in marked_object.grasps
+                for level in grasp.levels
+            ]
+
+            if grasp_distances and min(grasp_distances)[0] <= FINGERS:
+                name = min(grasp_distances)[1]
+                self._carried = (name, tip.actInv(camera.places[name]))
+
+        if self._carried is not None:
+            camera.places = {**camera.places, self._carried[0]: tip * self._carried[1]}
+
+        if not arm.closed:  # it was laid where the gripper has opened
+            self._carried = None
+        self._was_closed = arm.closed
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+class Mount(NamedTuple):
+    """Where a further camera of a simulated vehicle is.
+
+    Attributes:
+        name: For the pilot.
+        at_tip: It is carried by the arm's last link; else by the vehicle.
+        pose: In the frame of the tip, or of the arm's base.
+    """
+
+    name: str
+    at_tip: bool
+    pose: pin.SE3
+
+
+class SimulatedFurtherCamera:
+    """A camera of a simulated vehicle."""
+
+    def __init__(self, mount: Mount, camera: SimulatedCamera, first: SimulatedCamera, arm: Arm) -> None:
+        """Take what it sees.
+
+        Args:
+            mount: Where it is.
+            camera: Makes its pictures.
+            first: The vehicle's first camera: things are where that has them.
+            arm: The arm.
+        """
+        self._mount = mount
+        self._camera = camera
+        self._first = first
+        self._arm = arm
+        self._count = 0
+
+    def picture(self) -> NDArray[np.uint8]:
+        """The picture of now."""
+        camera = self._camera
+        arm = self._arm
+        q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
+        carried = camera.robot.fk(q) if self._mount.at_tip else pin.SE3.Identity()
+        camera.T_base_camera = carried * self._mount.pose
+
+        camera.places = self._first.places
+        camera.T_start_base = self._first.T_start_base
+        self._count += 1
+        return camera.picture(q, float(self._count)).pixels
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BaseMotion:
+    """Drift at a constant velocity, and sway as a sine; both are zero at the beginning.
+
+    Attributes:
+        drift: Velocity, shape (3,) [m/s].
+        sway: Amplitude, shape (3,) [m].
+        tilt: Amplitude of roll, pitch and yaw, shape (3,) [rad].
+        period: Of the sway [s].
+
+    Raises:
+        InputError: If one is not finite, the period is shorter than 0.2 s, or the motion is no vehicle's.
+
+    Example:
+        >>> BaseMotion(drift=[0.01, 0.0, 0.0]).at(2.0).translation.tolist()
+        [0.02, 0.0, 0.0]
+    """
+
+    drift: Vector
+    sway: Vector
+    tilt: Vector
+    period: float
+
+    def __init__(
+        self,
+        drift: ArrayLike = (0.0, 0.0, 0.0),
+        sway: ArrayLike = (0.0, 0.0, 0.0),
+        tilt: ArrayLike = (0.0, 0.0, 0.0),
+        period: float = 5.0,
+    ) -> None:
+        for name, given, most in (("drift", drift, MAX_SPEED), ("sway", sway, MAX_AMPLITUDE), ("tilt", tilt, np.pi)):
+            value = frozen(finite_array(given, (3,), f"{name} of the base"))
+            if np.abs(value).max() > most:
+                raise InputError(f"{name} of the base must be at most {most:.3g}, got {np.abs(value).max():.3g}")
+            object.__setattr__(self, name, value)
+        seconds = float(finite_array(period, (), "period of the base's sway"))
+        if seconds < MIN_PERIOD:
+            raise InputError(f"period of the base's sway must be {MIN_PERIOD} s or more, got {seconds:g}")
+        object.__setattr__(self, "period", seconds)
+
+    def at(self, time: float) -> pin.SE3:
+        """Where the base is at a time [s], in its own frame at time 0: ``T_start_base``."""
+        phase = float(np.sin(2.0 * np.pi * time / self.period))
+        return pose_from_rpy(self.drift * time + phase * self.sway, phase * self.tilt)

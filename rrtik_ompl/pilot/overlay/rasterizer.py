@@ -1,8 +1,8 @@
 """Solids as triangles, placed before a camera, and drawn into a picture by OpenCV's rasteriser.
 
 From shapes to pixels: a `Surface` is the triangles of one solid; a `Figure` many of them as one set of arrays, sorted
-by the frame that carries them; `placed` puts it before a camera in a few calls, the work of every frame; a `Canvas` holds
-the colours and depths of a picture. The rasteriser takes an opening angle alone: focal lengths, the centre of the
+by the frame that carries them; `placed` puts it before a camera in a few calls, the work of every frame; a `Canvas`
+holds the colours and depths of a picture. The rasteriser takes an opening angle alone: focal lengths, the centre of the
 picture and half a pixel go into the matrix.
 """
 

@@ -12,8 +12,7 @@ from rrtik_ompl.motion.following.follower import Follower
 from rrtik_ompl.motion.following.links import SimulatedLink
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
-from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
-from rrtik_ompl.pilot.devices.links import ArmLink
+from rrtik_ompl.pilot.devices.line_arm import ArmLink, LineArm, LineServer
 from rrtik_ompl.world.world import World
 from rrtik_tests.waiting import until
 
