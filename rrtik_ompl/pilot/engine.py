@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.files.messages import quoted
-from rrtik_ompl.pilot.answers import alarm, refused
-from rrtik_ompl.pilot.arguments import number
 from rrtik_ompl.pilot.devices.camera_feed import ENDED, FurtherCamera
 from rrtik_ompl.pilot.document import state_document
-from rrtik_ompl.pilot.interlock import PROPOSED, Sight
+from rrtik_ompl.pilot.events import alarm, refused
+from rrtik_ompl.pilot.interlock import PROPOSED, Sight, number
 from rrtik_ompl.pilot.perception import Perception
 from rrtik_ompl.pilot.record import PictureRecord
 from rrtik_ompl.pilot.session import Session

@@ -1,19 +1,20 @@
-"""What happens to a session, and what a session wants done: the events and effects of its state machine.
+"""What happens to a session, what it wants done, and what it says: the words of its state machine.
 
 An event is given to `machine.handle`. An effect is carried out by `Session`; one that asks for something has a
-``then``, which is called with the answer (the event `Reply`) before the next effect is carried out.
+``then``, which is called with the answer (the event `Reply`) before the next effect is carried out. What is said to the
+pilot is an `Answer`: a line with its level, by which the page shows it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.pilot.answers import Answer
 from rrtik_ompl.pilot.interlock import Sight
 from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.pilot.routes.route_search import NoRoute
@@ -226,3 +227,46 @@ class WriteAnswer:
 Effect: TypeAlias = (
     Stop | SetPoint | Grip | Read | ReadMaster | FindRoute | StepToGrasp | Acknowledge | Give | Write | WriteAnswer
 )
+
+
+# --- answers ---------------------------------------------------------------------------------------------------------
+
+
+class Level(str, Enum):
+    """What kind of line it is: what was done, a command that is not executed, or what nobody has commanded."""
+
+    NEWS = "news"
+    REFUSAL = "refusal"
+    ALARM = "alarm"
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A line for the pilot.
+
+    Attributes:
+        level: Of the line.
+        text: The line.
+
+    Example:
+        >>> refused("no object is chosen; choose one that is in view").level.value
+        'refusal'
+    """
+
+    level: Level
+    text: str
+
+
+def news(text: str) -> Answer:
+    """What was done, or is so now."""
+    return Answer(Level.NEWS, text)
+
+
+def refused(text: str) -> Answer:
+    """Why a command is not executed, or has not led to what it is for."""
+    return Answer(Level.REFUSAL, text)
+
+
+def alarm(text: str) -> Answer:
+    """What nobody has commanded: the arm was stopped, something is lost, a route must not be followed any more."""
+    return Answer(Level.ALARM, text)

@@ -14,8 +14,7 @@ from rrtik_ompl.base.arrays import Vector, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import apart
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.pilot.answers import alarm, news, refused
-from rrtik_ompl.pilot.events import FindRoute, Read, Stop
+from rrtik_ompl.pilot.events import FindRoute, Read, Stop, alarm, news, refused
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED, Verb
 from rrtik_ompl.pilot.queries import grasp_fault, world_by_hand
 from rrtik_ompl.pilot.routes.follower import Follower, Track, path_fault

@@ -40,8 +40,6 @@ import numpy as np
 from rrtik_ompl.base.arrays import frozen
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError
 from rrtik_ompl.pilot import guide
-from rrtik_ompl.pilot.answers import alarm, news, refused
-from rrtik_ompl.pilot.arguments import MAX_WORD_LENGTH, fitting
 from rrtik_ompl.pilot.events import (
     Acknowledge,
     Broken,
@@ -59,8 +57,20 @@ from rrtik_ompl.pilot.events import (
     Unusable,
     Write,
     WriteAnswer,
+    alarm,
+    news,
+    refused,
 )
-from rrtik_ompl.pilot.interlock import ACKNOWLEDGE, CHOOSING, FOLLOWING, PROPOSED, Verb, refusal
+from rrtik_ompl.pilot.interlock import (
+    ACKNOWLEDGE,
+    CHOOSING,
+    FOLLOWING,
+    MAX_WORD_LENGTH,
+    PROPOSED,
+    Verb,
+    fitting,
+    refusal,
+)
 from rrtik_ompl.pilot.motion import hand, held, leading
 from rrtik_ompl.pilot.queries import grasp_fault, known, out_of_view
 from rrtik_ompl.pilot.state import Means, Pictures, State

@@ -12,8 +12,8 @@ import numpy as np
 
 from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.files.messages import quoted
-from rrtik_ompl.pilot.answers import alarm, refused
 from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
+from rrtik_ompl.pilot.events import alarm, refused
 from rrtik_ompl.pilot.interlock import Sight
 from rrtik_ompl.pilot.machine import VERBS
 from rrtik_ompl.pilot.web.server import MAX_PAGES, PilotServer

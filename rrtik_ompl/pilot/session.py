@@ -20,9 +20,9 @@ from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot import events, queries
-from rrtik_ompl.pilot.answers import Answer, Level, alarm
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
 from rrtik_ompl.pilot.devices.line_arm import LineArm
+from rrtik_ompl.pilot.events import Answer, Level, alarm
 from rrtik_ompl.pilot.interlock import UNSEEN_SECONDS, Knowledge, Sight
 from rrtik_ompl.pilot.machine import handle
 from rrtik_ompl.pilot.motion.leading import GraspServo

@@ -1,4 +1,4 @@
-"""All that a session knows and has decided, as one value. Only `machine.handle` makes the next one."""
+"""All that a session knows and has decided, as one value, and its parts. Only `machine.handle` makes the next one."""
 
 from __future__ import annotations
 
@@ -6,20 +6,27 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pinocchio as pin
 
-from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.pilot.answers import Answer, news
-from rrtik_ompl.pilot.arm_check import ArmCheck
-from rrtik_ompl.pilot.drive import Drive, Press
-from rrtik_ompl.pilot.events import Effect, Stop
+from rrtik_ompl.pilot.events import Answer, Effect, Stop, news
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.interlock import MANOEUVRE, Sight
-from rrtik_ompl.pilot.routes.follower import Follower, Progress, Track
+from rrtik_ompl.pilot.routes.follower import MADE, Follower, Progress, Track
 from rrtik_ompl.pilot.routes.route import Route
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.problem import Problem
+
+STILL_SECONDS = 0.5  # an arm that stands for so long is where its last reading says: pictures and joints are not of now
+TIP_TOLERANCE = 0.005  # [m] of the arm's model and of the marker on it
+TIP_SIGMAS = 3.0
+MIN_CHANGE = 1e-4  # [rad or m]; less is noise
+
+LEASH_SECONDS = 0.1  # how far a set point may be ahead of the arm, at the speed of the moment
+HOLD_SECONDS = 0.25  # without a renewal for as long the drive is over
+FIRST_SECONDS = 0.04  # of motion that the first command of a press asks for: a tap moves the arm by as much
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +106,134 @@ class Pictures:
     time: float = -np.inf
     unusable: str = ""
     seen_at: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmCheck:
+    """The camera against the joints: a marker on the gripper shows whether the arm is where its encoders say.
+
+    Attributes:
+        off: How far they differ, in words, if that is more than may be; "" if not, or if the tip was never seen.
+        q: Where the arm has stood since it moved last, shape (dof,); empty before it was read.
+        since: When that was [s].
+    """
+
+    off: str = ""
+    q: Vector = field(default_factory=lambda: np.zeros(0))
+    since: float = 0.0
+
+    def read(self, q: Vector, time: float) -> ArmCheck:
+        """After a reading of the joints at a time [s]."""
+        if len(q) == len(self.q) and np.abs(q - self.q).max() <= MIN_CHANGE:
+            return self
+        return replace(self, q=q, since=time)
+
+    def see(self, T_base_tip: pin.SE3, covariance: Matrix, expected: pin.SE3, time: float) -> ArmCheck:
+        """After a picture.
+
+        Of an arm that moves nothing is said: the last word holds.
+
+        Args:
+            T_base_tip: The tip as the picture shows it.
+            covariance: Of that, shape (6, 6).
+            expected: Where joints say that the tip is.
+            time: Of the picture [s].
+        """
+        if time - self.since < STILL_SECONDS:
+            return self
+
+        distance = float(np.linalg.norm(T_base_tip.translation - expected.translation))
+        sigma = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
+        if distance <= TIP_TOLERANCE + TIP_SIGMAS * sigma:
+            return replace(self, off="")
+
+        how_far = f"{1e3 * distance:.0f} mm"
+        return replace(self, off=f"the camera sees the gripper {how_far} from where the joints say; check both")
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """A key, button or stick that is held; one at a time.
+
+    Attributes:
+        verb: The command that it renews.
+        number: Of the press: a key that is pressed anew has another.
+        over: It was ended: whoever still holds it has to press again.
+        due: Joint and end of the move that it makes.
+        nearest: How near to its end the arm has come, and when.
+        near: From the end of a move at which it is made [rad or m].
+    """
+
+    verb: str = ""
+    number: float = -1.0
+    over: bool = False
+    due: tuple[int, float] = (0, 0.0)
+    nearest: tuple[float, float] = (np.inf, 0.0)
+    near: float = MADE
+
+    def is_of(self, verb: str, number: object) -> bool:
+        """Whether a command renews it."""
+        return (verb, number) == (self.verb, self.number)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """How the arm is driven: one joint at a time, or all together. Hold to run: only as long as its command is renewed.
+
+    Each renewal gives the arm a set point that is a little ahead of it, by no more than `LEASH_SECONDS` of its way.
+    Without a renewal, whatever the reason (the key is released, the page or the line hangs), the arm stops there.
+
+    Attributes:
+        joint: Number of the joint that is driven; None if none is.
+        goal: Where the drive ends [rad or m].
+        leading: Whether all joints are led to set points.
+        point: The set point of the joint [rad or m].
+        renewed: When the drive was renewed last [s].
+    """
+
+    joint: int | None = None
+    goal: float = 0.0
+    leading: bool = False
+    point: float = 0.0
+    renewed: float = -np.inf
+
+    @property
+    def active(self) -> bool:
+        """Whether the arm is driven."""
+        return self.leading or self.joint is not None
+
+    def expired(self, time: float) -> bool:
+        """Whether it was not renewed in time."""
+        return self.active and time - self.renewed > HOLD_SECONDS
+
+    def goes_on_to(self, joint: int, goal: float) -> bool:
+        """Whether a joint is driven already, and in the direction of a goal [rad or m]."""
+        turned = self.active and (goal - self.point) * (self.goal - self.point) < 0.0
+        return joint == self.joint and not turned and not self.leading
+
+    def begun(self, here: float, time: float) -> Drive:
+        """A new drive of a joint that is at a value [rad or m]."""
+        return Drive(point=here, renewed=time - FIRST_SECONDS)
+
+    def on(self, joint: int, goal: float, rate: float, here: float, time: float) -> Drive:
+        """Driven on towards a goal.
+
+        Args:
+            joint: Number of the joint.
+            goal: Where it goes at most [rad or m].
+            rate: Of the joint [rad/s or m/s].
+            here: Where the joint is [rad or m].
+            time: Now [s].
+        """
+        seconds = float(np.clip(time - self.renewed, 0.0, LEASH_SECONDS))
+        step = np.clip(goal - self.point, -rate * seconds, rate * seconds)
+        leash = rate * LEASH_SECONDS
+        point = float(np.clip(self.point + step, here - leash, here + leash))
+        return Drive(joint, goal, False, point, max(time, self.renewed))
+
+    def led(self, time: float) -> Drive:
+        """All joints are led to set points."""
+        return Drive(None, self.goal, True, self.point, max(time, self.renewed))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

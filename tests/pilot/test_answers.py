@@ -10,7 +10,7 @@ import pytest
 
 import rrtik_ompl.pilot
 from rrtik_ompl.pilot import answers
-from rrtik_ompl.pilot.answers import Answer, Level
+from rrtik_ompl.pilot.events import Answer, Level
 from rrtik_ompl.pilot.interlock import MODES
 from rrtik_ompl.pilot.machine import VERBS
 from rrtik_ompl.pilot.setup import SessionOptions, open_session

@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.base.poses import pose, quaternion_xyzw
-from rrtik_ompl.pilot.arm_check import STILL_SECONDS
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
+from rrtik_ompl.pilot.state import STILL_SECONDS
 from rrtik_tests.pilot_session import PROBLEM, ROBOT, session
 
 

@@ -9,9 +9,9 @@ import pytest
 
 import rrtik_ompl.pilot
 from rrtik_ompl import AttachedObject, Box, Obstacle, Problem, Scene, World, pose
-from rrtik_ompl.pilot.answers import Level
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
+from rrtik_ompl.pilot.events import Level
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import MAX_SHIFT, Surroundings, gripper_links
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MountedMarker

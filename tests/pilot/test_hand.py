@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rrtik_ompl.pilot.answers import Level
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
+from rrtik_ompl.pilot.events import Level
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_tests.pilot_session import PLACE, VALVE, arrived, drive_at, follow, refused, session
 

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.pilot.answers import Level
 from rrtik_ompl.pilot.devices.arm import DEFAULT_RATE, SimulatedArm
-from rrtik_ompl.pilot.drive import LEASH_SECONDS, Press
+from rrtik_ompl.pilot.events import Level
 from rrtik_ompl.pilot.interlock import FOLLOWING, MODES, PROPOSED
 from rrtik_ompl.pilot.routes.follower import Follower
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
-from rrtik_ompl.pilot.state import Gripper, Way
+from rrtik_ompl.pilot.state import LEASH_SECONDS, Gripper, Press, Way
 from rrtik_tests.pilot_session import ALWAYS, MOVING, PRESENT, PROBLEM, alarmed, refused, session
 
 ARGUMENTS = {

@@ -11,10 +11,9 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.document import state_document
-from rrtik_ompl.pilot.drive import Press
 from rrtik_ompl.pilot.interlock import FOLLOWING, MANOEUVRE, PROPOSED, UNSEEN_SECONDS
 from rrtik_ompl.pilot.session import Session
-from rrtik_ompl.pilot.state import Way
+from rrtik_ompl.pilot.state import Press, Way
 from rrtik_ompl.pilot.surroundings import Structure
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.world import World

@@ -17,8 +17,7 @@ from rrtik_ompl.base.poses import apart
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.goal import PoseGoal
 from rrtik_ompl.pilot import guide
-from rrtik_ompl.pilot.answers import alarm, news, refused
-from rrtik_ompl.pilot.events import FindRoute, Grip, Stop
+from rrtik_ompl.pilot.events import FindRoute, Grip, Stop, alarm, news, refused
 from rrtik_ompl.pilot.interlock import BY_HAND, MANOEUVRE, ON_A_ROUTE, Verb
 from rrtik_ompl.pilot.routes.route import Route, route_to
 from rrtik_ompl.pilot.routes.route_search import NoRoute

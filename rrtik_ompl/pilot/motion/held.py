@@ -11,15 +11,13 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot import guide
-from rrtik_ompl.pilot.answers import Answer, alarm, news, refused
-from rrtik_ompl.pilot.drive import HOLD_SECONDS, LEASH_SECONDS, Press
-from rrtik_ompl.pilot.events import Give, SetPoint
+from rrtik_ompl.pilot.events import Answer, Give, SetPoint, alarm, news, refused
 from rrtik_ompl.pilot.interlock import BY_HAND, FOLLOWING, ON_A_ROUTE, Verb
 from rrtik_ompl.pilot.motion.supervisor import FOLLOW_SECONDS, amount, slack_of
 from rrtik_ompl.pilot.queries import joint_range, out_of_view, world_by_hand
 from rrtik_ompl.pilot.routes.follower import MADE, Follower, Track
 from rrtik_ompl.pilot.routes.manoeuvre import check_move, move_refusal, way_out
-from rrtik_ompl.pilot.state import Means, State
+from rrtik_ompl.pilot.state import HOLD_SECONDS, LEASH_SECONDS, Means, Press, State
 
 STUCK_SECONDS = 0.8  # an arm that comes no nearer to the end of a move for as long does not get there
 MIN_SPEED = 0.05  # share of the joints' rates

@@ -17,13 +17,11 @@ from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.following.servo import Servo
 from rrtik_ompl.motion.following.visual_servo import ServoStep, VisualServo
-from rrtik_ompl.pilot.answers import news
-from rrtik_ompl.pilot.drive import LEASH_SECONDS
-from rrtik_ompl.pilot.events import ReadMaster, StepToGrasp
+from rrtik_ompl.pilot.events import ReadMaster, StepToGrasp, news
 from rrtik_ompl.pilot.interlock import BY_HAND, ON_A_ROUTE, Verb
 from rrtik_ompl.pilot.motion.held import begins, lead_to, pace
 from rrtik_ompl.pilot.queries import unseen_for, world_by_hand
-from rrtik_ompl.pilot.state import Means, State
+from rrtik_ompl.pilot.state import LEASH_SECONDS, Means, State
 from rrtik_ompl.world.world import World
 
 NEAR = 0.15  # [m]; from farther away there may be no straight way to a grasp

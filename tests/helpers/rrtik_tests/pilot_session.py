@@ -9,8 +9,8 @@ from rrtik_ompl import load_problem
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box
-from rrtik_ompl.pilot.answers import Level
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.events import Level
 from rrtik_ompl.pilot.interlock import MANOEUVRE
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
 from rrtik_ompl.pilot.session import Session
