@@ -26,12 +26,11 @@ import rrtik_ompl as rrtik
 from bench.peers.description import NoTask, task_of
 from bench.peers.host import Host
 from bench.shared.clocks import spent
+from bench.shared.motion_bench_maker import problem_of, scene_files
 from bench.shared.parts import Parts
 from bench.shared.problems import goal_joints
 from bench.shared.run import Pythons, Run, SetsOrNone
 from bench.speed.machine import machine
-from bench.whole_calls.report import scene_files
-from bench.whole_calls.search_calls import problem_of
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, Problem
 from rrtik_ompl.base.arrays import TAU, Matrix

@@ -27,8 +27,8 @@ from typer import Option
 import rrtik_ompl as rrtik
 from bench.peers.description import task_of
 from bench.peers.host import Host
+from bench.planning.best_known import best_lengths
 from bench.shared.run import PandaSet, Roboplan, Run
-from bench.whole_calls.best_known import best_lengths
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ompl_bridge.setup import exact_path

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from ompl import geometric as og
 
-from bench.whole_calls.search_calls import problem_of
+from bench.shared.motion_bench_maker import problem_of
 from rrtik_ompl import Obstacle, Problem, Scene, World, list_problems, load_problem, load_robot
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget

@@ -17,9 +17,8 @@ from typing import Annotated
 
 from typer import Option
 
+from bench.shared.motion_bench_maker import problem_of, scene_files
 from bench.shared.run import Sets
-from bench.whole_calls.report import scene_files
-from bench.whole_calls.search_calls import problem_of
 from rrtik_ompl import Problem, plan, shorten
 
 BEST = Path(__file__).resolve().parent.parent / "data" / "mbm_best.csv"
