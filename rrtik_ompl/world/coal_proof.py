@@ -73,7 +73,7 @@ class CoalProof:
         Returns:
             The numbers of two links, level and number of an interval in whose middle they are measured, shape (n, 4).
         """
-        margins = self.packed.table[layout.MARGINS]
+        margins = self.packed.table.margins
         bodies = self.packed.bodies
         solids = self.packed.sides
 
@@ -110,7 +110,7 @@ class CoalProof:
             Level and number of each interval; no interval if the two are not shown apart in all of the motion.
         """
         pair = [self._bodies[k] for k in self.packed.bodies[row].tolist()]
-        required_gap = float(self.packed.table[layout.MARGINS][row]) + DISTANCE_TOLERANCE
+        required_gap = float(self.packed.table.margins[row]) + DISTANCE_TOLERANCE
         approach = SPARE * float(approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0]))
         if required_gap <= 0.0:  # they may overlap, and coal measures surfaces alone
             return []
@@ -155,6 +155,6 @@ def _gap(robot: Robot, pair: Sequence[Body], q: Vector) -> float:
 
 def _groups(packed: ProofPairs) -> Mask:
     """Which rows of the table are groups of bodies: these are made of pairs that come before them."""
-    firsts = packed.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)[:, layout.PARTS_FIRST]
+    firsts = packed.table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.PARTS_FIRST]
     groups: Mask = (packed.sides[:, [1, 3]] < 0).all(axis=1) & (firsts < np.arange(len(firsts)))
     return groups

@@ -24,8 +24,8 @@ from rrtik_ompl.model.robot import Robot
 def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, ends: Matrix) -> None:
     """Let the kernels try the planes of contacts first, where a motion begins or ends, shape (2, dof)."""
     frames = robot.chain.joint_frames(ends)
-    normals_of_rows = packed.table[layout.WAYS].reshape(-1, 3)
-    bases = packed.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_BASE]
+    normals_of_rows = packed.table.ways.reshape(-1, 3)
+    bases = packed.table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_BASE]
     normal_of_solids: dict[tuple[int, int], tuple[int, Vector]] = {}
 
     for row in packed.touching:

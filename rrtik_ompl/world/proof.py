@@ -22,7 +22,7 @@ from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest, world_digest
 from rrtik_ompl.geometry.collision.solids import of_each
-from rrtik_ompl.kernels.proof.layout import WAYS, ProofTable
+from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.proof.log import ProofLog
 from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
@@ -174,7 +174,7 @@ class Prover:
 
         for k in range(len(rows) - 1):
             arguments = (values[k].ctypes.data, values[k + 1].ctypes.data, 1, pair.ctypes.data, place.ctypes.data)
-            run = partial(kernels.prove, ProofTable(packed.table.address), *arguments)
+            run = partial(kernels.prove, packed.table.address, *arguments)
             if packed.touching:
                 suggest_planes(self.robot, self.bodies, packed, rows[k : k + 2])
             logs.append(coal.logged(rows[k : k + 2], pair, place, run))
@@ -201,14 +201,14 @@ class Prover:
             mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
         return mask
 
-    def table(self, clearance: float) -> int:
-        """Where the table is for kernels that prove motions of their own, with a clearance [m] until the next proof.
+    def table(self, clearance: float) -> ProofTable:
+        """The table for kernels that prove motions of their own, with a clearance [m] until the next proof.
 
         They keep a little more, so that a proof from the other end of a motion agrees, and forget earlier planes.
         """
         packed = self._packed_for(clearance, SPARE)
-        packed.table[WAYS][:] = 0.0
-        return packed.table.address
+        packed.table.ways[:] = 0.0
+        return packed.table
 
     def made(self, proof: Proof) -> bool:
         """Whether a proof is one of these bodies, by this object or its like for another thread."""
@@ -267,7 +267,7 @@ class Prover:
 
         packed = self._packed_for(*distances)
         coal = self._coal_proof(packed)
-        table = ProofTable(packed.table.address)
+        address = packed.table.address
         pairs = np.full(count, NOT_LOOKED_AT, dtype=np.int32)
         places = np.full(count, np.nan)
         read = tails.ctypes.data, heads.ctypes.data
@@ -277,7 +277,7 @@ class Prover:
             """Let the kernels prove so many of the motions, and write the pairs and places; how many stay open."""
             skipped = DOUBLE * joints * first
             sinks = written[0] + INT * first, written[1] + DOUBLE * first
-            return int(kernels.prove(table, read[0] + skipped, read[1] + skipped, number, *sinks))
+            return int(kernels.prove(address, read[0] + skipped, read[1] + skipped, number, *sinks))
 
         looked_at = 0
         open_count = 0

@@ -97,9 +97,9 @@ def test_no_point_leaves_its_chord_by_more_than_the_bound(name, tmp_path):
     for a, b in zip(starts, ends, strict=True):
         world.motion_proven(a, b)
         table = world.prover.tables.packed.table
-        bends = table[layout.BENDS]
+        bends = table.bends
         frames = robot.joint_frames(a + np.linspace(0.0, 1.0, 101)[:, None] * (b - a))
-        sweeps = table[layout.SWEEPS].reshape(-1, layout.SWEEP_SIZE)
+        sweeps = table.sweeps.reshape(-1, layout.SWEEP_SIZE)
         for body in [k for k in world.bodies if k.joint > 0]:
             for (frame, base), bend in zip(sweeps, bends, strict=True):
                 if frame != body.joint:

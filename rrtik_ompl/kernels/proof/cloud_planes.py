@@ -15,22 +15,11 @@ from rrtik_ompl.kernels.checks.gjk import dot, minus, scaled
 from rrtik_ompl.kernels.clouds.accessors import PARTS, blocks_of, coordinates_at, point_at
 from rrtik_ompl.kernels.clouds.kernels import next_block
 from rrtik_ompl.kernels.proof import layout
-from rrtik_ompl.kernels.proof.accessors import (
-    cloud_poses_of,
-    clouds_of,
-    corners_of,
-    first_block_of,
-    kind_of_solid,
-    size_at,
-    sizes_at,
-    solids_of,
-    vector_at,
-)
-from rrtik_ompl.kernels.proof.frames import carried, turned, turned_back
-from rrtik_ompl.kernels.proof.layout import ProofTable
-from rrtik_ompl.kernels.proof.planes import SHORTEST, best_plane, corner_at
+from rrtik_ompl.kernels.proof.frames import carried, frame_at, origin_of, turned, turned_back, vector_at
+from rrtik_ompl.kernels.proof.layout import Frame, ProofTable, SizeRows
+from rrtik_ompl.kernels.proof.planes import ANY_WAY, SHORTEST, best_plane, corner_at, sizes_at, solid_at
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import bits, field, first_bit, set_double, set_int, set_wide_lanes, spread_wide
+from rrtik_ompl.kernels.simd.lanes import bits, first_bit, set_wide_lanes, spread_wide
 from rrtik_ompl.kernels.simd.vectors import along
 from rrtik_ompl.kernels.tables.cloud_layout import CloudTable, PointBlocks
 
@@ -38,39 +27,107 @@ ALONG_X, ALONG_Y, ALONG_Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 SINGLE_ROUNDING = 1e-6  # of a point's place in a box, in single precision, relative to the coordinates
 
 
+@kernel
+def cloud_apart(proof: ProofTable, one: int, other: int, frames: Any, wanted: float) -> bool:
+    """Whether every ball of a cloud is apart from a solid, at both ends of an interval, by more than ``wanted``.
+
+    Args:
+        proof: The table.
+        one: The solid.
+        other: The solid that stands for the cloud.
+        frames: Of the first solid at begin and end, of the other one at begin and end, all seen from the world.
+        wanted: See above [m].
+    """
+    number = solid_at(proof, other)[layout.SOLID_KIND] - layout.CLOUD
+    cloud: CloudTable = proof.clouds[number]
+    pose = frame_at(proof.cloud_poses, number)
+    origin = origin_of(pose)
+    sizes = sizes_at(proof, one)
+    reach = wanted + sizes_at(proof, other)[layout.ROUND]
+
+    # around the solid at both ends, along the cloud's axes: where to look for points
+    x = turned(pose, ALONG_X)
+    y = turned(pose, ALONG_Y)
+    z = turned(pose, ALONG_Z)
+    middle, half = box_along(sizes, frames, x, y, z, origin)
+    size = max(abs(middle[0]) + half[0], abs(middle[1]) + half[1], abs(middle[2]) + half[2]) + reach
+    half = widened(half, reach + SINGLE_ROUNDING * (1.0 + size))
+    low = single(minus(middle, half))
+    high = single(minus(middle, scaled(half, -1.0)))
+
+    # the same along the solid's own axes at the begin
+    a = turned(frames[0], box_axis(sizes, 0))
+    b = turned(frames[0], box_axis(sizes, 1))
+    c = turned(frames[0], box_axis(sizes, 2))
+    own_middle, own_half = box_along(sizes, frames, a, b, c, origin)
+    axes = single(turned_back(pose, a)), single(turned_back(pose, b)), single(turned_back(pose, c))
+    middles = single(own_middle)
+    halves = single(widened(own_half, reach + 8.0 * SINGLE_ROUNDING * (1.0 + size)))
+
+    points = blocks_of(cloud)
+    block = -1
+    while True:
+        block = next_block(cloud, low, high, block)
+        if block < 0:
+            return True
+        found = points_in_box(points, block, axes, middles, halves)
+        if found != 0 and not points_apart(proof, one, other, frames, wanted, points, block, found):
+            return False
+
+
 @inlined
-def box_axis(table: ProofTable, solid: int, axis: int) -> Any:
+def box_along(sizes: SizeRows, frames: Any, x: Any, y: Any, z: Any, origin: Any) -> Any:
+    """Middle and half sizes, along three unit vectors, of what is around a solid at both ends."""
+    u = span_along(sizes, frames, x, origin)
+    v = span_along(sizes, frames, y, origin)
+    w = span_along(sizes, frames, z, origin)
+    return (u[0], v[0], w[0]), (u[1], v[1], w[1])
+
+
+@inlined
+def span_along(sizes: SizeRows, frames: Any, way: Any, origin: Any) -> Any:
+    """Middle and half extent along a vector of a solid's box at both ends, counted from an origin."""
+    centre = box_middle(sizes)
+    p = dot(minus(carried(frames[0], centre), origin), way)
+    q = dot(minus(carried(frames[1], centre), origin), way)
+    a = extent_along(sizes, frames[0], way)
+    b = extent_along(sizes, frames[1], way)
+    low = min(p - a, q - b)
+    high = max(p + a, q + b)
+    return 0.5 * (low + high), 0.5 * (high - low)
+
+
+@inlined
+def box_axis(sizes: SizeRows, axis: int) -> Any:
     """An axis of a solid's box in the solid's frame."""
-    return sizes_at(table, solid, layout.BOX_AXES + 3 * axis)
+    return vector_at(sizes, layout.BOX_AXES + 3 * axis)
 
 
 @inlined
-def box_middle(table: ProofTable, solid: int) -> Any:
+def box_middle(sizes: SizeRows) -> Any:
     """The middle of a solid's box in the solid's frame."""
-    m = sizes_at(table, solid, layout.BOX_MIDDLE)
-    a, b, c = box_axis(table, solid, 0), box_axis(table, solid, 1), box_axis(table, solid, 2)
-    return minus(minus(scaled(a, m[0]), scaled(b, -m[1])), scaled(c, -m[2]))
+    m = vector_at(sizes, layout.BOX_MIDDLE)
+    a = scaled(box_axis(sizes, 0), m[0])
+    b = scaled(box_axis(sizes, 1), -m[1])
+    c = scaled(box_axis(sizes, 2), -m[2])
+    return minus(minus(a, b), c)
 
 
 @inlined
-def spread_along(table: ProofTable, solid: int, seen: int, place: int, way: Any) -> float:
-    """Half the extent of a solid's box along a vector of the surroundings; its frame is at a place of ``seen``."""
-    own, half = turned_back(seen, place, way), sizes_at(table, solid, layout.BOX_HALF)
-    a = abs(dot(box_axis(table, solid, 0), own)) * half[0]
-    b = abs(dot(box_axis(table, solid, 1), own)) * half[1]
-    extent: float = a + b + abs(dot(box_axis(table, solid, 2), own)) * half[2]
+def extent_along(sizes: SizeRows, frame: Frame, way: Any) -> float:
+    """Half the extent of a solid's box along a vector of the surroundings of its frame."""
+    own = turned_back(frame, way)
+    half = vector_at(sizes, layout.BOX_HALF)
+    a = abs(dot(box_axis(sizes, 0), own)) * half[0]
+    b = abs(dot(box_axis(sizes, 1), own)) * half[1]
+    extent: float = a + b + abs(dot(box_axis(sizes, 2), own)) * half[2]
     return extent
 
 
 @inlined
-def span_along(table: ProofTable, solid: int, seen: int, places: Any, way: Any, origin: Any) -> Any:
-    """Middle and half extent along a vector of a solid's box at both ends, counted from an origin."""
-    centre = box_middle(table, solid)
-    p = dot(minus(carried(seen, places[0], centre), origin), way)
-    q = dot(minus(carried(seen, places[1], centre), origin), way)
-    a, b = spread_along(table, solid, seen, places[0], way), spread_along(table, solid, seen, places[1], way)
-    low, high = min(p - a, q - b), max(p + a, q + b)
-    return 0.5 * (low + high), 0.5 * (high - low)
+def widened(half: Any, by: float) -> Any:
+    """Half sizes of a box that is larger."""
+    return half[0] + by, half[1] + by, half[2] + by
 
 
 @inlined
@@ -84,9 +141,12 @@ def points_in_box(points: PointBlocks, block: int, axes: Any, middle: Any, half:
     """The points of a block, as bits, that lie in a box, given along its axes. Here lanes hold points."""
     found = 0
     for part in range(PARTS):
-        x, y = coordinates_at(points, block, 0, part), coordinates_at(points, block, 1, part)
+        x = coordinates_at(points, block, 0, part)
+        y = coordinates_at(points, block, 1, part)
         z = coordinates_at(points, block, 2, part)
-        a, b, c = along(axes[0], x, y, z), along(axes[1], x, y, z), along(axes[2], x, y, z)
+        a = along(axes[0], x, y, z)
+        b = along(axes[1], x, y, z)
+        c = along(axes[2], x, y, z)
         inside = (a >= middle[0] - half[0]) & (a <= middle[0] + half[0])
         inside = inside & (b >= middle[1] - half[1]) & (b <= middle[1] + half[1])
         inside = inside & (c >= middle[2] - half[2]) & (c <= middle[2] + half[2])
@@ -94,107 +154,61 @@ def points_in_box(points: PointBlocks, block: int, axes: Any, middle: Any, half:
     return found
 
 
-@inlined
-def put_corner(table: ProofTable, other: int, number: int, poses: int, pose: int, p: Any) -> None:
-    """Let a point of a cloud be a corner of the solid that stands for it, the only one if it is a block's first."""
-    p = carried(poses, pose, (np.float64(p[0]), np.float64(p[1]), np.float64(p[2])))
-    corners, block = corners_of(table), first_block_of(solids_of(table), other) + number // WIDTH
-    lane = number % WIDTH
-    for axis in range(3):
-        if lane == 0:
-            set_wide_lanes(corners, 3 * block + axis, spread_wide(p[axis]))
-        else:
-            set_double(corners, (3 * block + axis) * WIDTH + lane, p[axis])
-
-
-@inlined
-def count_corners(table: ProofTable, other: int, count: int) -> None:
-    """Say how many corners the solid that stands for a cloud has."""
-    solids = solids_of(table)
-    end = first_block_of(solids, other) + (count + WIDTH - 1) // WIDTH
-    set_int(solids, layout.SOLID_SIZE * other + layout.END_BLOCK, end)
-
-
-@inlined
-def towards(table: ProofTable, one: int, other: int, seen: int, places: Any) -> Any:
-    """A unit vector from the first corner of the solid that stands for a cloud to the other solid."""
-    corner = corner_at(corners_of(table), first_block_of(solids_of(table), other), 0)
-    way = minus(carried(seen, places[0], box_middle(table, one)), corner)
-    length = sqrt(dot(way, way))
-    return scaled(way, 1.0 / length) if length > SHORTEST else (0.0, 0.0, 1.0)
-
-
 @kernel
 def points_apart(
-    table: ProofTable, one: int, other: int, seen: int, places: Any, wanted: float, points: PointBlocks, found: Any
+    proof: ProofTable, one: int, other: int, frames: Any, wanted: float, points: PointBlocks, block: int, found: int
 ) -> bool:
     """Whether planes keep points of a block, given as bits, from a solid at both ends by more than ``wanted``."""
-    poses, pose = cloud_poses_of(table), layout.FRAME_SIZE * (kind_of_solid(solids_of(table), other) - layout.CLOUD)
-    block, left = found
-    count, rest = 0, left
+    count = 0
+    rest = found
     while rest != 0:
-        put_corner(table, other, count, poses, pose, point_at(points, block, first_bit(rest)))
+        put_corner(proof, other, count, point_at(points, block, first_bit(rest)))
         count += 1
-        rest &= rest - 1
-    count_corners(table, other, count)
-    gap, _ = best_plane(table, one, other, seen, places, wanted, towards(table, one, other, seen, places))
+        rest &= rest - 1  # without the lowest bit
+    count_corners(proof, other, count)
+    gap, _ = best_plane(proof, one, other, frames, wanted, towards(proof, one, other, frames))
     if gap > wanted:
         return True
     if count == 1:
         return False
-    count_corners(table, other, 1)
-    while left != 0:
-        put_corner(table, other, 0, poses, pose, point_at(points, block, first_bit(left)))
-        gap, _ = best_plane(table, one, other, seen, places, wanted, towards(table, one, other, seen, places))
+
+    count_corners(proof, other, 1)
+    rest = found
+    while rest != 0:
+        put_corner(proof, other, 0, point_at(points, block, first_bit(rest)))
+        gap, _ = best_plane(proof, one, other, frames, wanted, towards(proof, one, other, frames))
         if gap <= wanted:
             return False
-        left &= left - 1
+        rest &= rest - 1
     return True
 
 
-@kernel
-def cloud_apart(table: ProofTable, one: int, other: int, seen: int, places: Any, wanted: float) -> bool:
-    """Whether every ball of a cloud is apart from a solid, at both ends of an interval, by more than ``wanted``.
+@inlined
+def put_corner(proof: ProofTable, other: int, number: int, point: Any) -> None:
+    """Let a point of a cloud be a corner of the solid that stands for it, the only one if it is a block's first."""
+    solid = solid_at(proof, other)
+    pose = frame_at(proof.cloud_poses, solid[layout.SOLID_KIND] - layout.CLOUD)
+    p = carried(pose, (np.float64(point[0]), np.float64(point[1]), np.float64(point[2])))
+    block = solid[layout.FIRST_BLOCK] + number // WIDTH
+    lane = number % WIDTH
+    for axis in range(3):
+        if lane == 0:
+            set_wide_lanes(proof.corners, 3 * block + axis, spread_wide(p[axis]))
+        else:
+            proof.corners[(3 * block + axis) * WIDTH + lane] = p[axis]
 
-    Args:
-        table: The table.
-        one: The solid.
-        other: The solid that stands for the cloud.
-        seen: Frames, all seen from the world.
-        places: Of the first solid's frame at begin and end.
-        wanted: See above [m].
-    """
-    number = kind_of_solid(solids_of(table), other) - layout.CLOUD
-    cloud: CloudTable = field(clouds_of(table), number)
-    poses, pose = cloud_poses_of(table), layout.FRAME_SIZE * number
-    reach = wanted + size_at(table, other, layout.ROUND)
-    origin = vector_at(poses, pose + layout.SHIFT)
-    # around the solid at both ends, along the cloud's axes: where to look for points
-    x, y, z = turned(poses, pose, ALONG_X), turned(poses, pose, ALONG_Y), turned(poses, pose, ALONG_Z)
-    u, v = span_along(table, one, seen, places, x, origin), span_along(table, one, seen, places, y, origin)
-    w = span_along(table, one, seen, places, z, origin)
-    size = max(abs(u[0]) + u[1], abs(v[0]) + v[1], abs(w[0]) + w[1]) + reach
-    around = reach + SINGLE_ROUNDING * (1.0 + size)
-    middle, half = (u[0], v[0], w[0]), (u[1] + around, v[1] + around, w[1] + around)
-    low, high = single(minus(middle, half)), single(minus(middle, scaled(half, -1.0)))
-    # the same along the solid's own axes at the begin
-    a = turned(seen, places[0], box_axis(table, one, 0))
-    b = turned(seen, places[0], box_axis(table, one, 1))
-    c = turned(seen, places[0], box_axis(table, one, 2))
-    u, v = span_along(table, one, seen, places, a, origin), span_along(table, one, seen, places, b, origin)
-    w = span_along(table, one, seen, places, c, origin)
-    axes = (
-        single(turned_back(poses, pose, a)),
-        single(turned_back(poses, pose, b)),
-        single(turned_back(poses, pose, c)),
-    )
-    around = reach + 8.0 * SINGLE_ROUNDING * (1.0 + size)
-    middles, halves = single((u[0], v[0], w[0])), single((u[1] + around, v[1] + around, w[1] + around))
-    points, block = blocks_of(cloud), -1
-    while True:
-        block = next_block(cloud, low, high, block)
-        if block < 0:
-            return True
-        found = points_in_box(points, block, axes, middles, halves)
-        if found != 0 and not points_apart(table, one, other, seen, places, wanted, points, (block, found)):
-            return False
+
+@inlined
+def count_corners(proof: ProofTable, other: int, count: int) -> None:
+    """Say how many corners the solid that stands for a cloud has."""
+    solid = solid_at(proof, other)
+    solid[layout.END_BLOCK] = solid[layout.FIRST_BLOCK] + (count + WIDTH - 1) // WIDTH
+
+
+@inlined
+def towards(proof: ProofTable, one: int, other: int, frames: Any) -> Any:
+    """A unit vector from the first corner of the solid that stands for a cloud to the other solid."""
+    corner = corner_at(proof.corners, solid_at(proof, other)[layout.FIRST_BLOCK], 0)
+    way = minus(carried(frames[0], box_middle(sizes_at(proof, one))), corner)
+    length = sqrt(dot(way, way))
+    return scaled(way, 1.0 / length) if length > SHORTEST else ANY_WAY

@@ -8,40 +8,47 @@ from typing import Any
 from rrtik_ompl.kernels.checks.gjk import dot
 from rrtik_ompl.kernels.layout import JointValues
 from rrtik_ompl.kernels.proof import layout
-from rrtik_ompl.kernels.proof.accessors import (
-    base_of_sweep,
-    bends_of,
-    frame_of_sweep,
-    frames_of,
-    joint_count_of,
-    joints_of,
-    node_frames,
-    parents_of,
-    reaches_of,
-    sliding_of,
-    sweep_count_of,
-    sweeps_of,
-    vector_at,
-)
-from rrtik_ompl.kernels.proof.layout import ProofTable
+from rrtik_ompl.kernels.proof.layout import Frame, ProofTable
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import double_at, int_at, set_double
+from rrtik_ompl.kernels.simd.records import row_at
 
 
 @inlined
-def turned(array: int, place: int, p: Any) -> Any:
+def vector_at(numbers: Any, place: int) -> Any:
+    """Three numbers of an array from a place on."""
+    return numbers[place], numbers[place + 1], numbers[place + 2]
+
+
+@inlined
+def frame_at(frames: Frame, number: int) -> Frame:
+    """One of several frames."""
+    return row_at(frames, layout.FRAME_SIZE, number)
+
+
+@inlined
+def node_frames(proof: ProofTable, node: int) -> Frame:
+    """The frames of a node; the first one is the world."""
+    return row_at(proof.frames, layout.FRAME_SIZE * (proof.joint_count + 1), node)
+
+
+@inlined
+def origin_of(frame: Frame) -> Any:
+    """The origin of a frame."""
+    return vector_at(frame, layout.ORIGIN)
+
+
+@inlined
+def turned(frame: Frame, p: Any) -> Any:
     """A vector of a frame in the frame's surroundings."""
-    return (
-        dot(vector_at(array, place), p),
-        dot(vector_at(array, place + 3), p),
-        dot(vector_at(array, place + 6), p),
-    )
+    return dot(vector_at(frame, 0), p), dot(vector_at(frame, 3), p), dot(vector_at(frame, 6), p)
 
 
 @inlined
-def turned_back(array: int, place: int, p: Any) -> Any:
+def turned_back(frame: Frame, p: Any) -> Any:
     """A vector of the surroundings in a frame."""
-    a, b, c = vector_at(array, place), vector_at(array, place + 3), vector_at(array, place + 6)
+    a = vector_at(frame, 0)
+    b = vector_at(frame, 3)
+    c = vector_at(frame, 6)
     return (
         a[0] * p[0] + b[0] * p[1] + c[0] * p[2],
         a[1] * p[0] + b[1] * p[1] + c[1] * p[2],
@@ -50,81 +57,80 @@ def turned_back(array: int, place: int, p: Any) -> Any:
 
 
 @inlined
-def carried(array: int, place: int, p: Any) -> Any:
+def carried(frame: Frame, p: Any) -> Any:
     """A point of a frame in the frame's surroundings."""
-    x, y, z = turned(array, place, p)
-    origin = vector_at(array, place + layout.SHIFT)
+    x, y, z = turned(frame, p)
+    origin = origin_of(frame)
     return x + origin[0], y + origin[1], z + origin[2]
 
 
 @kernel
-def place_frames(table: ProofTable, start: JointValues, end: JointValues, s: float, node: int) -> None:
-    """Write the frames of all joints at a share s of the motion between two rows of joint values."""
-    frames, joints, parents = frames_of(table), joints_of(table), parents_of(table)
-    first = node_frames(table, node)
+def place_frames(proof: ProofTable, start: JointValues, end: JointValues, share: float, node: int) -> None:
+    """Write the frames of all joints at a share of the motion between two rows of joint values."""
+    frames = node_frames(proof, node)
     for place in range(layout.FRAME_SIZE):
-        set_double(frames, first + place, 1.0 if place in (0, 4, 8) else 0.0)
-    for k in range(joint_count_of(table)):
-        q = double_at(start, k) + s * (double_at(end, k) - double_at(start, k))
-        parent, to = first + layout.FRAME_SIZE * int_at(parents, k), first + layout.FRAME_SIZE * (k + 1)
-        record = layout.JOINT_SIZE * k
-        axis = vector_at(joints, record + layout.JOINT_AXIS)
-        shift = vector_at(joints, record + layout.SHIFT)
-        slides = int_at(sliding_of(table), k) != 0
-        c, e = (1.0, 0.0) if slides else (cos(q), sin(q))
-        d = 1.0 - c
-        x, y, z = axis
-        for i in range(3):
-            row = vector_at(frames, parent + 3 * i)
-            u, v, w = turned_back(joints, record, row)
-            along = q * (u * x + v * y + w * z) if slides else 0.0
-            set_double(frames, to + 3 * i, u * (c + x * x * d) + v * (y * x * d + z * e) + w * (z * x * d - y * e))
-            set_double(frames, to + 3 * i + 1, u * (x * y * d - z * e) + v * (c + y * y * d) + w * (z * y * d + x * e))
-            set_double(frames, to + 3 * i + 2, u * (x * z * d + y * e) + v * (y * z * d - x * e) + w * (c + z * z * d))
-            origin = double_at(frames, parent + layout.SHIFT + i)
-            set_double(frames, to + layout.SHIFT + i, origin + dot(row, shift) + along)
+        frames[place] = 1.0 if place in (0, 4, 8) else 0.0
+    for k in range(proof.joint_count):
+        value = start[k] + share * (end[k] - start[k])
+        slides = proof.sliding[k] != 0
+        cosine, sine = (1.0, 0.0) if slides else (cos(value), sin(value))
+        joint = row_at(proof.joints, layout.JOINT_SIZE, k)
+        move_frame(joint, value, slides, cosine, sine, frame_at(frames, proof.parents[k]), frame_at(frames, k + 1))
+
+
+@inlined
+def move_frame(joint: Any, value: float, slides: bool, cosine: float, sine: float, parent: Frame, frame: Frame) -> None:
+    """Write the frame of a joint: its placement in the parent's frame, then its own turn (Rodrigues) or slide."""
+    x, y, z = vector_at(joint, layout.JOINT_AXIS)
+    shift = origin_of(joint)
+    c, s, d = cosine, sine, 1.0 - cosine
+    for i in range(3):
+        row = vector_at(parent, 3 * i)
+        u, v, w = turned_back(joint, row)
+        frame[3 * i] = u * (c + x * x * d) + v * (y * x * d + z * s) + w * (z * x * d - y * s)
+        frame[3 * i + 1] = u * (x * y * d - z * s) + v * (c + y * y * d) + w * (z * y * d + x * s)
+        frame[3 * i + 2] = u * (x * z * d + y * s) + v * (y * z * d - x * s) + w * (c + z * z * d)
+        along = value * (u * x + v * y + w * z) if slides else 0.0
+        frame[layout.ORIGIN + i] = parent[layout.ORIGIN + i] + dot(row, shift) + along
 
 
 @kernel
-def seen_from(frames: int, frame: int, base: int, seen: int, to: int) -> None:
-    """Write a frame as seen from another one, all by their places."""
+def seen_from(base: Frame, frame: Frame, seen: Frame) -> None:
+    """Write a frame as seen from another one."""
     for column in range(3):
-        way = (
-            double_at(frames, frame + column),
-            double_at(frames, frame + 3 + column),
-            double_at(frames, frame + 6 + column),
-        )
-        x, y, z = turned_back(frames, base, way)
-        set_double(seen, to + column, x)
-        set_double(seen, to + 3 + column, y)
-        set_double(seen, to + 6 + column, z)
-    a, b = vector_at(frames, frame + layout.SHIFT), vector_at(frames, base + layout.SHIFT)
-    x, y, z = turned_back(frames, base, (a[0] - b[0], a[1] - b[1], a[2] - b[2]))
-    set_double(seen, to + layout.SHIFT, x)
-    set_double(seen, to + layout.SHIFT + 1, y)
-    set_double(seen, to + layout.SHIFT + 2, z)
+        axis = frame[column], frame[3 + column], frame[6 + column]
+        x, y, z = turned_back(base, axis)
+        seen[column] = x
+        seen[3 + column] = y
+        seen[6 + column] = z
+    a = origin_of(frame)
+    b = origin_of(base)
+    x, y, z = turned_back(base, (a[0] - b[0], a[1] - b[1], a[2] - b[2]))
+    seen[layout.ORIGIN] = x
+    seen[layout.ORIGIN + 1] = y
+    seen[layout.ORIGIN + 2] = z
 
 
 @kernel
-def bound_bends(table: ProofTable, start: JointValues, end: JointValues) -> None:
+def bound_bends(proof: ProofTable, start: JointValues, end: JointValues) -> None:
     """Bound the acceleration of each sweep's points over a whole motion, time running from 0 to 1 [m].
 
     From the body inwards: what turns at rate w about an axis at most r away adds the centripetal w^2 r and the Coriolis
     term 2 w V of the velocity V that it has already; what slides adds velocity alone.
     """
-    count, sliding, parents = joint_count_of(table), sliding_of(table), parents_of(table)
-    reaches, bends, sweeps = reaches_of(table), bends_of(table), sweeps_of(table)
-    for sweep in range(sweep_count_of(table)):
-        velocity, bend = 0.0, 0.0
-        frame, base = frame_of_sweep(sweeps, sweep), base_of_sweep(sweeps, sweep)
-        while frame != base:
-            k = frame - 1
-            rate = abs(double_at(end, k) - double_at(start, k))
-            if int_at(sliding, k) != 0:
+    for number in range(proof.sweep_count):
+        sweep = row_at(proof.sweeps, layout.SWEEP_SIZE, number)
+        reaches = row_at(proof.reaches, proof.joint_count, number)
+        velocity = 0.0
+        bend = 0.0
+        frame = sweep[layout.SWEEP_FRAME]
+        while frame != sweep[layout.SWEEP_BASE]:
+            joint = frame - 1
+            rate = abs(end[joint] - start[joint])
+            if proof.sliding[joint] != 0:
                 velocity += rate
             else:
-                reach = double_at(reaches, count * sweep + k)
-                bend += rate * (2.0 * velocity + rate * reach)
-                velocity += rate * reach
-            frame = int_at(parents, k)
-        set_double(bends, sweep, bend)
+                bend += rate * (2.0 * velocity + rate * reaches[joint])
+                velocity += rate * reaches[joint]
+            frame = proof.parents[joint]
+        proof.bends[number] = bend

@@ -1,54 +1,114 @@
-"""Where things stand in the table of a proof; see :mod:`rrtik_ompl.kernels.layout` for how tables are made."""
+"""The table of a proof: what each field is, and the places of numbers in its rows."""
 
 from __future__ import annotations
 
-from typing import NewType
+from rrtik_ompl.kernels.record import Doubles, Ints, Record, Wholes
 
-ProofTable = NewType("ProofTable", int)
 
-# Joints: PARENTS: frame that carries each joint · SLIDING: whether it slides · JOINTS: records of float64 (below)
-# Solids: SOLIDS: records of int32 · SIZES: records of float64 · CORNERS: float64, blocks (below)
-# Sweeps: a body seen from a frame that it moves in. SWEEPS: records of int32 · REACHES: JOINT_COUNT float64 each
-# Pairs: PAIRS: records of int32, those of whole bodies first · MARGINS: what each keeps [m], rounding included
-JOINT_COUNT, PARENTS, SLIDING, JOINTS, SOLIDS, SIZES, CORNERS = range(7)
-SWEEP_COUNT, SWEEPS, REACHES, BODY_PAIR_COUNT, PAIR_COUNT, PAIRS, MARGINS = range(7, 14)
-# What a proof computes in. FRAMES: of all joints at each node · STAMPS: the motion that a node's frames are of ·
-# BENDS: largest acceleration of each sweep in this motion [m] · WAYS: of each pair the normal of its last plane ·
-# LISTS: open pairs at each level · STACK: levels and numbers of intervals · SEEN: frames seen from another one ·
-# LAST_STAMP: one int32, counts motions
-FRAMES, STAMPS, BENDS, WAYS, LISTS, COUNTS, STACK, SEEN, LAST_STAMP = range(14, 23)
-# TOP_COUNT, TOP_PAIRS: numbers of the pairs to begin with, groups of bodies before their bodies (int32)
-TOP_COUNT, TOP_PAIRS = range(23, 25)
-# What a proof tells of itself. LOG_ROOM: records that there is room for, 0 for a proof that tells nothing · LOG:
-# records of int32 · LOG_WAYS: of each the unit normal of its plane, seen from the base of its pair, or zeros ·
-# LOG_COUNT: one int32, counts records, also those for which there was no room
-LOG_ROOM, LOG, LOG_WAYS, LOG_COUNT = range(25, 29)
-# CLOUDS: addresses of the tables of clouds · CLOUD_POSES: their frames in the world
-CLOUDS, CLOUD_POSES = range(29, 31)
+class Frame(Doubles):
+    """Frames: the rotation row by row, then the origin."""
 
-# Joint (doubles): rotation of its placement row by row, origin, axis.
-JOINT_SIZE = 15
-TURN, SHIFT, JOINT_AXIS = 0, 9, 12
-# Frame (doubles): rotation row by row, origin.
+
+class JointRows(Frame):
+    """The placement of each joint in its parent's frame, and its axis."""
+
+
+class SolidRows(Ints):
+    """Of each solid what it is, and where its corners are; see below."""
+
+
+class SizeRows(Doubles):
+    """The measures of each solid; see below."""
+
+
+class Corners(Doubles):
+    """Blocks of x, y and z of as many corners as there are lanes; the last block of a solid is filled up."""
+
+
+class SweepRows(Ints):
+    """Of each sweep the frame of the body, and the frame that it is seen from."""
+
+
+class PairRows(Ints):
+    """Of each pair its solids, and how they are seen; see below."""
+
+
+class LogRows(Ints):
+    """Of each record what is proven; see below."""
+
+
+class ProofTable(Record):
+    """An arm among bodies, what of them must not touch, and what a proof of a motion computes in.
+
+    A sweep is a body, or several, seen from a frame that it moves in. Frames are counted like Pinocchio's joints: 0 is
+    the world. A node is one of ``NODES`` places of a motion, from its start to its end.
+    """
+
+    joint_count: int
+    parents: Ints  # frame that carries each joint
+    sliding: Ints  # whether each slides
+    joints: JointRows
+    solids: SolidRows
+    sizes: SizeRows
+    corners: Corners
+    sweep_count: int
+    sweeps: SweepRows
+    reaches: Doubles  # [m] of each sweep, ``joint_count`` of them: how far its points come from the axis of each joint
+
+    body_pair_count: int  # pairs of whole bodies, which come first
+    pair_count: int
+    pairs: PairRows
+    margins: Doubles  # what each pair keeps [m], rounding included
+    top_count: int
+    top_pairs: Ints  # the pairs to begin with, groups of bodies before their bodies
+
+    # What a proof computes in.
+    frames: Frame  # at each node that of the world, then those of all joints
+    stamps: Ints  # number of the motion that the frames of each node are of
+    stamp: int  # number of this motion
+    bends: Doubles  # largest acceleration of each sweep in this motion [m]
+    ways: Doubles  # of each pair the normal of its last plane
+    lists: Ints  # open pairs at each level, ``pair_count`` places for each
+    counts: Ints  # how many of them
+    stack: Ints  # levels and numbers of intervals
+    seen: Frame  # four, of a pair's solids at both ends of an interval, seen from the pair's base
+
+    # What it tells of itself.
+    log_room: int  # records that there is room for; 0 for a proof that tells nothing
+    log: LogRows
+    log_ways: Doubles  # of each record the unit normal of its plane, seen from the base of its pair, or zeros
+    log_count: int  # records, also those for which there was no room
+
+    clouds: Wholes  # addresses of their tables
+    cloud_poses: Frame  # in the world
+
+
 FRAME_SIZE = 12
-# Corners (doubles): x, y and z of as many corners as there are lanes; the last block of a solid is filled up.
-# Solid (ints): frame, blocks of corners from, to, kind.
+ORIGIN = 9
+
+JOINT_SIZE = 15
+JOINT_AXIS = 12  # behind a frame
+
+# Solid: its frame, blocks of its corners from, to, kind.
 SOLID_SIZE = 4
 SOLID_FRAME, FIRST_BLOCK, END_BLOCK, SOLID_KIND = range(4)
 CONVEX_SOLID, HALF_SPACE, WHOLE_BODY, UNKNOWN = range(4)  # a whole body, or several, has a ball and a box, no corners
 CLOUD = 4  # and its number among the clouds; its corners are the points that are compared at the moment
-# Sizes (doubles): bounding ball; axes of the box row by row, its middle along them, its half sides; radius of the disc
-# (offset of a half-space) and its axis; radius of the ball around every point.
+
+# Sizes: bounding ball; axes of the box row by row, its middle along them, its half sides; radius of the disc (offset
+# of a half-space) and its axis; radius of the ball around every point.
 SIZE_COUNT = 24
 BALL_CENTRE, BALL_RADIUS, BOX_AXES, BOX_MIDDLE, BOX_HALF, DISC, DISC_AXIS, ROUND = 0, 3, 4, 13, 16, 19, 20, 23
-# Sweep (ints): frame of the body, frame it is seen from.
+
 SWEEP_SIZE = 2
 SWEEP_FRAME, SWEEP_BASE = range(2)
-# Pair (ints): two solids, the frame that both are seen from, their sweeps (-1: it stands still there), pairs of their
-# parts from, to.
+
+# Pair: two solids, the frame that both are seen from, their sweeps (-1: it stands still there), pairs of their parts
+# from, to.
 PAIR_SIZE = 7
 PAIR_ONE, PAIR_OTHER, PAIR_BASE, ONE_SWEEP, OTHER_SWEEP, PARTS_FIRST, PARTS_END = range(7)
-# Record of the log (ints): pair, level and number of an interval on which it is proven apart, by what.
+
+# Log: a pair, level and number of an interval on which it is proven apart, by what.
 LOG_SIZE = 4
 LOG_PAIR, LOG_LEVEL, LOG_NUMBER, LOG_MEANS = range(4)
 OPEN, BY_BALL, BY_PLANE = range(3)  # not proven; by a ball and a ball or box; by a plane

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.kernels.proof import layout
+from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.proof.packing import ProofPairs
-from rrtik_ompl.kernels.tables.memory import Table, aligned
+from rrtik_ompl.kernels.tables.memory import aligned
 
 FIRST_ROOM = 4096  # records
 
@@ -40,28 +41,29 @@ def logged(packed: ProofPairs, run: Callable[[], object], first_room: int = FIRS
         run: Lets them prove the motion; called again where there was too little room.
         first_room: For how many records there is room at first.
     """
-    table, room = packed.table, first_room
+    table = packed.table
+    room = first_room
     try:
         _give_room(table, room)
         run()
-        while (count := int(table[layout.LOG_COUNT][0])) > room:
-            room = 2 * count  # another run need not come to the same planes
+        while table.log_count > room:
+            room = 2 * table.log_count  # another run need not come to the same planes
             _give_room(table, room)
             run()
     finally:
-        table.header[layout.LOG_ROOM] = 0
-    records = table[layout.LOG].reshape(-1, layout.LOG_SIZE)[:count].astype(np.int64)
+        table.log_room = 0
+
+    count = table.log_count
+    records = table.log.reshape(-1, layout.LOG_SIZE)[:count].astype(np.int64)
     intervals = records[:, [layout.LOG_LEVEL, layout.LOG_NUMBER]]
-    normals = np.array(table[layout.LOG_WAYS].reshape(-1, 3)[:count])
+    normals = np.array(table.log_ways.reshape(-1, 3)[:count])
     return ProofLog(packed.sides[records[:, layout.LOG_PAIR]], intervals, normals)
 
 
-def _give_room(table: Table, room: int) -> None:
+def _give_room(table: ProofTable, room: int) -> None:
     """Empty the log and give it room; the table's address stays."""
-    if len(table[layout.LOG_WAYS]) != 3 * room:
+    if len(table.log_ways) != 3 * room:
         records = np.zeros(layout.LOG_SIZE * room, dtype=np.int32)
-        for place, array in ((layout.LOG, records), (layout.LOG_WAYS, np.zeros(3 * room))):
-            table.arrays[place] = roomy = aligned(array)
-            table.header[place] = roomy.ctypes.data
-    table.header[layout.LOG_ROOM] = room
-    table[layout.LOG_COUNT][0] = 0
+        table.put(log=aligned(records), log_ways=aligned(np.zeros(3 * room)))
+    table.log_room = room
+    table.log_count = 0

@@ -11,10 +11,17 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels.proof import layout
-from rrtik_ompl.kernels.proof.cloud_frames import cloud_bodies, cloud_poses
-from rrtik_ompl.kernels.proof.corners import corner_blocks, corners_in
 from rrtik_ompl.kernels.proof.groups import BLOCK
-from rrtik_ompl.kernels.proof.packing import NOTHING, ProofPairs, sizes_of, solid_kind
+from rrtik_ompl.kernels.proof.packing import (
+    NOTHING,
+    ProofPairs,
+    cloud_bodies,
+    cloud_poses,
+    corner_blocks,
+    corners_in,
+    size_rows,
+    solid_kind,
+)
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, convex_solids, placed_bodies
@@ -40,18 +47,18 @@ class MovedObstacles:
         self._numbers = [k for k, body in enumerate(bodies) if body.kind == "obstacle"]
         self._back = [bodies[k].placement.inverse() for k in self._numbers]
         place = {k: number for number, k in enumerate(self._numbers)}
-        below = packed.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_OTHER]
+        below = packed.table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_OTHER]
         solids = dict(zip(below.tolist(), packed.sides[:, 2].tolist(), strict=True))  # what stands still is below
         owners = {solid: place[body] for solid, body in sorted(solids.items()) if body in place}
         self._solids, self._owners = (np.array(list(some), dtype=np.int64) for some in (owners, owners.values()))
-        records = packed.table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)[self._solids]
+        records = packed.table.solids.reshape(-1, layout.SOLID_SIZE)[self._solids]
         counts = records[:, layout.END_BLOCK] - records[:, layout.FIRST_BLOCK]
         spans = [np.arange(*ends) for ends in records[:, [layout.FIRST_BLOCK, layout.END_BLOCK]].tolist()]
         self._block_places = np.concatenate([np.zeros(0, dtype=np.int64), *spans])
         self._block_owners = np.repeat(self._owners, counts)
         self._half = records[:, layout.SOLID_KIND] == layout.HALF_SPACE
-        self._sizes: Matrix = packed.table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)[self._solids]
-        self._blocks: NDArray[np.float64] = packed.table[layout.CORNERS].reshape(-1, 3, WIDTH)[self._block_places]
+        self._sizes: Matrix = packed.table.sizes.reshape(-1, layout.SIZE_COUNT)[self._solids]
+        self._blocks: NDArray[np.float64] = packed.table.corners.reshape(-1, 3, WIDTH)[self._block_places]
         sides = [(row, place[k]) for row, pair in enumerate(packed.bodies.tolist()) for k in pair if k in place]
         self._pairs: NDArray[np.int64] = np.array(sides, dtype=np.int64).reshape(-1, 2)
         obstacles = np.array([bodies[k].margin for k in self._numbers])
@@ -77,9 +84,9 @@ class MovedObstacles:
         rows[:, _MIDDLE] += _turned(axes, shift)
         rows[:, _DISC_AXIS] = _turned(turn, rows[:, _DISC_AXIS])
         rows[:, layout.DISC] += self._half * (rows[:, _DISC_AXIS] * shift).sum(axis=1)
-        packed.table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)[self._solids] = rows
+        packed.table.sizes.reshape(-1, layout.SIZE_COUNT)[self._solids] = rows
         blocks = turns[self._block_owners] @ self._blocks + shifts[self._block_owners][:, :, None]
-        packed.table[layout.CORNERS].reshape(-1, 3, WIDTH)[self._block_places] = blocks
+        packed.table.corners.reshape(-1, 3, WIDTH)[self._block_places] = blocks
         self._put_clouds(bodies)
 
     def _put_clouds(self, bodies: Sequence[Body]) -> None:
@@ -87,15 +94,15 @@ class MovedObstacles:
         table, numbers = self._packed.table, cloud_bodies(bodies)
         if not numbers:
             return
-        table[layout.CLOUD_POSES][:] = cloud_poses(bodies).ravel()
+        table.cloud_poses[:] = cloud_poses(bodies).ravel()
         self._clouds = [cloud_table(bodies[k].geometry.cloud) for k in numbers]
-        table[layout.CLOUDS][:] = [cloud.address for cloud in self._clouds]
-        sizes = table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)
-        kinds = table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)[:, layout.SOLID_KIND]
+        table.clouds[:] = [cloud.address for cloud in self._clouds]
+        sizes = table.sizes.reshape(-1, layout.SIZE_COUNT)
+        kinds = table.solids.reshape(-1, layout.SOLID_SIZE)[:, layout.SOLID_KIND]
         places = [bodies[k].placement.homogeneous for k in numbers]
         around = placed_bodies([convex_solids(bodies[k].geometry) for k in numbers], np.array(places))
         turns = np.array([place[:3, :3] for place in places])
-        sizes[np.flatnonzero(kinds >= layout.CLOUD)] = sizes_of([solids.around for solids in around], turns)
+        sizes[np.flatnonzero(kinds >= layout.CLOUD)] = size_rows([solids.around for solids in around], turns)
 
 
 class MovedSolids:
@@ -107,9 +114,9 @@ class MovedSolids:
 
     def __init__(self, packed: ProofPairs) -> None:
         self._packed, table = packed, packed.table
-        self._records = table[layout.SOLIDS].reshape(-1, layout.SOLID_SIZE)
-        self._sizes = table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)
-        self._blocks = table[layout.CORNERS].reshape(-1, 3, WIDTH)
+        self._records = table.solids.reshape(-1, layout.SOLID_SIZE)
+        self._sizes = table.sizes.reshape(-1, layout.SIZE_COUNT)
+        self._blocks = table.corners.reshape(-1, 3, WIDTH)
         self._left = len(packed.firsts) if packed.groups else NO_LIMIT  # moves until neighbours are better found anew
         self._groups: dict[int, list[int]] = {}
         for group, members in enumerate(packed.groups):
@@ -133,7 +140,7 @@ class MovedSolids:
         self._left -= 1
         whole = [own] if end - first > len(own) else []
         groups = [*whole, *((solid,) for solid in own)]
-        self._sizes[first:end] = sizes_of(groups, pose[:, :3, :3].repeat(len(groups), axis=0))
+        self._sizes[first:end] = size_rows(groups, pose[:, :3, :3].repeat(len(groups), axis=0))
         blocks = slice(self._records[parts[0], layout.FIRST_BLOCK], self._records[parts[-1], layout.END_BLOCK])
         self._blocks[blocks] = corner_blocks([solid.corners for solid in own])
         for group in self._groups.get(number, ()):
@@ -142,7 +149,7 @@ class MovedSolids:
                 solids = [_box(self._sizes[place]), *own]
             else:
                 solids = [self._solid(k) for member in members for k in self._parts(member)]
-            self._sizes[place] = sizes_of([solids], np.eye(3)[None])
+            self._sizes[place] = size_rows([solids], np.eye(3)[None])
         return True
 
     def _parts(self, number: int) -> range:

@@ -12,23 +12,23 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
+from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.collector import collector_waits
 from rrtik_ompl.kernels.layout import CLOUD_SOLID, HALF_SPACE_SOLID
 from rrtik_ompl.kernels.layout import CONVEX_SOLID as IS_CONVEX
 from rrtik_ompl.kernels.proof import layout
-from rrtik_ompl.kernels.proof.cloud_frames import cloud_bodies, cloud_poses
-from rrtik_ompl.kernels.proof.corners import block_count, corner_blocks
 from rrtik_ompl.kernels.proof.groups import Members, compared_as_one, group_rows
-from rrtik_ompl.kernels.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY
+from rrtik_ompl.kernels.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY, ProofTable
+from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
-from rrtik_ompl.kernels.tables.memory import Table, table, with_own
+from rrtik_ompl.kernels.tables.memory import Table, packed, with_own
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, Solids, placed_bodies
 from rrtik_ompl.model.robot import Chain
 
 ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
 KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE, CLOUD_SOLID: CLOUD}
 SIZED = (IS_CONVEX, CLOUD_SOLID)  # have a ball and a box around them
-COMPUTED = (layout.MARGINS, *range(layout.FRAMES, layout.LAST_STAMP + 1), layout.LOG, layout.LOG_WAYS, layout.LOG_COUNT)
+COMPUTED = ("margins", "frames", "stamps", "bends", "ways", "lists", "counts", "stack", "seen", "log", "log_ways")
 
 
 @dataclass(slots=True, eq=False)
@@ -37,6 +37,7 @@ class ProofPairs:
 
     Attributes:
         table: For the kernels.
+        clouds: Tables whose addresses it holds.
         bodies: Numbers of the two bodies of each of the table's pairs, shape (n, 2).
         sides: The same pairs as the kernels have them: body above the plane, its part, body below, its part, shape
             (n, 4); part -1 is a body of several parts as a whole.
@@ -50,7 +51,8 @@ class ProofPairs:
             :meth:`keep`, and what they keep between all bodies for rounding and slack.
     """
 
-    table: Table
+    table: ProofTable
+    clouds: Sequence[Table]
     bodies: NDArray[np.int64]
     sides: NDArray[np.int64]
     margins: Vector
@@ -65,14 +67,19 @@ class ProofPairs:
         """Let the kernels keep a clearance from obstacles beside the margins, and a slack between all bodies [m]."""
         if (clearance, ROOM + slack) != self.kept:
             self.kept = clearance, ROOM + slack
-            self.table[layout.MARGINS][:] = self.margins + self.kept[1] + clearance * self.clear
+            self.table.margins[:] = self.margins + self.kept[1] + clearance * self.clear
 
     def for_thread(self) -> ProofPairs:
         """The same pairs in a table with memory of its own to compute in."""
-        own = {place: np.zeros_like(self.table[place]) for place in COMPUTED}
-        if self.table.parts:  # of a cloud, points that are compared stand among the solids
-            own |= {place: self.table[place] for place in (layout.SOLIDS, layout.CORNERS)}
-        return replace(self, table=with_own(self.table, own), kept=(float("nan"), ROOM))
+        own = {name: np.zeros_like(getattr(self.table, name)) for name in COMPUTED}
+        if self.clouds:  # points that are compared stand among the solids
+            own |= {name: getattr(self.table, name) for name in ("solids", "corners")}
+        memory = with_own(self.table.memory, {ProofTable.places[name]: array for name, array in own.items()})
+        return replace(self, table=ProofTable(memory), kept=(float("nan"), ROOM))
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond an array."""
+        return self.table.intact() and all(cloud.intact() for cloud in self.clouds)
 
 
 @collector_waits
@@ -132,41 +139,35 @@ def proof_pairs(
     top += range(len(grouped), len(whole))
     sides = rows[:, layout.PAIR_SIZE :]
     named = np.sort(sides[:, ::2], axis=1)
-    packed = _solid_arrays(bodies, parts, list(together))
     clouds = [cloud_table(bodies[k].geometry.cloud) for k in cloud_bodies(bodies)]
-    made = table(
-        {
-            layout.JOINT_COUNT: joints,
-            layout.PARENTS: (chain.parent + 1).astype(np.int32),
-            layout.SLIDING: chain.prismatic.astype(np.int32),
-            layout.JOINTS: _joint_records(chain),
-            **packed,
-            layout.SWEEP_COUNT: len(sweeps),
-            layout.SWEEPS: np.array([(bodies[k].joint, base) for (k, *_), base in sweeps], dtype=np.int32),
-            layout.REACHES: np.array([np.max([reached[k] for k in them], axis=0) for them, _ in sweeps]),
-            layout.BODY_PAIR_COUNT: len(whole),
-            layout.PAIR_COUNT: len(rows),
-            layout.PAIRS: rows[:, : layout.PAIR_SIZE].astype(np.int32),
-            layout.MARGINS: np.zeros(len(rows)),
-            layout.FRAMES: np.zeros(NODES * (joints + 1) * layout.FRAME_SIZE),
-            layout.STAMPS: np.zeros(NODES, dtype=np.int32),
-            layout.BENDS: np.zeros(len(sweeps)),
-            layout.WAYS: np.zeros(3 * len(rows)),
-            layout.LISTS: np.zeros((layout.DEEPEST + 2) * len(rows), dtype=np.int32),
-            layout.COUNTS: np.zeros(layout.DEEPEST + 2, dtype=np.int32),
-            layout.STACK: np.zeros(2 * (layout.DEEPEST + 3), dtype=np.int32),
-            layout.SEEN: np.zeros(4 * layout.FRAME_SIZE),
-            layout.LAST_STAMP: np.zeros(1, dtype=np.int32),
-            layout.TOP_COUNT: len(top),
-            layout.TOP_PAIRS: np.array(top, dtype=np.int32),
-            layout.LOG_ROOM: 0,
-            layout.LOG: np.zeros(0, dtype=np.int32),
-            layout.LOG_WAYS: np.zeros(0),
-            layout.LOG_COUNT: np.zeros(1, dtype=np.int32),
-            layout.CLOUDS: np.array([cloud.address for cloud in clouds], dtype=np.int64),
-            layout.CLOUD_POSES: cloud_poses(bodies),
-        },
-        clouds,
+    made = packed(
+        ProofTable,
+        joint_count=joints,
+        parents=(chain.parent + 1).astype(np.int32),
+        sliding=chain.prismatic.astype(np.int32),
+        joints=_joint_rows(chain),
+        **_solid_arrays(bodies, parts, list(together)),
+        sweep_count=len(sweeps),
+        sweeps=np.array([(bodies[k].joint, base) for (k, *_), base in sweeps], dtype=np.int32),
+        reaches=np.array([np.max([reached[k] for k in them], axis=0) for them, _ in sweeps]),
+        body_pair_count=len(whole),
+        pair_count=len(rows),
+        pairs=rows[:, : layout.PAIR_SIZE].astype(np.int32),
+        margins=np.zeros(len(rows)),
+        top_count=len(top),
+        top_pairs=np.array(top, dtype=np.int32),
+        frames=np.zeros(NODES * (joints + 1) * layout.FRAME_SIZE),
+        stamps=np.zeros(NODES, dtype=np.int32),
+        bends=np.zeros(len(sweeps)),
+        ways=np.zeros(3 * len(rows)),
+        lists=np.zeros((layout.DEEPEST + 2) * len(rows), dtype=np.int32),
+        counts=np.zeros(layout.DEEPEST + 2, dtype=np.int32),
+        stack=np.zeros(2 * (layout.DEEPEST + 3), dtype=np.int32),
+        seen=np.zeros(4 * layout.FRAME_SIZE),
+        log=np.zeros(0, dtype=np.int32),
+        log_ways=np.zeros(0),
+        clouds=np.array([cloud.address for cloud in clouds], dtype=np.int64),
+        cloud_poses=cloud_poses(bodies),
     )
     arrays = body_arrays(bodies)
     beside = np.asarray(arrays.obstacles[named].any(axis=1))
@@ -175,7 +176,16 @@ def proof_pairs(
     for number, row in enumerate(of_groups, len(whole) + len(of_parts)):
         margins[number] = margins[row[layout.PARTS_FIRST] : row[layout.PARTS_END]].max()
     return ProofPairs(
-        made, named, sides, margins, beside, beside & ~touching, np.flatnonzero(touching).tolist(), ends, list(together)
+        table=made,
+        clouds=clouds,
+        bodies=named,
+        sides=sides,
+        margins=margins,
+        beside_obstacle=beside,
+        clear=beside & ~touching,
+        touching=np.flatnonzero(touching).tolist(),
+        firsts=ends,
+        groups=list(together),
     )
 
 
@@ -195,7 +205,7 @@ def _common(chain: Chain, first: int, second: int) -> int:
     return first
 
 
-def _joint_records(chain: Chain) -> Matrix:
+def _joint_rows(chain: Chain) -> Matrix:
     """The joints as the kernels read them, shape (joints, JOINT_SIZE)."""
     turns = chain.placement[:, :3, :3].reshape(-1, 9)
     return np.concatenate([turns, chain.placement[:, :3, 3], chain.axis], axis=1)
@@ -226,7 +236,7 @@ def _reaches(chain: Chain, joint: int, parts: Sequence[ConvexSolid], strokes: Ve
     return reaches
 
 
-def sizes_of(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]) -> Matrix:
+def size_rows(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]) -> Matrix:
     """Ball and box around groups of solids, and the measures of the first of each, shape (n, SIZE_COUNT).
 
     Args:
@@ -270,8 +280,11 @@ def sizes_of(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]
 
 def _solid_arrays(
     bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], groups: Sequence[Members]
-) -> dict[int, int | NDArray[np.int32] | NDArray[np.float64]]:
-    """The arrays of all solids: a body of several parts comes before these, as a whole; groups of bodies come last."""
+) -> dict[str, NDArray[np.int32] | NDArray[np.float64]]:
+    """The arrays of all solids by their fields.
+
+    A body of several parts comes before these, as a whole; groups of bodies come last.
+    """
     numbers: list[tuple[int, ...]] = []
     solids: list[Sequence[ConvexSolid]] = []
     corners: list[Matrix] = []
@@ -296,8 +309,38 @@ def _solid_arrays(
     records = np.array(numbers, dtype=np.int32).reshape(-1, layout.SOLID_SIZE)  # none where all is free
     clouds = np.flatnonzero(records[:, layout.SOLID_KIND] == CLOUD)
     records[clouds, layout.SOLID_KIND] += np.arange(len(clouds), dtype=np.int32)
-    return {
-        layout.SOLIDS: records,
-        layout.SIZES: sizes_of(solids, turns),
-        layout.CORNERS: corner_blocks(corners),
-    }
+    return {"solids": records, "sizes": size_rows(solids, turns), "corners": corner_blocks(corners)}
+
+
+def block_count(corners: Matrix) -> int:
+    """How many blocks the corners of a solid take, shape (k, 3)."""
+    return -(-len(corners) // WIDTH)
+
+
+def corner_blocks(solids: Sequence[Matrix]) -> NDArray[np.float64]:
+    """The corners of solids, shapes (k, 3), in blocks that kernels compare at once, shape (blocks, 3, WIDTH).
+
+    Each solid begins a block; its last one is filled up with its last corner.
+    """
+    counts = np.array([len(corners) for corners in solids], dtype=np.int64)
+    lanes = WIDTH * -(-counts // WIDTH)
+    numbers = np.arange(lanes.sum()) - np.repeat(np.cumsum(lanes) - lanes, lanes)
+    numbers = np.minimum(numbers, np.repeat(counts - 1, lanes)) + np.repeat(np.cumsum(counts) - counts, lanes)
+    corners = np.concatenate([np.zeros((0, 3)), *solids])[numbers]
+    return np.ascontiguousarray(corners.reshape(-1, WIDTH, 3).transpose(0, 2, 1))
+
+
+def corners_in(blocks: NDArray[np.float64]) -> Matrix:
+    """The corners in blocks, shape (k, 3), those that fill up among them."""
+    return np.asarray(blocks.transpose(0, 2, 1).reshape(-1, 3))
+
+
+def cloud_bodies(bodies: Sequence[Body]) -> list[int]:
+    """Numbers of the bodies that are clouds."""
+    return [k for k, body in enumerate(bodies) if isinstance(body.geometry, CloudSolid)]
+
+
+def cloud_poses(bodies: Sequence[Body]) -> Matrix:
+    """Frames of the clouds as the kernels read them, shape (clouds, FRAME_SIZE)."""
+    places = [bodies[k].placement for k in cloud_bodies(bodies)]
+    return np.array([[*place.rotation.ravel(), *place.translation] for place in places]).reshape(-1, layout.FRAME_SIZE)

@@ -11,22 +11,12 @@ from typing import Any
 
 from rrtik_ompl.kernels.checks.gjk import dot, minus, nearest_on_triangle, scaled
 from rrtik_ompl.kernels.proof import layout
-from rrtik_ompl.kernels.proof.accessors import (
-    corners_of,
-    end_block_of,
-    first_block_of,
-    size_at,
-    sizes_at,
-    solids_of,
-    vector_at,
-)
-from rrtik_ompl.kernels.proof.frames import carried, turned_back
-from rrtik_ompl.kernels.proof.layout import ProofTable
+from rrtik_ompl.kernels.proof.frames import carried, origin_of, turned, turned_back, vector_at
+from rrtik_ompl.kernels.proof.layout import Corners, Frame, ProofTable, SizeRows, SolidRows
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
     bits,
     choose,
-    double_at,
     first_bit,
     highest_of_wide,
     lowest_of_wide,
@@ -34,6 +24,7 @@ from rrtik_ompl.kernels.simd.lanes import (
     spread_wide,
     wide_lanes_at,
 )
+from rrtik_ompl.kernels.simd.records import row_at, same_place
 
 MOST_STEPS = 20
 CONVERGED = 1e-7  # [m]
@@ -41,28 +32,103 @@ SHORTEST = 1e-9  # [m] of a vector that has a direction
 UPRIGHT = 1e-12  # sine of the angle to a disc's axis, below which the disc has no height
 LOWEST = -1e18
 NO_BLOCK = 1e9  # more than there are
+ANY_WAY = (0.0, 0.0, 1.0)  # unit vector, where none is better
 
 
 @inlined
-def corner_at(corners: int, block: int, lane: int) -> Any:
-    """One corner of a block."""
-    place = 3 * WIDTH * block + lane
-    return double_at(corners, place), double_at(corners, place + WIDTH), double_at(corners, place + 2 * WIDTH)
+def solid_at(proof: ProofTable, number: int) -> SolidRows:
+    """What is said of a solid."""
+    return row_at(proof.solids, layout.SOLID_SIZE, number)
 
 
 @inlined
-def heights(corners: int, block: int, way: Any) -> Any:
-    """How far the corners of a block are along a vector, a lane each."""
-    x, y, z = (
-        wide_lanes_at(corners, 3 * block),
-        wide_lanes_at(corners, 3 * block + 1),
-        wide_lanes_at(corners, 3 * block + 2),
-    )
-    return rounded_sum(rounded_sum(x * way[0], y * way[1]), z * way[2])
+def sizes_at(proof: ProofTable, number: int) -> SizeRows:
+    """The sizes of a solid."""
+    return row_at(proof.sizes, layout.SIZE_COUNT, number)
+
+
+@kernel
+def best_plane(proof: ProofTable, one: int, other: int, frames: Any, wanted: float, way: Any) -> Any:
+    """Search a plane with a gap above ``wanted`` between two solids, each at the two ends of an interval.
+
+    Args:
+        proof: The table.
+        one: The solid above the plane.
+        other: The one below.
+        frames: Of the first solid at begin and end, of the second one at begin and end; all seen from the frame that
+            the plane is fixed in.
+        wanted: Where to end the search [m].
+        way: Unit vector of the first plane that is tried.
+
+    Returns:
+        The gap of the best plane found [m] and its unit normal.
+    """
+    around = sizes_at(proof, one)[layout.ROUND] + sizes_at(proof, other)[layout.ROUND]
+    best = LOWEST
+    best_way = way
+    distance = -LOWEST  # of the simplex a, b, c from the origin
+    a = b = c = way
+    for step in range(MOST_STEPS):
+        p = farthest_of_two(proof, one, frames[0], frames[1], scaled(way, -1.0))
+        p = minus(p, farthest_of_two(proof, other, frames[2], frames[3], way))
+        height = dot(p, way)
+        if height - around > best:
+            best = height - around
+            best_way = way
+        if best > wanted or distance - height < CONVERGED:
+            break
+
+        if step == 0:
+            a, b, c, nearest = p, p, p, p
+        else:  # p takes the place of one of the three corners
+            u = nearest_on_triangle(a, b, p)
+            v = nearest_on_triangle(b, c, p)
+            w = nearest_on_triangle(c, a, p)
+            to_u = dot(u, u)
+            to_v = dot(v, v)
+            to_w = dot(w, w)
+            if to_u <= to_v and to_u <= to_w:
+                c, nearest = p, u
+            elif to_v <= to_w:
+                a, nearest = p, v
+            else:
+                b, nearest = p, w
+        distance = sqrt(dot(nearest, nearest))
+        if distance - around <= wanted or distance < SHORTEST:  # points are that near: no plane can do it
+            break
+        way = scaled(nearest, 1.0 / distance)
+    return best, best_way
 
 
 @inlined
-def highest_corner(corners: int, first: int, end: int, way: Any) -> Any:
+def farthest_of_two(proof: ProofTable, solid: int, begin: Frame, end: Frame, way: Any) -> Any:
+    """As ``farthest``, of a solid at the two ends of an interval."""
+    p = farthest(proof, solid, begin, way)
+    if same_place(end, begin):
+        return p
+    q = farthest(proof, solid, end, way)
+    return q if dot(q, way) > dot(p, way) else p
+
+
+@kernel
+def farthest(proof: ProofTable, number: int, frame: Frame, way: Any) -> Any:
+    """The point of a solid's core, in its frame, that is farthest along a unit vector of the surroundings."""
+    solid = solid_at(proof, number)
+    sizes = sizes_at(proof, number)
+    own = turned_back(frame, way)
+    p = highest_corner(proof.corners, solid[layout.FIRST_BLOCK], solid[layout.END_BLOCK], own)
+    radius = sizes[layout.DISC]
+    if radius > 0.0:
+        axis = vector_at(sizes, layout.DISC_AXIS)
+        across = minus(own, scaled(axis, dot(axis, own)))
+        length = sqrt(dot(across, across))
+        if length > UPRIGHT:
+            p = minus(p, scaled(across, -radius / length))
+    return carried(frame, p)
+
+
+@inlined
+def highest_corner(corners: Corners, first: int, end: int, way: Any) -> Any:
     """The first corner of some blocks that is farthest along a vector. Here lanes hold corners."""
     best = heights(corners, first, way)
     if end - first == 1:
@@ -78,160 +144,115 @@ def highest_corner(corners: int, first: int, end: int, way: Any) -> Any:
     return corner_at(corners, int(block), first_bit(bits(top & (where <= block))))
 
 
-@kernel
-def farthest(table: ProofTable, solid: int, seen: int, place: int, way: Any) -> Any:
-    """The point of a solid's core that is farthest along a unit vector; the solid's frame is at a place of ``seen``."""
-    corners, solids = corners_of(table), solids_of(table)
-    own = turned_back(seen, place, way)
-    p = highest_corner(corners, first_block_of(solids, solid), end_block_of(solids, solid), own)
-    radius = size_at(table, solid, layout.DISC)
-    if radius > 0.0:
-        axis = sizes_at(table, solid, layout.DISC_AXIS)
-        across = minus(own, scaled(axis, dot(axis, own)))
-        length = sqrt(dot(across, across))
-        if length > UPRIGHT:
-            p = minus(p, scaled(across, -radius / length))
-    return carried(seen, place, p)
+@inlined
+def heights(corners: Corners, block: int, way: Any) -> Any:
+    """How far the corners of a block are along a vector, a lane each."""
+    x = wide_lanes_at(corners, 3 * block)
+    y = wide_lanes_at(corners, 3 * block + 1)
+    z = wide_lanes_at(corners, 3 * block + 2)
+    return rounded_sum(rounded_sum(x * way[0], y * way[1]), z * way[2])
 
 
 @inlined
-def farthest_of_two(table: ProofTable, solid: int, seen: int, begin: int, end: int, way: Any) -> Any:
-    """As ``farthest``, of a solid at the two ends of an interval."""
-    p = farthest(table, solid, seen, begin, way)
-    if end == begin:
-        return p
-    q = farthest(table, solid, seen, end, way)
-    return q if dot(q, way) > dot(p, way) else p
+def corner_at(corners: Corners, block: int, lane: int) -> Any:
+    """One corner of a block."""
+    place = 3 * WIDTH * block + lane
+    return corners[place], corners[place + WIDTH], corners[place + 2 * WIDTH]
 
 
 @kernel
-def beyond_half_space(table: ProofTable, one: int, other: int, seen: int, places: Any) -> float:
+def beyond_half_space(proof: ProofTable, one: int, other: int, frames: Any) -> float:
     """The height of a solid over a half-space, at both ends of an interval."""
-    normal = sizes_at(table, other, layout.DISC_AXIS)
-    low = farthest_of_two(table, one, seen, places[0], places[1], scaled(normal, -1.0))
-    height: float = dot(normal, low) - size_at(table, other, layout.DISC) - size_at(table, one, layout.ROUND)
+    half_space = sizes_at(proof, other)
+    normal = vector_at(half_space, layout.DISC_AXIS)
+    low = farthest_of_two(proof, one, frames[0], frames[1], scaled(normal, -1.0))
+    height: float = dot(normal, low) - half_space[layout.DISC] - sizes_at(proof, one)[layout.ROUND]
     return height
 
 
 @kernel
-def best_plane(table: ProofTable, one: int, other: int, seen: int, places: Any, wanted: float, way: Any) -> Any:
-    """Search a plane with a gap above ``wanted`` between two solids, each at the two ends of an interval.
-
-    Args:
-        table: The table.
-        one: The solid above the plane.
-        other: The one below.
-        seen: Frames, all seen from the frame that the plane is fixed in.
-        places: Of the first solid's frame at begin and end, of the second one's at begin and end.
-        wanted: Where to end the search [m].
-        way: Unit vector of the first plane that is tried.
-
-    Returns:
-        The gap of the best plane found [m] and its unit normal.
-    """
-    around = size_at(table, one, layout.ROUND) + size_at(table, other, layout.ROUND)
-    best, best_way, size = LOWEST, way, -LOWEST
-    a = b = c = way
-    for used in range(MOST_STEPS):
-        p = farthest_of_two(table, one, seen, places[0], places[1], scaled(way, -1.0))
-        p = minus(p, farthest_of_two(table, other, seen, places[2], places[3], way))
-        height = dot(p, way)
-        if height - around > best:
-            best, best_way = height - around, way
-        if best > wanted or size - height < CONVERGED:
-            break
-        if used == 0:
-            a, b, c, nearest = p, p, p, p
-        else:
-            u, v, w = nearest_on_triangle(a, b, p), nearest_on_triangle(b, c, p), nearest_on_triangle(c, a, p)
-            to_u, to_v, to_w = dot(u, u), dot(v, v), dot(w, w)
-            if to_u <= to_v and to_u <= to_w:
-                c, nearest = p, u
-            elif to_v <= to_w:
-                a, nearest = p, v
-            else:
-                b, nearest = p, w
-        size = sqrt(dot(nearest, nearest))
-        if size - around <= wanted or size < SHORTEST:  # points are that near: no plane can do it
-            break
-        way = scaled(nearest, 1.0 / size)
-    return best, best_way
-
-
-@kernel
-def ball_gap(table: ProofTable, one: int, other: int, seen: int, places: Any, wanted: float) -> Any:
+def ball_gap(proof: ProofTable, one: int, other: int, frames: Any, wanted: float) -> Any:
     """A lower bound of the gap between the ball of one solid, on the chord between its ends, and another solid.
 
     Returns:
         The larger of two gaps, to the ball of the other solid on its chord and, if that stands still, to its box [m],
         or the first if it is above ``wanted``; and, if none is, a unit vector from the other solid to the first one.
     """
-    centre = sizes_at(table, one, layout.BALL_CENTRE)
-    p, q = carried(seen, places[0], centre), carried(seen, places[1], centre)
-    still = places[2] == places[3]
-    other_centre = sizes_at(table, other, layout.BALL_CENTRE)
-    begin, end = carried(seen, places[2], other_centre), carried(seen, places[3], other_centre)
+    sizes = sizes_at(proof, one)
+    other_sizes = sizes_at(proof, other)
+    radius = sizes[layout.BALL_RADIUS]
+    still = same_place(frames[2], frames[3])
+    centre = vector_at(sizes, layout.BALL_CENTRE)
+    other_centre = vector_at(other_sizes, layout.BALL_CENTRE)
+    p = carried(frames[0], centre)
+    q = carried(frames[1], centre)
+    begin = carried(frames[2], other_centre)
+    end = carried(frames[3], other_centre)
     # hulls of both balls: the difference of two points, one on each chord, is nearest to a parallelogram's plane at
     # a distance that the distance of the middles less the half chords bounds
     if still:
-        from_other, chord = minus(p, begin), minus(q, p)
+        from_other = minus(p, begin)
+        chord = minus(q, p)
         share = -dot(from_other, chord) / max(1e-30, dot(chord, chord))
         apart = minus(from_other, scaled(chord, -min(1.0, max(0.0, share))))
-        spread = 0.0
+        half_chords = 0.0
     else:
         apart = scaled(minus((p[0] + q[0], p[1] + q[1], p[2] + q[2]), minus(begin, scaled(end, -1.0))), 0.5)
-        first_chord, second_chord = minus(q, p), minus(end, begin)
-        spread = 0.5 * (sqrt(dot(first_chord, first_chord)) + sqrt(dot(second_chord, second_chord)))
+        chord = minus(q, p)
+        other_chord = minus(end, begin)
+        half_chords = 0.5 * (sqrt(dot(chord, chord)) + sqrt(dot(other_chord, other_chord)))
     distance = sqrt(dot(apart, apart))
-    gap, way = distance - spread - size_at(table, other, layout.BALL_RADIUS), apart
-    if gap - size_at(table, one, layout.BALL_RADIUS) > wanted:
-        return gap - size_at(table, one, layout.BALL_RADIUS), way
+    gap = distance - half_chords - other_sizes[layout.BALL_RADIUS]
+    way = apart
+    if gap - radius > wanted:
+        return gap - radius, way
+
     if still:
-        to_box = outside_box(table, other, turned_back_point(seen, places[2], p), turned_back_point(seen, places[2], q))
+        to_box = outside_box(other_sizes, point_in(frames[2], p), point_in(frames[2], q))
         length = sqrt(dot(to_box, to_box))
         gap = max(gap, length)
         if length > 0.0:
-            way = along_box(table, other, seen, places[2], to_box)
+            way = turned(frames[2], along_box(other_sizes, to_box))
     length = sqrt(dot(way, way))
     if length < SHORTEST:
-        return gap - size_at(table, one, layout.BALL_RADIUS), (0.0, 0.0, 1.0)
-    return gap - size_at(table, one, layout.BALL_RADIUS), scaled(way, 1.0 / length)
+        return gap - radius, ANY_WAY
+    return gap - radius, scaled(way, 1.0 / length)
 
 
 @inlined
-def turned_back_point(seen: int, place: int, p: Any) -> Any:
-    """A point in the frame at a place."""
-    return turned_back(seen, place, minus(p, vector_at(seen, place + layout.SHIFT)))
+def point_in(frame: Frame, p: Any) -> Any:
+    """A point of the surroundings in a frame."""
+    return turned_back(frame, minus(p, origin_of(frame)))
 
 
 @kernel
-def outside_box(table: ProofTable, solid: int, p: Any, q: Any) -> Any:
-    """How far the chord from p to q, in the solid's frame, stays outside its box, along each axis of the box."""
-    x = outside_along(table, solid, 0, p, q)
-    y = outside_along(table, solid, 1, p, q)
-    return x, y, outside_along(table, solid, 2, p, q)
+def outside_box(sizes: SizeRows, p: Any, q: Any) -> Any:
+    """How far the chord from p to q, in a solid's frame, stays outside its box, along each axis of the box."""
+    return outside_along(sizes, 0, p, q), outside_along(sizes, 1, p, q), outside_along(sizes, 2, p, q)
 
 
 @inlined
-def outside_along(table: ProofTable, solid: int, axis: int, p: Any, q: Any) -> float:
+def outside_along(sizes: SizeRows, axis: int, p: Any, q: Any) -> float:
     """See ``outside_box``; 0 if the chord comes between the two sides."""
-    way = sizes_at(table, solid, layout.BOX_AXES + 3 * axis)
-    middle, half = size_at(table, solid, layout.BOX_MIDDLE + axis), size_at(table, solid, layout.BOX_HALF + axis)
-    one, other = dot(way, p) - middle, dot(way, q) - middle
-    below, above = min(one, other), max(one, other)
-    return max(0.0, below - half) + min(0.0, above + half)
+    way = vector_at(sizes, layout.BOX_AXES + 3 * axis)
+    middle = sizes[layout.BOX_MIDDLE + axis]
+    half = sizes[layout.BOX_HALF + axis]
+    one = dot(way, p) - middle
+    other = dot(way, q) - middle
+    below = min(one, other)
+    above = max(one, other)
+    outside: float = max(0.0, below - half) + min(0.0, above + half)
+    return outside
 
 
 @inlined
-def along_box(table: ProofTable, solid: int, seen: int, place: int, p: Any) -> Any:
-    """A vector along the axes of a solid's box, in the frame that the solid is seen from."""
-    a, b = sizes_at(table, solid, layout.BOX_AXES), sizes_at(table, solid, layout.BOX_AXES + 3)
-    c = sizes_at(table, solid, layout.BOX_AXES + 6)
-    own = (
+def along_box(sizes: SizeRows, p: Any) -> Any:
+    """A vector that is given along the axes of a solid's box, in the solid's frame."""
+    a = vector_at(sizes, layout.BOX_AXES)
+    b = vector_at(sizes, layout.BOX_AXES + 3)
+    c = vector_at(sizes, layout.BOX_AXES + 6)
+    return (
         a[0] * p[0] + b[0] * p[1] + c[0] * p[2],
         a[1] * p[0] + b[1] * p[1] + c[1] * p[2],
         a[2] * p[0] + b[2] * p[1] + c[2] * p[2],
     )
-    x = dot(vector_at(seen, place), own)
-    y = dot(vector_at(seen, place + 3), own)
-    return x, y, dot(vector_at(seen, place + 6), own)

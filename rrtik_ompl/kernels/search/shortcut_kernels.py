@@ -20,6 +20,7 @@ from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, copy_ro
 from rrtik_ompl.kernels.search.shortcut_layout import FIRST_INSIDE, SECOND_INSIDE, ShortcutTable
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.kernels.simd.random_kernels import next_share
+from rrtik_ompl.kernels.simd.records import exists
 
 PULL_PROBABILITY = 0.5  # of each joint in a pull
 MIN_GAIN = 1e-6  # of the length of the route, or a shortcut is not worth its checks
@@ -187,7 +188,7 @@ def check_parts(search: ShortcutTable) -> int:
     search.questions = 0
     worst = FREE
     pulled = search.cuts == shortcut_layout.PULL
-    proven = search.motions.proof != 0
+    proven = exists(search.motions.proof)
     for part in range(1 if proven and not pulled else shortcut_layout.MAX_QUESTIONS):
         a, b = ends_of_part(search, part)
         if a != b:

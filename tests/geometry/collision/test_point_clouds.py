@@ -134,7 +134,7 @@ def test_what_is_proven_free_is_free_all_along(name):
     assert 0.1 < proven.mean() < 0.99
     for a, b in zip(A[proven], B[proven], strict=True):
         assert spheres.valid_batch(np.linspace(a, b, 60)).all()
-    assert cloud.prover.tables.packed.table.intact()
+    assert cloud.prover.tables.packed.intact()
 
 
 @pytest.mark.kernels

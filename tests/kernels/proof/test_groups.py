@@ -18,7 +18,7 @@ def test_a_gripper_that_is_compared_as_one_is_apart_from_links_where_its_parts_a
     ends = starts + rng.normal(size=starts.shape) * 0.3
     together = World(robot)
     table = together.prover._packed_for(0.0, 0.0)
-    pairs = table.table[layout.PAIRS].reshape(-1, layout.PAIR_SIZE)
+    pairs = table.table.pairs.reshape(-1, layout.PAIR_SIZE)
     several = pairs[:, layout.PAIR_ONE] >= table.firsts[-1]  # their solids come last
     assert (pairs[several, layout.PAIR_BASE] > 0).any()
     proven = together.motions_proven(starts, ends)

@@ -15,7 +15,7 @@ from bench.proofs.cases import random_cases, random_scene
 from bench.proofs.certificates import main
 from bench.proofs.tampering import TAMPERINGS
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.kernels.proof import layout, log
+from rrtik_ompl.kernels.proof import log
 from rrtik_ompl.model.certificate import MotionEntries, from_document
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
@@ -213,7 +213,7 @@ def test_the_log_grows_where_it_is_too_small_and_costs_nothing_afterwards(cases,
     assert verify_certificate(again, case.world, case.path.waypoints) == ""
     assert again.entries == case.certificate.entries
     assert packed.table.intact()
-    assert packed.table.header[layout.LOG_ROOM] == 0
+    assert packed.table.log_room == 0
 
 
 def test_a_verifier_needs_neither_kernels_nor_planners():

@@ -26,7 +26,7 @@ class MotionTable(Record):
     steps_per_unit: float
     ends: JointValues  # memory for those of both ends of a motion
     resolve: int  # 1 if doubtful motions are resolved; 0 in a conservative world
-    proof: ProofTable  # of a world where only proven motions count as free, else 0
+    proof: ProofTable  # of a world where only proven motions count as free; else there is none
 
 
 STEP_TOLERANCE = 1e-9  # [steps] by which a motion may be longer than its whole number of steps

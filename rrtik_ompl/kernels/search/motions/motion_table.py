@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, positive
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels import FastWorld
+from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.search.motions.motion_layout import STEP_TOLERANCE, MotionTable
 from rrtik_ompl.kernels.tables.memory import packed
 
@@ -60,7 +61,7 @@ class FastMotions:
         resolution: See ``weights``, above 0 [m].
         steps_per_unit: At least this many steps for each unit of Euclidean length; with zero weights the only rule.
         resolve: See above.
-        proof: Makes the table of proofs ready and says where it is, in a world where only proven motions count as free.
+        proof: Makes the table of proofs ready, in a world where only proven motions count as free.
 
     Raises:
         InputError: If there are no kernels, shapes do not fit, or a number is out of range.
@@ -76,7 +77,7 @@ class FastMotions:
         resolution: float,
         steps_per_unit: float = 0.0,
         resolve: bool = True,
-        proof: Callable[[], int] | None = None,
+        proof: Callable[[], ProofTable] | None = None,
     ) -> None:
         if fast.address == 0:
             raise InputError("search in kernels: there are none; install numba")

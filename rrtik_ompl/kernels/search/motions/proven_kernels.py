@@ -7,7 +7,7 @@ from typing import Any
 from rrtik_ompl.kernels.checks.check_kernels import inner_collision
 from rrtik_ompl.kernels.checks.kinematics import forward_kinematics
 from rrtik_ompl.kernels.layout import COLLIDING, FREE, JointValues, WorldTable
-from rrtik_ompl.kernels.proof.accessors import node_frames
+from rrtik_ompl.kernels.proof.frames import node_frames
 from rrtik_ompl.kernels.proof.layout import NODES, OPEN, ProofTable
 from rrtik_ompl.kernels.proof.proof_kernels import apart, begin_motion, prove_motion, visit
 from rrtik_ompl.kernels.record import Doubles, Ints
@@ -20,6 +20,7 @@ from rrtik_ompl.kernels.search.motions.motion_layout import MotionTable
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, row_at
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import bits, lane_numbers, set_wide_lanes
+from rrtik_ompl.kernels.simd.records import exists
 from rrtik_ompl.kernels.tables.accessors import arm_of, joint_count_of, joint_row, scratch_of, values_of
 
 LOOKS = 2  # blocks of configurations, spread over a motion, that are looked at before it is proven
@@ -64,7 +65,7 @@ def both_ends(motions: MotionTable, start: Configuration, end: Configuration) ->
 def judge_motion(motions: MotionTable, start: Configuration, end: Configuration, resolve: bool) -> int:
     """As check_motion, but FREE or not where only proven motions count as free."""
     proof = motions.proof
-    if proof == 0:
+    if not exists(proof):
         checked: int = check_motion(motions, start, end, resolve)
         return checked
     values, others = both_ends(motions, start, end)
@@ -81,7 +82,7 @@ def judge_near(motions: MotionTable, start: Configuration, end: Configuration, h
     A new failure is noted there. Its pair is -1 if none is known.
     """
     proof = motions.proof
-    if proof == 0:
+    if not exists(proof):
         checked: int = check_motion(motions, start, end, resolves(motions))
         return checked
     values, others = both_ends(motions, start, end)
