@@ -12,12 +12,12 @@ import pinocchio as pin
 from typer import Option
 
 import rrtik_ompl as rrtik
+from bench.moves.oracles import grid_route, least_moves
 from bench.shared.problems import goal_joints
 from bench.shared.run import Run
 from rrtik_bench.crdt.runs import histogram, joints_of, share, sound
 from rrtik_bench.report.page import Report
 from rrtik_ompl.model.transitions import lower_bound, transitions
-from rrtik_ompl.planning.shortening.fewest_moves import grid_route, least_moves
 from rrtik_ompl.world.problem import Problem
 from rrtik_planners import FewestMoves
 

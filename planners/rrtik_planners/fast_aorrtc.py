@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, Stop
-from rrtik_ompl.planning.shortening.restarts import BOUND, BOUNDED_SAMPLES
+from rrtik_ompl.planning.improving import BOUND, BOUNDED_SAMPLES
 from rrtik_planners.restart_shorten import RestartShorten
 
 

@@ -107,7 +107,7 @@ class FastRRTConnect(SafePlanner):
     def solve_each(
         self, ends: Matrix, seeds: Sequence[int], bounds: tuple[Vector, Vector]
     ) -> Sequence[SearchResult | None]:
-        """See :class:`rrtik_ompl.planning.batches.SolvesEach`."""
+        """See :class:`rrtik_ompl.planning.many.SolvesEach`."""
         self._bounds = bounds
         if self.bound is not None or self.max_iterations is None or not has_kernels(self._world, KERNELS):
             return [None] * len(ends)

@@ -18,13 +18,12 @@ from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, S
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.planning.moves.clearance_levels import Level, clearance_levels
 from rrtik_ompl.planning.moves.fine_grids import FineGrids, rounds_before
-from rrtik_ompl.planning.moves.lower_bounds import remembered
-from rrtik_ompl.planning.moves.reach_bound import reach_bound
+from rrtik_ompl.planning.moves.lower_bounds import reach_bound, remembered
 from rrtik_ompl.planning.moves.rules import Joints, PerJoint
 from rrtik_ompl.planning.moves.search import MOST_NODES, MoveSearch, Proof
 from rrtik_ompl.planning.moves.staircase import one_joint_moves
 from rrtik_ompl.planning.shortening import Task, Wishes
-from rrtik_ompl.planning.shortening.random_cut import shortcut
+from rrtik_ompl.planning.shortening.cuts import shortcut
 from rrtik_ompl.world.world import World
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect

@@ -17,8 +17,8 @@ from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUTS
 from rrtik_ompl.kernels.search.taut.layout import KERNELS as TAUT
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
+from rrtik_ompl.planning.improving import GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
 from rrtik_ompl.planning.shortening.best import best_in_time
-from rrtik_ompl.planning.shortening.restarts import GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
 from rrtik_ompl.planning.shortening.task import Task, Wishes
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.fast_rrt_connect import FastRRTConnect

@@ -1,28 +1,44 @@
-"""`plan_many()`: many queries in one world, by all cores of this machine."""
+"""`plan_many()`: many queries in one world, by all cores of this machine.
+
+For each query `plan()` makes a brief attempt on what kernels prove, and accepts its path if all of it is proven with
+the clearance that its ends have. :func:`plans_together` does that for many queries in a few calls: the ends of all, and
+then the paths of all, go to the kernels together. A query that takes any other turn gets no plan there; `plan()` then
+does all of it.
+"""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Vector, dimensions, finite_array, positive, whole_number
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, dimensions, finite_array, positive, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, ProblemError, require
 from rrtik_ompl.kernels.threads import in_threads
 from rrtik_ompl.model.goal import Goal, JointGoal
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
-from rrtik_ompl.ompl_bridge.planner_options import is_safe
-from rrtik_ompl.planning.batches import Query, plans_together
+from rrtik_ompl.ompl_bridge.planner_options import is_safe, reseed, safe_planner
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
+from rrtik_ompl.ompl_bridge.results import SearchResult
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
+from rrtik_ompl.ompl_bridge.setup import shared_space
+from rrtik_ompl.planning.attempts import EFFORT_ITERATIONS, load_kernels_for
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.plan import PROOF_MODES, plan
-from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.kept_clearance import Room, rooms_between
+from rrtik_ompl.world.problem import Problem, known_problem
 from rrtik_ompl.world.world import World
 
 Ends = ArrayLike | Sequence[Goal]
@@ -126,3 +142,158 @@ def _planned(world: World, planner: str | None, options: Mapping[str, Any], quer
     except ProblemError as error:
         return Plan(False, None, str(error), 0.0, planner or AUTO, seed, MappingProxyType({}))
     return plan(problem, planner, seed=seed, **options)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Query:
+    """What is asked: a start, shape (dof,), a goal, and the seed of everything random."""
+
+    start: Matrix
+    goal: JointGoal
+    seed: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """A path that a search has found, and its counts."""
+
+    query: Query
+    path: JointPath
+    counts: Mapping[str, int | float]
+
+
+def plans_together(
+    world: World, planner: NamedPlanner, queries: Sequence[Query], request: Request
+) -> list[Plan | None]:
+    """The plans of queries by one planner; None for each that is to be planned alone.
+
+    Args:
+        world: Where they are.
+        planner: Searches for each.
+        queries: Configurations inside the limits, or not.
+        request: What is asked for each, but for the seed.
+    """
+    plans: list[Plan | None] = [None] * len(queries)
+    if not (queries and serves(world, planner.factory)):
+        return plans
+    ends = np.array([[query.start, query.goal.q] for query in queries])
+    any_problem = known_problem(world, *ends[0])
+    load_kernels_for(any_problem, planner.factory)
+
+    began = time.perf_counter()
+    usable = _usable(world, ends)
+    rooms = dict(zip(np.flatnonzero(usable).tolist(), rooms_between(world, ends[usable], None), strict=True))
+    searcher = _Searcher(any_problem, planner, request)
+    found = searcher.paths({k: queries[k] for k, room in rooms.items() if room is not None})
+    proofs = _proofs(world, {k: (found_path.path.waypoints, rooms[k]) for k, found_path in found.items()})
+    seconds_per_query = (time.perf_counter() - began) / len(queries)
+
+    for k, proof in proofs.items():
+        query = found[k].query
+        path = found[k].path.with_proof(proof)
+        counts = {"attempts": 1, "rejected": 0, **found[k].counts}
+        counts["rejected"] = 0  # paths, whatever a planner counts by that name
+        problem = known_problem(world, path.start, query.goal)
+        plans[k] = Plan(
+            True, path, "", seconds_per_query, planner.name, query.seed, MappingProxyType(counts), problem=problem
+        )
+    return plans
+
+
+def serves(world: World, factory: PlannerFactory) -> bool:
+    """Whether queries may be planned together: by a planner of ours in an exact world whose kernels suffice."""
+    robot = world.robot
+    kernels_suffice = type(world) is World and world.accuracy == "exact" and world.fast is not None
+    joints_are_bounded = bool(np.isfinite([robot.lower, robot.upper]).all()) and not robot.continuous.any()
+    planner_is_reseeded = traits_of(factory).reseeded and is_safe(factory)
+    return kernels_suffice and joints_are_bounded and not robot.joint_weights and planner_is_reseeded
+
+
+def _usable(world: World, ends: Matrix) -> Mask:
+    """Which starts and goals, shape (m, 2, dof), are two configurations inside the limits that kernels prove free."""
+    rows = ends.reshape(-1, world.robot.dof)
+    inside_limits: Mask = np.logical_and.reduce((rows >= world.robot.lower) & (rows <= world.robot.upper), axis=1)
+    is_free: Mask = (
+        world.with_accuracy("conservative").valid_batch(np.where(inside_limits[:, None], rows, 0.0)) & inside_limits
+    )
+    usable: Mask = is_free[::2] & is_free[1::2] & np.logical_or.reduce(ends[:, 0] != ends[:, 1], axis=1)
+    return usable
+
+
+@runtime_checkable
+class SolvesEach(Protocol):
+    """A planner that searches for many queries in one call."""
+
+    def solve_each(
+        self, ends: Matrix, seeds: Sequence[int], bounds: tuple[Vector, Vector]
+    ) -> Sequence[SearchResult | None]:
+        """What `SafePlanner.solve_rows` does with each seed between free ends, shape (m, 2, dof), and its statistics.
+
+        None for those that are to be searched for one after the other.
+        """
+
+
+class _Searcher:
+    """One planner that searches for one query after the other."""
+
+    def __init__(self, problem: Problem, planner: NamedPlanner, request: Request) -> None:
+        self._robot = problem.world.robot
+        self._request = request
+        self._bounds = self._robot.lower, self._robot.upper
+        options = {ITERATION_LIMIT: EFFORT_ITERATIONS, **request.parameters}
+        brief = problem.with_accuracy("conservative")
+        assert is_safe(planner.factory)  # as `serves` has seen
+        space = shared_space(*self._bounds)
+        self._planner: SafePlanner = safe_planner(planner.factory, planner.name, space, brief, 0, options)
+
+    def paths(self, queries: Mapping[int, Query]) -> dict[int, _Found]:
+        """What the first attempts of `plan()` find, by the numbers of the queries."""
+        seeds = [attempt_seeds(query.seed, self._request.restarts)[0] for query in queries.values()]
+        quick: Sequence[SearchResult | None] = [None] * len(seeds)
+        if isinstance(self._planner, SolvesEach) and queries:
+            ends = np.array([(query.start, query.goal.q) for query in queries.values()])
+            quick = self._planner.solve_each(ends, seeds, self._bounds)
+
+        made = dict[int, _Found]()
+        for (k, query), seed, result in zip(queries.items(), seeds, quick, strict=True):
+            found = self._checked_path(query, result or self._search_one(query, seed))
+            if found is not None:
+                made[k] = found
+        return made
+
+    def _search_one(self, query: Query, seed: int) -> SearchResult:
+        """What a search for one query finds."""
+        reseed(self._planner, seed)
+        ends = query.start[None], query.goal.q[None]
+        budget = self._request.budget.begun_now()
+        _, rows = self._planner.solve_rows(*ends, self._bounds, budget.over, checked=True)
+        return SearchResult(rows, self._planner.statistics)
+
+    def _checked_path(self, query: Query, result: SearchResult) -> _Found | None:
+        """What was found, if it is a path from the start to the goal."""
+        if result.path is None:
+            return None
+        path = JointPath.of(self._robot, result.path)
+        if len(path.waypoints) < 2 or (path.start != query.start).any() or (path.end != query.goal.q).any():
+            return None
+        return _Found(query, path, result.statistics)
+
+
+def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Room | None]]) -> dict[int, Proof]:
+    """Proofs of those routes that are proven to keep what their ends do, by their numbers."""
+    proofs: dict[int, Proof] = {}
+    for clearance in sorted({room.kept for _, room in routes.values() if room is not None}):
+        routes_of_clearance = {
+            k: rows for k, (rows, room) in routes.items() if room is not None and room.kept == clearance
+        }
+        proven = world.motions_proven(
+            np.concatenate([rows[:-1] for rows in routes_of_clearance.values()]),
+            np.concatenate([rows[1:] for rows in routes_of_clearance.values()]),
+            clearance=clearance,
+        )
+
+        ends = np.cumsum([len(rows) - 1 for rows in routes_of_clearance.values()])
+        for (k, rows), is_proven in zip(routes_of_clearance.items(), np.split(proven, ends[:-1]), strict=True):
+            if is_proven.all():
+                proofs[k] = Proof(len(rows) - 1, clearance, (), world.prover.margin, maker=world.prover)
+    return proofs

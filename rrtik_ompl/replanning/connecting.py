@@ -18,8 +18,7 @@ from rrtik_ompl.kernels.search.connect_layout import KERNELS as CONNECT_KERNELS
 from rrtik_ompl.kernels.search.shortcut import ShortcutSearch
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as CUT_KERNELS
 from rrtik_ompl.model.transitions import without_repeats
-from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect
-from rrtik_ompl.planning.search.tree import ConfigurationTree
+from rrtik_ompl.planning.search.rrt_connect import ConfigurationTree, ConnectRules, RrtConnect
 from rrtik_ompl.world.motion_queries import KernelWorld, MotionFree, MotionQueries
 
 KERNELS = (CONNECT_KERNELS, CUT_KERNELS)  # libraries that replanning in kernels needs

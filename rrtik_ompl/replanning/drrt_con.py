@@ -195,7 +195,7 @@ def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> M
     """Shorten a free path: from each kept point straight to the last point that can be reached.
 
     Points lie every ``step`` along the path, and ``MAX_CUTS`` of them are tried in one call;
-    :func:`rrtik_ompl.planning.shortening.sequential.sequential_cut` tries every waypoint and no others. Source:
+    :func:`rrtik_ompl.planning.shortening.cuts.sequential_cut` tries every waypoint and no others. Source:
     [1, ch. 5.3, method 1], as DRRT-Con uses it.
     """
     points_kept = [path[:1]]

@@ -13,8 +13,7 @@ import numpy as np
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.base.choices import Replanner
-from rrtik_ompl.planning.search.rrt_connect import ConnectRules, extend
-from rrtik_ompl.planning.search.tree import ConfigurationTree
+from rrtik_ompl.planning.search.rrt_connect import ConfigurationTree, ConnectRules, extend
 from rrtik_ompl.replanning.connecting import ITERATIONS, Joined, joined, one_by_one
 from rrtik_ompl.replanning.drrt_con import DrrtCon, Post
 from rrtik_ompl.world.motion_queries import MotionQueries

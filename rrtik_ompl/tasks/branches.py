@@ -17,10 +17,8 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.planning.tip_motion import DEVIATION, TURN_DEVIATION
 from rrtik_ompl.planning.tip_motion.attempts import Attempt, Way, attempt, farthest, path_of
-from rrtik_ompl.planning.tip_motion.following import follow
-from rrtik_ompl.planning.tip_motion.freedom import centred
+from rrtik_ompl.planning.tip_motion.following import Tolerance, centred, follow
 from rrtik_ompl.planning.tip_motion.rails import straight_rail
-from rrtik_ompl.planning.tip_motion.values import Tolerance
 from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts, parted
 from rrtik_ompl.tasks.finger_motion import finger_motion
 from rrtik_ompl.tasks.handling import contacts_on_arrival, fault_of_setting_down, handled, may_touch

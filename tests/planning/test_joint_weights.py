@@ -10,7 +10,7 @@ from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
 from rrtik_ompl.planning import improving
-from rrtik_ompl.planning.path_costs import least_cost, length
+from rrtik_ompl.planning.improving import least_cost, length
 from rrtik_planners import FastRRTConnect
 
 HEAVY = 6.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rrtik_ompl.planning.search.tree import ConfigurationTree
+from rrtik_ompl.planning.search.rrt_connect import ConfigurationTree
 from rrtik_ompl.replanning.connecting import PythonConnect
 from rrtik_ompl.replanning.drrt_con import (
     DrrtCon,

@@ -7,8 +7,15 @@ import pytest
 
 from rrtik_ompl.base.budget import no_stop
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS
-from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect, extend, path_between, reach, straight_path
-from rrtik_ompl.planning.search.tree import ConfigurationTree
+from rrtik_ompl.planning.search.rrt_connect import (
+    ConfigurationTree,
+    ConnectRules,
+    RrtConnect,
+    extend,
+    path_between,
+    reach,
+    straight_path,
+)
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.motion_queries import (
     CALL_TARGET_SECONDS,

@@ -14,8 +14,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import route_length, single_joint, transitions
-from rrtik_ompl.planning.moves.axis_cut import axis_cut, double_axis_cut
-from rrtik_ompl.planning.moves.axis_cut_rounds import axis_cut_rounds
+from rrtik_ompl.planning.moves.axis_cut import axis_cut, axis_cut_rounds, double_axis_cut
 from rrtik_ompl.world.problem import Problem
 
 STAGES = ("raw", "pass 1", "pass 2", "extra rounds")

@@ -16,9 +16,8 @@ from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.model.transitions import part_counts, route_length, subdivided
-from rrtik_ompl.planning.shortening.random_cut import random_cut
+from rrtik_ompl.planning.shortening.cuts import random_cut, sequential_cut
 from rrtik_ompl.planning.shortening.retraction import retract
-from rrtik_ompl.planning.shortening.sequential import sequential_cut
 from rrtik_ompl.planning.shortening.task import Task, Wishes
 
 STEP = 1.0  # of the planner

@@ -3,7 +3,7 @@
 Between two points the joints move in a straight line, and the tip leaves the rail. By how much is bounded, not sampled:
 its distance is 0 at both ends, it is measured in the middle, and by the remainder of quadratic interpolation
 [61, ch. 2.1] it is no more elsewhere than there plus ``REMAINDER`` times a bound of its third derivative.
-:mod:`rrtik_ompl.planning.tip_motion.reference_follow` is the same in numpy.
+:mod:`rrtik_ompl.planning.tip_motion.following` is the same in numpy.
 """
 
 from __future__ import annotations

@@ -21,8 +21,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import merge_moves, route_length
 from rrtik_ompl.ompl_bridge.planner_traits import planners_with
 from rrtik_ompl.pilot.routes.follower import path_fault, slack
-from rrtik_ompl.planning.moves.lattice import MoveLattice
-from rrtik_ompl.planning.moves.values import Values, lattice_size, spread_values, values_of
+from rrtik_ompl.planning.moves.lattice import MoveLattice, Values, lattice_size, spread_values, values_of
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening.fewest_moves import turning_limits
 from rrtik_ompl.world.problem import Problem

@@ -1,7 +1,7 @@
 """Fewer single-joint moves: the axis post-processor. Source: [1, ch. 6.3, algorithm 12].
 
 Works on arrays: a route is (k, n) waypoints, every edge of which should move one joint; ``motions_free(A, B)`` says
-for batches which straight motions are free.
+for batches which straight motions are free. Beyond the published double pass: further rounds in random orders.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array
-from rrtik_ompl.base.budget import Stop, no_stop
+from rrtik_ompl.base.budget import Budget, Stop, no_stop
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.model.transitions import merge_moves
+from rrtik_ompl.model.transitions import lower_bound, merge_moves, route_length, transitions
 from rrtik_ompl.world.motion_queries import MotionsFree
 
 PART, LONGER = 16, 4  # moves of the first parts that are cut, and how many times longer they are the next time
 FIRST_TESTS, MORE_TESTS = 4, 4  # waypoints tried together from a pivot, and how many times more the next time
+MAX_CUT_ROUNDS = 20
 
 
 def axis_cut(
@@ -176,3 +177,49 @@ def _route(waypoints: ArrayLike) -> Matrix:
     if len(route) == 0:
         raise InputError("waypoints: a route needs at least one configuration")
     return merge_moves(route, tolerance=0.0)
+
+
+def axis_cut_rounds(
+    waypoints: ArrayLike,
+    motions_free: MotionsFree,
+    *,
+    rounds: int = MAX_CUT_ROUNDS,
+    budget: Budget | None = None,
+) -> Matrix:
+    """The double pass, then ``rounds`` passes with random joint orders in alternating direction; keeps the best.
+
+    A pass never adds a move, but may end in another route with as many. Each round goes on from the last one, so the
+    rounds wander among routes of equal rank and leave where a shorter one opens.
+
+    Args:
+        waypoints: Shape (k, n), start first.
+        motions_free: Which straight motions are free, for batches of shape (m, n).
+        rounds: Number of further passes, at least 0.
+        budget: When to end, with the best so far, and the seed of the random orders; without an end if None.
+
+    Returns:
+        Shape (m, n), start first: the route with the fewest transitions seen, the shortest among those.
+
+    Raises:
+        InputError: If the waypoints are no (k, n) numbers or ``rounds`` is negative.
+    """
+    if rounds < 0:
+        raise InputError(f"rounds: expected at least 0, got {rounds}")
+
+    budget = Budget() if budget is None else budget
+    rng = np.random.default_rng(budget.seed)
+    free = check_once(motions_free)
+    route = best = double_axis_cut(waypoints, free, stop=budget.over)
+    fewest = lower_bound(best[0], best[-1])
+
+    for k in range(rounds):
+        if transitions(best) == fewest or budget.over():
+            break
+        route = axis_cut(route[::-1], free, axes=rng.permutation(route.shape[1]).tolist(), stop=budget.over)
+        best = min(best, route[::-1] if k % 2 == 0 else route, key=route_rank)
+    return best
+
+
+def route_rank(route: Matrix) -> tuple[int, float]:
+    """Sort key of a route, shape (k, n): transitions, then length."""
+    return transitions(route), route_length(route)

@@ -17,9 +17,8 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix, Vector, distinct
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.planning.moves.clearance_levels import Level
-from rrtik_ompl.planning.moves.lattice import MoveLattice
+from rrtik_ompl.planning.moves.lattice import MoveLattice, Values, spread_values, values_of
 from rrtik_ompl.planning.moves.rules import long_enough
-from rrtik_ompl.planning.moves.values import Values, spread_values, values_of
 from rrtik_ompl.world.motion_queries import BatchedMotionQueries, OutOfTime
 
 # Configurations of one grid after the other, and whether their values are near those of the best route. The largest

@@ -17,16 +17,14 @@ from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.ompl_bridge.simplify import simplified
 from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
-from rrtik_ompl.planning.moves.axis_cut import double_axis_cut
-from rrtik_ompl.planning.moves.axis_cut_rounds import axis_cut_rounds
+from rrtik_ompl.planning.moves.axis_cut import axis_cut_rounds, double_axis_cut
 from rrtik_ompl.planning.moves.rules import MoveRules
 from rrtik_ompl.planning.shortening.acceptance import Acceptance, Form
 from rrtik_ompl.planning.shortening.along_constraints import along_constraints
 from rrtik_ompl.planning.shortening.best import best_in_time
 from rrtik_ompl.planning.shortening.corners import snap_corners
-from rrtik_ompl.planning.shortening.random_cut import random_cut, shortcut
+from rrtik_ompl.planning.shortening.cuts import random_cut, sequential_cut, shortcut
 from rrtik_ompl.planning.shortening.retraction import retract
-from rrtik_ompl.planning.shortening.sequential import sequential_cut
 from rrtik_ompl.planning.shortening.task import Task, Wishes
 from rrtik_ompl.world.kept_clearance import check_route_clearance, proved
 from rrtik_ompl.world.problem import Problem

@@ -10,10 +10,9 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.kernels.search.taut import layout
 from rrtik_ompl.kernels.search.taut.tightening import Tightening
 from rrtik_ompl.model.transitions import length_of, route_length
-from rrtik_ompl.planning.moves.axis_cut_rounds import axis_cut_rounds
-from rrtik_ompl.planning.shortening.random_cut import PULLS, WAYPOINTS, kernel_search, random_cut, run
+from rrtik_ompl.planning.moves.axis_cut import axis_cut_rounds
+from rrtik_ompl.planning.shortening.cuts import PULLS, WAYPOINTS, kernel_search, random_cut, run, sequential_cut
 from rrtik_ompl.planning.shortening.retraction import STEPS, retract
-from rrtik_ompl.planning.shortening.sequential import sequential_cut
 from rrtik_ompl.planning.shortening.task import Task
 from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels
 

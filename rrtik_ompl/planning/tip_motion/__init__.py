@@ -18,8 +18,8 @@ from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.goal import PoseGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.planning.tip_motion.attempts import Way, farthest, path_of
+from rrtik_ompl.planning.tip_motion.following import Tolerance
 from rrtik_ompl.planning.tip_motion.rails import Rail, arc_rail, screw_rail, straight_rail
-from rrtik_ompl.planning.tip_motion.values import Tolerance
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
 

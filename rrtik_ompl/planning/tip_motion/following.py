@@ -1,24 +1,118 @@
-"""Joints that follow a rail as far as they can: in kernels, or in numpy where there are none."""
+"""Joints that follow a rail as far as they can: in kernels, or in numpy where there are none.
+
+:func:`follow_plainly` is the reference implementation of :mod:`rrtik_ompl.kernels.ik.rail_kernels`.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.ik.numeric.kernel_call import KernelCall
+from rrtik_ompl.ik.reference_descent import LARGEST_STEP, PER_CHORD
 from rrtik_ompl.ik.serial_chain import limb_of
+from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.kernels.ik import rail_layout
 from rrtik_ompl.kernels.ik.ik_layout import AIM_FLOATS, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE
-from rrtik_ompl.kernels.ik.rail_layout import RailTable
+from rrtik_ompl.kernels.ik.rail_layout import (
+    ARRIVED,
+    DAMPING,
+    LARGEST_CHANGE,
+    LARGEST_GROWTH,
+    NEWTON_STEPS,
+    REMAINDER,
+    ROOM,
+    SMALLEST_SHRINKING,
+    RailTable,
+)
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.planning.tip_motion.freedom import levers_of, redundant
+from rrtik_ompl.model.tip_distance import reach_of
 from rrtik_ompl.planning.tip_motion.rails import Rail
-from rrtik_ompl.planning.tip_motion.reference_follow import follow_plainly
-from rrtik_ompl.planning.tip_motion.values import FIRST_STEP, MOST_ROWS, SMALLEST_STEP, Followed, Leaning, Tolerance
+
+MOST_ROWS = 4096  # of one rail
+FIRST_STEP = 0.05  # share of the rail
+SMALLEST_STEP = 1e-6  # share of the rail: where it has to be smaller, the arm cannot go on
+POSE_JOINTS = 6  # with more of them a pose leaves some freedom
+CENTRING = 2.0  # how much of its way to the middle of its limits a joint is drawn over a rail, if it is free
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leaning:
+    """Where what a rail leaves free is drawn.
+
+    Attributes:
+        reference: Configuration, shape (dof,).
+        pull: Share of the way there for a whole rail, by joint, shape (dof,).
+        homing: Whether the reference is to be reached at the end of the rail.
+    """
+
+    reference: Vector
+    pull: Vector
+    homing: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tolerance:
+    """How far the tip may leave a rail: ``deviation`` [m], ``turn`` [rad]."""
+
+    deviation: float
+    turn: float
+
+    @property
+    def chord(self) -> float:
+        """The turn as 2 sin(angle / 2)."""
+        return float(2.0 * np.sin(0.5 * self.turn))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Followed:
+    """Configurations along a rail, shape (k, dof), the first one given, and the share of the rail at each, (k,)."""
+
+    rows: Matrix
+    shares: Vector
+
+    @property
+    def complete(self) -> bool:
+        """Whether the end of the rail is reached."""
+        return bool(self.shares[-1] >= 1.0 - SMALLEST_STEP)
+
+
+@lru_cache(maxsize=64)
+def levers_of(robot: Robot) -> Vector:
+    """How far the tip is from each joint between it and the base at most [m], shape (joints,): offsets in a row."""
+    tip = tip_columns(robot)
+    lengths = np.linalg.norm(tip.fixed[1:, :3, 3], axis=1)
+    lower, upper = (np.where(np.isfinite(x), x, 0.0) for x in (robot.lower, robot.upper))
+    strokes = np.abs(tip.gain) @ np.maximum(np.abs(lower), np.abs(upper)) + np.abs(tip.offset)
+    return frozen(np.cumsum((lengths + np.where(tip.prismatic, strokes, 0.0))[::-1])[::-1])
+
+
+@lru_cache(maxsize=64)
+def moving_the_tip(robot: Robot) -> tuple[int, ...]:
+    """Numbers of the joints of q that move the tip."""
+    return tuple(np.flatnonzero((tip_columns(robot).gain != 0.0).any(axis=0)).tolist())
+
+
+@lru_cache(maxsize=64)
+def redundant(robot: Robot) -> bool:
+    """Whether a pose of the tip leaves the joints some freedom."""
+    return len(moving_the_tip(robot)) > POSE_JOINTS
+
+
+@lru_cache(maxsize=64)
+def centred(robot: Robot) -> Leaning:
+    """Away from the limits, where the rail leaves that free [60]."""
+    bounded = np.isfinite(robot.lower) & np.isfinite(robot.upper)
+    low, high = robot.finite_range()
+    pull = np.zeros(robot.dof)
+    if redundant(robot):
+        pull[list(moving_the_tip(robot))] = CENTRING
+    return Leaning(frozen(0.5 * (low + high)), frozen(np.where(bounded, pull, 0.0)))
 
 
 def follow(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> Followed:
@@ -74,3 +168,93 @@ def _plan(dof: int, joints: int) -> TablePlan:
         capacity=MOST_ROWS,
         count=1,
     )
+
+
+def follow_plainly(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> Followed:
+    """Follow a rail from a configuration at its beginning, shape (dof,), until its end or as far as possible."""
+    rows = [robot.clamp(q)]
+    shares = [0.0]
+    step = FIRST_STEP
+    while shares[-1] < 1.0 - SMALLEST_STEP and len(rows) < MOST_ROWS and step >= SMALLEST_STEP:
+        share_left = 1.0 - shares[-1]
+        tried_step = share_left if step >= share_left - SMALLEST_STEP else step
+        trial = _correct(
+            robot, rail, shares[-1] + tried_step, _guess(robot, rows, shares, tried_step, leaning), tolerance
+        )
+        deviation = (
+            np.inf
+            if trial is None
+            else _deviation_bound(robot, rail, rows[-1], trial, (shares[-1], tried_step), tolerance)
+        )
+
+        if trial is not None and deviation <= 1.0 - ROOM:
+            rows.append(trial)
+            shares.append(shares[-1] + tried_step)
+        change = 0.9 / np.sqrt(deviation) if deviation > 0.0 else LARGEST_GROWTH
+        step = tried_step * min(max(change, SMALLEST_SHRINKING), LARGEST_GROWTH)
+    return Followed(np.array(rows), np.array(shares))
+
+
+def _guess(robot: Robot, rows: list[Vector], shares: list[float], step: float, leaning: Leaning) -> Vector:
+    """The configuration with which a step begins."""
+    share = step / (1.0 - shares[-1]) if leaning.homing else step
+    guess = rows[-1] + share * leaning.pull * (leaning.reference - rows[-1])
+    if len(rows) > 1 and not redundant(robot):
+        guess = guess + step / (shares[-1] - shares[-2]) * (rows[-1] - rows[-2])
+    return robot.clamp(guess)
+
+
+def _correct(robot: Robot, rail: Rail, share: float, q: Vector, tolerance: Tolerance) -> Vector | None:
+    """Bring the tip to a point of the rail by Newton's method, inside the limits; None if it does not get there."""
+    aim = rail.poses(share)[0]
+    scale = np.repeat([1.0 / reach_of(robot), PER_CHORD], 3)
+    for k in range(NEWTON_STEPS + 1):
+        tip, jacobian = (x[0] for x in robot.fk_jacobian_batch(q))
+        error = _residual(aim, tip)
+        distance = np.linalg.norm(error[:3])
+        chord = np.linalg.norm(error[3:])
+        if distance <= ARRIVED * tolerance.deviation and chord <= ARRIVED * tolerance.chord:
+            return q
+        if k < NEWTON_STEPS:
+            q = robot.clamp(q + _newton_step(robot, q, jacobian * scale[:, None], error * scale))
+    return None
+
+
+def _residual(aim: Matrix, tip: Matrix) -> Vector:
+    """From a tip to a pose, in world axes: [m], and the turn's axis times its chord, shape (6,)."""
+    turn = aim[:3, :3] @ tip[:3, :3].T
+    skew = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    half = np.sqrt(max(0.25 * (1.0 + np.trace(turn)), 1e-24))
+    return np.concatenate([aim[:3, 3] - tip[:3, 3], skew / half])
+
+
+def _newton_step(robot: Robot, q: Vector, jacobian: Matrix, error: Vector) -> Vector:
+    """The shortest step that removes a residual, without joints at a limit that would go on beyond it."""
+    pull = jacobian.T @ error
+    pinned = ((q <= robot.lower) & (pull < 0.0)) | ((q >= robot.upper) & (pull > 0.0))
+    free = np.where(pinned, 0.0, jacobian)
+    change: Vector = free.T @ np.linalg.solve(free @ free.T + DAMPING * np.eye(6), error)
+    return change * (LARGEST_STEP / max(float(np.abs(change).max()), LARGEST_STEP))
+
+
+def _deviation_bound(
+    robot: Robot, rail: Rail, q: Vector, trial: Vector, at: tuple[float, float], tolerance: Tolerance
+) -> float:
+    """How far the tip leaves the rail on a motion at most, 1 is what it may; ``at``: share and step."""
+    if np.abs(trial - q).max() > LARGEST_CHANGE:
+        return float(np.inf)
+    share, step = at
+    error = _residual(rail.poses(share + 0.5 * step)[0], robot.fk_batch(0.5 * (q + trial))[0])
+
+    tip = tip_columns(robot)
+    change = np.abs(tip.gain) @ np.abs(trial - q)
+    turning = np.where(tip.prismatic, 0.0, change)
+    slid = change[tip.prismatic].sum()
+    turn = turning.sum()
+    swept = turning @ levers_of(robot)
+
+    third = turn**2 * (swept + 3.0 * slid) + abs(step * rail.arc_angle) ** 3 * rail.arc_radius
+    third_turn = turn**3 + abs(step * rail.turn_angle) ** 3
+    distance = np.linalg.norm(error[:3]) + REMAINDER * third
+    chord = np.linalg.norm(error[3:]) + np.sqrt(1.5) * REMAINDER * third_turn
+    return float(max(distance / tolerance.deviation, chord / tolerance.chord))

@@ -6,12 +6,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from bench.moves.oracles import least_moves
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Sphere
 from rrtik_ompl.model.transitions import single_joint
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening import shorten
-from rrtik_ompl.planning.shortening.fewest_moves import least_moves
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_planners import FewestMoves

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.moves.oracles import grid_route, least_moves
 from rrtik_ompl.base.budget import no_stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
@@ -12,7 +13,6 @@ from rrtik_ompl.geometry.collision.overlap_depth import OverlapDepth
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.planning.moves.lower_bounds import OneFreeValue, sharper_bound
-from rrtik_ompl.planning.shortening.fewest_moves import grid_route, least_moves
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.model.transitions import lower_bound, route_length, single_joint, transitions
-from rrtik_ompl.planning.moves.lattice import MoveLattice
+from rrtik_ompl.planning.moves.lattice import MoveLattice, within_travel
 from rrtik_ompl.planning.moves.search import MoveSearch
-from rrtik_ompl.planning.moves.values import within_travel
 from rrtik_tests.mazes import GridWorld
 
 GRID = 4

@@ -12,7 +12,7 @@ from rrtik_bench.shortening.plane_arms import PlaneArm, PlaneGrid
 from rrtik_ompl.base.budget import Budget, no_stop
 from rrtik_ompl.planning.moves.clearance_levels import clearance_levels
 from rrtik_ompl.planning.moves.fine_grids import FineGrids
-from rrtik_ompl.planning.moves.reach_bound import reach_bound
+from rrtik_ompl.planning.moves.lower_bounds import reach_bound
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.problem_files.problem import load_problem

@@ -10,8 +10,13 @@ from hypothesis import strategies as st
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, route_length, single_joint, transitions
-from rrtik_ompl.planning.moves.axis_cut import axis_cut, axis_moves, cut_parts, double_axis_cut
-from rrtik_ompl.planning.moves.axis_cut_rounds import axis_cut_rounds, best_of
+from rrtik_ompl.planning.moves.axis_cut import (
+    axis_cut,
+    axis_cut_rounds,
+    axis_moves,
+    cut_parts,
+    double_axis_cut,
+)
 from rrtik_tests.mazes import GridWorld
 
 GRID = 6
@@ -180,24 +185,3 @@ def test_further_rounds_are_never_worse_and_repeat_with_their_seed(
 def test_negative_rounds_are_refused() -> None:
     with pytest.raises(InputError, match="rounds"):
         axis_cut_rounds([[0.0, 0], [1, 0]], free, rounds=-1)
-
-
-def test_best_of_takes_the_fewest_transitions_then_the_shortest() -> None:
-    long, short = np.array([[0.0, 0], [0, 5], [1, 5]]), np.array([[0.0, 0], [0, 1], [1, 1]])
-    many = np.array([[0.0, 0], [0, 0.1], [0.1, 0.1], [0.1, 0.2]])
-    offers = iter([many, None, long, short])
-    assert best_of(lambda seed: next(offers), 4) is short
-
-
-def test_best_of_gives_each_attempt_its_own_seed_and_none_if_all_fail() -> None:
-    seeds: list[int] = []
-    assert best_of(lambda seed: seeds.append(seed), 5, seed=3) is None
-    again: list[int] = []
-    best_of(lambda seed: again.append(seed), 5, seed=3)
-    assert seeds == again
-    assert len(set(seeds)) == 5
-
-
-def test_best_of_nothing_is_refused() -> None:
-    with pytest.raises(InputError, match="count"):
-        best_of(lambda seed: None, 0)

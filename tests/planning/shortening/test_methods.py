@@ -16,9 +16,8 @@ from rrtik_ompl.model.transitions import route_length, single_joint, transitions
 from rrtik_ompl.planning.shortening import METHODS, Task, Wishes
 from rrtik_ompl.planning.shortening.acceptance import Acceptance
 from rrtik_ompl.planning.shortening.corners import snap_corners
-from rrtik_ompl.planning.shortening.random_cut import random_cut
+from rrtik_ompl.planning.shortening.cuts import random_cut, sequential_cut
 from rrtik_ompl.planning.shortening.retraction import retract
-from rrtik_ompl.planning.shortening.sequential import sequential_cut
 
 DISCS = [((2.0, 0.0), 1.0), ((5.0, 0.6), 1.2), ((8.0, -0.5), 1.0), ((5.0, -3.0), 0.8)]
 FOR_ALL_PATHS = [name for name, method in METHODS.items() if not method.keeps_moves]

@@ -10,11 +10,17 @@ from rrtik_ompl.ik.serial_chain import limb_of
 from rrtik_ompl.kernels.ik import rail_layout
 from rrtik_ompl.kernels.ik.ik_layout import AIM_FLOATS
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.planning.tip_motion.following import follow, packed_rail
-from rrtik_ompl.planning.tip_motion.freedom import centred, levers_of, redundant
+from rrtik_ompl.planning.tip_motion.following import (
+    Leaning,
+    Tolerance,
+    centred,
+    follow,
+    follow_plainly,
+    levers_of,
+    packed_rail,
+    redundant,
+)
 from rrtik_ompl.planning.tip_motion.rails import arc_rail, screw_rail, straight_rail
-from rrtik_ompl.planning.tip_motion.reference_follow import follow_plainly
-from rrtik_ompl.planning.tip_motion.values import Leaning, Tolerance
 from rrtik_tests.sizes import how_many
 
 TOLERANCE = Tolerance(1e-4, np.radians(0.1))

@@ -11,9 +11,8 @@ from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.model.goal import PoseGoal
 from rrtik_ompl.planning.tip_motion.attempts import ENDS, RANDOM_REFERENCES, Way, attempt, leanings
-from rrtik_ompl.planning.tip_motion.freedom import centred
+from rrtik_ompl.planning.tip_motion.following import Tolerance, centred
 from rrtik_ompl.planning.tip_motion.rails import arc_rail, screw_rail, straight_rail
-from rrtik_ompl.planning.tip_motion.values import Tolerance
 
 UR5_READY = [0.0, -1.6, 1.8, -0.2, 1.6, 0.0]
 DENSE = np.linspace(0.0, 1.0, 51)[:, None]

@@ -1,7 +1,9 @@
-"""Random cut: straight from one random place of the route to another. Source: [1, ch. 5.3, method 2].
+"""Cuts from one place of a route straight to another. Source: [1, ch. 5.3, methods 1 and 2].
 
-Where the world has kernels the whole loop runs in one (:mod:`rrtik_ompl.kernels.search.shortcut`): first without the
-shortcuts that the kernels cannot decide, for those take a hundred times as long, then with them.
+The sequential cut goes from each waypoint to the last one that can be reached, the random cut from one random place to
+another. Where the world has kernels the whole loop of the latter runs in one
+(:mod:`rrtik_ompl.kernels.search.shortcut`): first without the shortcuts that the kernels cannot decide, for those take
+a hundred times as long, then with them.
 """
 
 from __future__ import annotations
@@ -21,6 +23,26 @@ TRIES_PER_CALL = 64  # of the kernel, until the task may end it
 # what shortcuts do beyond the published random cut: see the kernel
 WAYPOINTS = 0.5  # share of ends that are waypoints
 PULLS = 0.3  # share of tries that pull a waypoint
+
+
+def sequential_cut(route: Matrix, task: Task) -> Matrix:
+    """Cut a route, shape (k, n), from its start; deterministic.
+
+    Waypoints are tried from the last one on back to the next, which needs no check.
+    """
+    cut_route = [route[:1]]
+    pivot = 0
+    last = len(route) - 1
+    while pivot < last:
+        found = task.first_link(route[pivot], route[last : pivot + 1 : -1])
+        if found is None:
+            cut_route.append(route[pivot + 1 : pivot + 2])
+            pivot += 1
+        else:
+            cut_route.append(found[1])
+            pivot = last - found[0]
+        task.report(np.vstack([*cut_route, route[pivot + 1 :]]))
+    return without_repeats(np.vstack(cut_route))
 
 
 def random_cut(route: Matrix, task: Task, *, tries: int = TRIES) -> Matrix:

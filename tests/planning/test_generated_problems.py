@@ -5,8 +5,7 @@ import pytest
 
 from rrtik_ompl import World, load_robot, plan
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.planning.generated_problems import FAMILIES, generated_problem
-from rrtik_ompl.planning.generated_problems.families import obstacles
+from rrtik_ompl.planning.generated_problems import FAMILIES, generated_problem, obstacles
 from rrtik_ompl.planning.moves.staircase import staircase_orders
 
 TITAN = load_robot("titan4")
