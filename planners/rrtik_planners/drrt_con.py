@@ -12,7 +12,7 @@ from rrtik_ompl.kernels.search.connect_layout import KERNELS
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
-from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph
+from rrtik_ompl.ompl_bridge.results import PlannerGraph
 from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
 from rrtik_ompl.replanning.connecting import KernelConnect, PythonConnect
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along

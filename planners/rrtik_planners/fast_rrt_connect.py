@@ -17,7 +17,7 @@ from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.search.tree_memory import certain_tree
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
-from rrtik_ompl.ompl_bridge.inspection.graph import Tree, without
+from rrtik_ompl.ompl_bridge.results import Tree, without
 from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import KernelWorld, decider, has_kernels
 from rrtik_planners.one_joint_options import iteration_limit

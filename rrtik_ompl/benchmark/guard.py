@@ -18,8 +18,7 @@ from typing import IO, Any
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.benchmark.run import CRASH, HANG, OUT_OF_MEMORY
 from rrtik_ompl.ompl_bridge.ownership import PLAIN_HINT, is_plain
-from rrtik_ompl.ompl_bridge.planner_files import label_of
-from rrtik_ompl.ompl_bridge.planner_names import find_planner, is_auto
+from rrtik_ompl.ompl_bridge.planner_names import find_planner, is_auto, label_of
 
 COMMAND = (sys.executable, "-m", "rrtik_ompl.benchmark.child")
 MEMORY_WORDS = ("bad_alloc", "MemoryError", "Cannot allocate memory")

@@ -30,8 +30,7 @@ from rrtik_ompl.description.catalog import find_suite, load_robot
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
-from rrtik_ompl.ompl_bridge.planner_files import is_planner_file, label_of, planner_in_folder
-from rrtik_ompl.ompl_bridge.planner_names import options_of
+from rrtik_ompl.ompl_bridge.planner_names import is_planner_file, label_of, options_of, planner_in_folder
 from rrtik_ompl.ompl_bridge.planner_traits import unbound_planners
 from rrtik_ompl.planning.generated_problems import FAMILIES
 

@@ -1,4 +1,4 @@
-"""One attempt of one planner at one problem.
+"""OMPL at work, arrays in and out: one attempt of one planner at one problem, one shortening by its PathSimplifier.
 
 A planner of ours works on arrays. For any other one every OMPL object lives and dies inside the call.
 """
@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from ompl import base as ob
+from ompl import geometric as og
 from ompl import util as ou
 
 from rrtik_ompl.base.arrays import Matrix
@@ -35,6 +36,7 @@ from rrtik_ompl.ompl_bridge.setup import (
     shared_space,
     space_information,
 )
+from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
 from rrtik_ompl.world.problem import Problem
 
@@ -43,6 +45,7 @@ ITERATION_LIMIT = "max_iterations"  # the option of our planners
 MOTIONS_PER_ITERATION = 5  # checked motions of OMPL's planners that count as one iteration of ours
 
 INVALID = (ob.PlannerStatus.INVALID_START, ob.PlannerStatus.INVALID_GOAL)
+MAX_SECONDS = 1e9  # [s]
 
 
 def attempt_seeds(seed: int, restarts: int) -> list[int]:
@@ -278,3 +281,33 @@ def _graph(planner: ob.Planner, si: ob.SpaceInformation) -> dict[str, int]:
     graph = ob.PlannerData(si)
     planner.getPlannerData(graph)
     return {"vertices": graph.numVertices(), "edges": graph.numEdges()}
+
+
+def simplified(problem: Problem, route: Matrix, budget: Budget) -> tuple[Matrix, int]:
+    """Let ``ompl.geometric.PathSimplifier`` shorten a route, shape (k, n); also how many motions were checked.
+
+    Its last step checks configurations alone of what it has bent, so the result must be checked. When the time is up
+    no motion counts as free, and what was found so far is returned.
+
+    Raises:
+        PlannerError: If a check raised an error.
+        KeyboardInterrupt: After it has stopped in good order.
+    """
+    with quiet():
+        seed_ompl(budget.seed)
+        validity = ValidityCallback(problem.world)
+        si = space_information(problem, route, validity)
+
+        seconds = 0.0 if budget.over() else min(budget.left, MAX_SECONDS)
+        validity.deadline = time.monotonic() + seconds
+        condition = ob.timedPlannerTerminationCondition(seconds)
+        validity.stop = condition.terminate
+
+        states = StateIO(si)
+        path = states.path(si, route)
+        with interrupt_ends(condition):
+            og.PathSimplifier(si).simplify(path, condition, True)
+
+        if validity.error is not None:
+            raise PlannerError(f"PathSimplifier broke: {in_short(validity.error)}")
+        return states.rows(path), validity.motions

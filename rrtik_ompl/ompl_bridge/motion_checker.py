@@ -10,8 +10,8 @@ import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.ompl_bridge.spaces.unrolled import pieces
 from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.ompl_bridge.unrolled import pieces
 from rrtik_ompl.world.motion_queries import MotionQueries
 
 

@@ -13,9 +13,8 @@ from ompl import base as ob
 from rrtik_ompl.base.arrays import finite_array
 from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 from rrtik_ompl.description.joint_weights import weights_as_costs
-from rrtik_ompl.ompl_bridge.inspection.settings import keyword_parameters
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
-from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
+from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, keyword_parameters
 from rrtik_ompl.world.problem import Problem
 
 

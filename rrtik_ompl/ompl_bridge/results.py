@@ -1,16 +1,25 @@
-"""What a search of a planner brings back, and how a ``solve`` that could not be done is put into words."""
+"""What a search of a planner brings back: a path, counts, what was grown; and why a ``solve`` could not be done."""
 
 from __future__ import annotations
 
+import os
 import traceback
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from ompl import base as ob
 
-from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.base.errors import InputError, RrtikError
-from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph
+from rrtik_ompl.files.text import write_text
+from rrtik_ompl.ompl_bridge.states import StateIO
+
+Numbers: TypeAlias = NDArray[np.int64]
+Tree: TypeAlias = tuple[Matrix, ArrayLike]  # vertices, and the number of each one's parent, below 0 for a root
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,3 +100,184 @@ def status_of(found: SearchResult) -> ob.PlannerStatus:
     if found.path is None:
         return ob.PlannerStatus.TIMEOUT
     return ob.PlannerStatus.APPROXIMATE_SOLUTION if found.difference > 0.0 else ob.PlannerStatus.EXACT_SOLUTION
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannerGraph:
+    """What a planner has grown in its last ``solve``. The arrays are read-only.
+
+    Attributes:
+        vertices: Configurations, shape (v, n) [unit of the space].
+        edges: Pairs of vertices whose motion was found free, shape (e, 2); of a tree the parent first.
+        costs: Length of each edge, shape (e,) [unit of the space].
+        starts: Numbers of the vertices that are starts.
+        goals: Likewise of goals.
+    """
+
+    vertices: Matrix
+    edges: Numbers
+    costs: Vector
+    starts: Numbers
+    goals: Numbers
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write it as GraphML, which Gephi, NetworkX, igraph and others read.
+
+        The coordinates of a vertex are in ``coords``, divided by commas, as OMPL writes them; ``weight`` of an edge is
+        its cost.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
+        write_text(os.fspath(file), "\n".join([*_graph_ml(self), ""]))
+
+    def planner_data(self, si: ob.SpaceInformation) -> ob.PlannerData:
+        """The graph as ``ompl.base.PlannerData``, which has its own copies of the states.
+
+        Args:
+            si: Of the planner.
+        """
+        io = StateIO(si)
+        data = ob.PlannerData(si)
+        states = [si.allocState() for _ in self.vertices]  # the data hold only their addresses until they are decoupled
+
+        starts = set(self.starts.tolist())
+        goals = set(self.goals.tolist())
+
+        for number, (one, row) in enumerate(zip(states, self.vertices, strict=True)):
+            io.write(one, row)
+            vertex = ob.PlannerDataVertex(one)
+            if number in starts:
+                data.addStartVertex(vertex)
+            elif number in goals:
+                data.addGoalVertex(vertex)
+            else:
+                data.addVertex(vertex)
+
+        for first, second in self.edges.tolist():
+            data.addEdge(first, second)
+
+        data.decoupleFromPlanner()
+        return data
+
+
+def graph_of(vertices: Matrix, edges: ArrayLike, starts: ArrayLike = (), goals: ArrayLike = ()) -> PlannerGraph:
+    """A graph; its costs are the lengths of its edges.
+
+    Args:
+        vertices: Shape (v, n).
+        edges: Pairs of vertices, shape (e, 2).
+        starts: Numbers of vertices.
+        goals: Likewise.
+    """
+    pairs = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
+    costs = np.linalg.norm(vertices[pairs[:, 1]] - vertices[pairs[:, 0]], axis=1)
+    joined, first, last = (frozen(each, dtype=np.int64) for each in (pairs, starts, goals))
+    return PlannerGraph(frozen(vertices), joined, frozen(costs), first, last)
+
+
+def graph_of_trees(starts: Tree, goals: Tree | None = None) -> PlannerGraph:
+    """A graph of a tree that grows from starts and, if there is one, a tree that grows from goals."""
+    rows = []
+    edges = []
+    roots = []
+    count = 0
+
+    for tree in (starts, goals):
+        vertices = np.empty((0, starts[0].shape[1])) if tree is None else np.asarray(tree[0])
+        parents = np.empty(0, dtype=np.int64) if tree is None else np.asarray(tree[1], dtype=np.int64)
+        grown = np.flatnonzero(parents >= 0)
+
+        rows.append(vertices)
+        edges.append(np.stack([parents[grown], grown], axis=1) + count)
+        roots.append(np.flatnonzero(parents < 0) + count)
+        count += len(vertices)
+
+    return graph_of(np.concatenate(rows), np.concatenate(edges), *roots)
+
+
+def graph_of_path(path: Matrix) -> PlannerGraph:
+    """A path, shape (k, n), as a graph: what is left of a planner that keeps no tree."""
+    steps = np.arange(len(path) - 1)
+    return graph_of(path, np.stack([steps, steps + 1], axis=1), [0], [len(path) - 1])
+
+
+def without(rows: Matrix, parents: NDArray[np.integer], is_kept: NDArray[np.bool_]) -> Tree:
+    """A tree without the vertices that are not kept and those below them."""
+    remains = is_kept.copy()
+    parent_or_0 = np.where(parents < 0, 0, parents)
+
+    # A round drops the children of those that the one before it dropped.
+    while True:
+        still_remains = remains & ((parents < 0) | remains[parent_or_0])
+        if (still_remains == remains).all():
+            break
+        remains = still_remains
+
+    numbers = np.cumsum(remains) - 1
+    return rows[remains], np.where(parents < 0, -1, numbers[parent_or_0])[remains]
+
+
+def nearest_approach(graph: PlannerGraph, goals: Matrix) -> tuple[Matrix, float] | None:
+    """The way from a start, along edges, to the vertex nearest to a goal; and how far from it that is.
+
+    Args:
+        graph: Grown by a planner.
+        goals: Shape (g, n).
+
+    Returns:
+        The way, shape (k, n), and the distance [unit of the space]; None if nothing is nearer than a start.
+    """
+    predecessors = _predecessors(graph)
+    if not predecessors:
+        return None
+
+    numbers = np.fromiter(predecessors, dtype=np.int64)
+    gaps = np.linalg.norm(graph.vertices[numbers][:, None] - goals[None], axis=2).min(axis=1)
+    vertex = int(numbers[gaps.argmin()])
+    distance = float(gaps.min())
+    if predecessors[vertex] < 0 or distance == 0.0:
+        return None
+
+    vertices = [vertex]
+    while predecessors[vertices[-1]] >= 0:
+        vertices.append(predecessors[vertices[-1]])
+    return graph.vertices[vertices[::-1]].copy(), distance
+
+
+def _predecessors(graph: PlannerGraph) -> dict[int, int]:
+    """The vertices to which edges lead from a start, each with the one before it, -1 for a start."""
+    leaving: dict[int, list[int]] = {}
+    for first, second in graph.edges.tolist():
+        leaving.setdefault(first, []).append(second)
+
+    predecessors = dict.fromkeys(graph.starts.tolist(), -1)
+    waiting = deque(predecessors)
+
+    while waiting:
+        vertex = waiting.popleft()
+        for head in leaving.get(vertex, ()):
+            if head not in predecessors:
+                predecessors[head] = vertex
+                waiting.append(head)
+    return predecessors
+
+
+def _graph_ml(graph: PlannerGraph) -> Iterator[str]:
+    yield '<?xml version="1.0" encoding="UTF-8"?>'
+    yield '<graphml xmlns="http://graphml.graphdrawing.org/xmlns">'
+    yield '  <key id="coords" for="node" attr.name="coords" attr.type="string"/>'
+    yield '  <key id="role" for="node" attr.name="role" attr.type="string"/>'
+    yield '  <key id="weight" for="edge" attr.name="weight" attr.type="double"/>'
+    yield '  <graph id="graph" edgedefault="directed">'
+
+    roles = dict.fromkeys(graph.goals.tolist(), "goal") | dict.fromkeys(graph.starts.tolist(), "start")
+    for number, row in enumerate(graph.vertices.tolist()):
+        role = f'<data key="role">{roles[number]}</data>' if number in roles else ""
+        coords = ",".join(map(repr, row))
+        yield f'    <node id="n{number}"><data key="coords">{coords}</data>{role}</node>'
+    for (first, second), cost in zip(graph.edges.tolist(), graph.costs.tolist(), strict=True):
+        yield f'    <edge source="n{first}" target="n{second}"><data key="weight">{cost!r}</data></edge>'
+
+    yield "  </graph>"
+    yield "</graphml>"

@@ -7,10 +7,12 @@ arrays at once, and ``solve`` always returns a status.
 
 from __future__ import annotations
 
+import inspect
+import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache, wraps
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -20,22 +22,33 @@ from ompl import util as ou
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, whole_number
 from rrtik_ompl.base.budget import Stop
-from rrtik_ompl.base.errors import PlannerError
+from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
-from rrtik_ompl.ompl_bridge.inspection.graph import PlannerGraph, Tree, graph_of_path, graph_of_trees, nearest_approach
-from rrtik_ompl.ompl_bridge.inspection.settings import FILLED_IN, change, keyword_parameters, options_of, remembering
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.planner_inputs import condition_of, starts_and_goals, usable
-from rrtik_ompl.ompl_bridge.results import Failure, IllPosed, SearchResult, explained, failure_of, status_of
-from rrtik_ompl.ompl_bridge.spaces.coordinates import coordinates_of
-from rrtik_ompl.ompl_bridge.spaces.unrolled import Unrolled
-from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.ompl_bridge.results import (
+    Failure,
+    IllPosed,
+    PlannerGraph,
+    SearchResult,
+    Tree,
+    explained,
+    failure_of,
+    graph_of_path,
+    graph_of_trees,
+    nearest_approach,
+    status_of,
+)
+from rrtik_ompl.ompl_bridge.states import StateIO, coordinates_of
+from rrtik_ompl.ompl_bridge.unrolled import Unrolled
 from rrtik_ompl.world.motion_queries import MotionQueries, turning_joints
 from rrtik_ompl.world.route_check import route_violations, verification_resolution
 from rrtik_ompl.world.world import World
 
 SEARCHES = 20  # until a world's second check takes a path
+FILLED_IN = ("world", "seed", "goal")  # options that `plan()` fills in
+GIVEN = "_given"  # the attribute that keeps the arguments of a planner's constructor
 
 
 class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
@@ -392,3 +405,68 @@ def _refusal_of_second_check(world: object, rows: Matrix | None, unrolled: Unrol
         rows = rows.repeat(2, axis=0)  # a motion of no length
     found = route_violations(world, rows, verification_resolution(world))
     return found[0].reason if found else ""
+
+
+def keyword_parameters(planner: Callable[..., Any]) -> Mapping[str, Any]:
+    """The parameters of a planner's class but the first one, which is the space information, and their defaults."""
+    return _parameters(planner)  # apart, as lru_cache asks for Hashable, which classes are not to mypy
+
+
+def remembering(constructor: Callable[..., None]) -> Callable[..., None]:
+    """A constructor that keeps the options it is given; of constructors that call each other the outermost does."""
+
+    @wraps(constructor)
+    def remember(self: object, *arguments: Any, **options: Any) -> None:
+        self.__dict__.setdefault(GIVEN, options)
+        constructor(self, *arguments, **options)
+
+    return remember
+
+
+def options_of(planner: ob.Planner) -> dict[str, Any]:
+    """The options of a planner with the values in use."""
+    defaults = {name: value for name, value in keyword_parameters(type(planner)).items() if name not in FILLED_IN}
+    given = planner.__dict__.get(GIVEN, {})
+    return {name: given.get(name, value) for name, value in defaults.items()}
+
+
+def change(planner: ob.Planner, name: str, value: object) -> None:
+    """Change an option of a planner, as its constructor would take it; a text is read as JSON where it is that.
+
+    Raises:
+        UnknownNameError: If there is no option of that name.
+        InputError: If the planner refuses the value; it is as it was then.
+    """
+    options = options_of(planner)
+    if name not in options:
+        raise UnknownNameError(f"parameter of planner {planner.getName()}", name, tuple(options))
+
+    given = {**planner.__dict__[GIVEN], name: _read(value)}
+    try:
+        made = type(planner)(planner.getSpaceInformation(), **{**given, "seed": planner.seed})
+    except TypeError as error:
+        raise InputError(f"planner {planner.getName()}: {name}: {error}") from None
+
+    # All that depends on options, but neither how far its numbers are drawn nor what hangs on its space.
+    settings = {key: each for key, each in vars(made).items() if key not in ("rng", "_states")}
+    planner.__dict__.update(settings)
+    planner.__dict__[GIVEN] = given
+
+
+def _read(value: object) -> object:
+    if not isinstance(value, str):
+        return value
+    words = {"none": None, "true": True, "false": False}
+    if value.strip().lower() in words:
+        return words[value.strip().lower()]
+
+    try:
+        return json.loads(value)
+    except ValueError:
+        return value
+
+
+@lru_cache(maxsize=64)
+def _parameters(planner: Callable[..., Any]) -> Mapping[str, Any]:
+    parameters = list(inspect.signature(planner).parameters.values())[1:]
+    return MappingProxyType({each.name: each.default for each in parameters})

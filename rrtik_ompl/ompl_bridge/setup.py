@@ -13,8 +13,8 @@ import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector, frozen
-from rrtik_ompl.ompl_bridge.spaces.unrolled import near_image
 from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.ompl_bridge.unrolled import near_image
 from rrtik_ompl.world.motion_queries import MotionFree
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World

@@ -20,10 +20,9 @@ from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.model.goal import Goal, JointGoal
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
-from rrtik_ompl.problem_files.moveit_frames import WORLD, Frames
 from rrtik_ompl.problem_files.moveit_messages import JointConstraint, RequestMessage, RobotState, SceneMessage
 from rrtik_ompl.problem_files.moveit_regions import held_regions_of, tip_goal
-from rrtik_ompl.problem_files.moveit_scene import SceneReader, passed_over, tell
+from rrtik_ompl.problem_files.moveit_scene import WORLD, Frames, SceneReader, passed_over, tell
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

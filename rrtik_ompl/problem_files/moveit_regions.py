@@ -10,8 +10,8 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_region import ANYWHERE
 from rrtik_ompl.model.goal import Goal, PoseGoal, PositionGoal
 from rrtik_ompl.model.task_region import TaskRegion
-from rrtik_ompl.problem_files.moveit_frames import Frames
 from rrtik_ompl.problem_files.moveit_messages import Constraints, OrientationConstraint, PositionConstraint
+from rrtik_ompl.problem_files.moveit_scene import Frames
 
 FREE = np.pi - 2e-3  # [rad] a tolerance of 3.14 leaves an axis free
 LARGEST = np.radians(80.0)  # [rad] of an angle that is bounded

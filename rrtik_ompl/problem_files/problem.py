@@ -26,10 +26,10 @@ from rrtik_ompl.problem_files.problem_values import (
     problem_document,
     problem_path,
     settings_of,
+    world_data,
 )
 from rrtik_ompl.problem_files.robot import robot_data
 from rrtik_ompl.problem_files.scene import scene_data
-from rrtik_ompl.problem_files.world import world_data
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

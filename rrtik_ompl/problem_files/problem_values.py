@@ -3,32 +3,64 @@
 from __future__ import annotations
 
 import os
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field
 
 from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.catalog import find_problem, list_planners, load_robot, robot_from_entry, task_files
-from rrtik_ompl.files.sections import Version, parse, without_null
+from rrtik_ompl.files.sections import NotNegative, Positive, Section, Version, parse, without_null
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.world_settings import WorldSettings
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.world_settings import FINEST_RESOLUTION, MOTION_RESOLUTION, WorldSettings
 from rrtik_ompl.problem_files.goal import GoalSection, StartSection, build_goal
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection
 from rrtik_ompl.problem_files.robot import RobotEntry
 from rrtik_ompl.problem_files.run import RunSection
 from rrtik_ompl.problem_files.scene import SceneEntry
-from rrtik_ompl.problem_files.world import WorldKeys
 
 FilePath = str | os.PathLike[str]
 ONLY_PATHS = (".csv", ".txt")  # endings; a .json may be either
 NO_GOAL = "it has stages and no goal"
 OF_TASKS = {"task": NO_GOAL, "goals": "it has several goals, to be reached in order"}  # by keys
 OF_PATHS = ("waypoints", "points")  # keys of files of paths and of trajectories
+ELSEWHERE = ("robot", "scene", "constraints")  # settings that have sections of their own
+
+
+class WorldKeys(Section):
+    """How a world checks. Lengths in metres."""
+
+    motion_resolution: Positive = Field(
+        MOTION_RESOLUTION,
+        ge=FINEST_RESOLUTION,
+        description="largest step of any point of the arm between two checked configurations [m]",
+    )
+    self_margin: NotNegative = Field(
+        0.0, description="[m] that links, and what they hold, keep from each other wherever they must not touch"
+    )
+    accuracy: Accuracy = Field(
+        "exact", description="exact, or conservative: what kernels cannot prove free counts as blocked"
+    )
+    clearance: NotNegative = Field(0.0, description="[m] that is kept from obstacles on top of their margins")
+    proving: NotNegative | None = Field(
+        None,
+        description="[m] of clearance with which motions must be proven to count as free; in steps if absent",
+    )
+
+    def settings(self, robot: Robot, scene: Scene) -> WorldSettings:
+        """Of the world of a robot in a scene.
+
+        Raises:
+            InputError: If the robot is none that a world can be made of.
+        """
+        return WorldSettings(robot, scene, **{name: getattr(self, name) for name in WorldKeys.model_fields})
 
 
 class ProblemFile(WorldKeys):
@@ -115,8 +147,10 @@ def settings_of(document: YamlDocument, entry: ProblemFile, robot: Robot | FileP
 def planner_of(document: YamlDocument, name: str | None) -> str | None:
     """The name of a planner, if there is such a planner."""
     if name is not None and name.lower() not in list_planners():
-        from rrtik_ompl.ompl_bridge.planner_files import is_planner_file  # loads OMPL, which few files need
-        from rrtik_ompl.ompl_bridge.planner_names import options_of
+        from rrtik_ompl.ompl_bridge.planner_names import (
+            is_planner_file,  # loads OMPL, which few files need
+            options_of,
+        )
 
         with document.at(("planner",)):
             if is_planner_file(name):
@@ -129,3 +163,20 @@ def problem_schema() -> dict[str, Any]:
     """JSON schema of the problem file, made from the same models that check it."""
     schema = without_null(ProblemFile.model_json_schema())
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def world_data(settings: WorldSettings) -> dict[str, Any]:
+    """What the keys of a file say about settings: those that are not the default, and the motion resolution.
+
+    Raises:
+        InputError: If the format has no word for one of them.
+    """
+    data: dict[str, Any] = {"motion_resolution": settings.motion_resolution}
+    for each in fields(settings):
+        value = getattr(settings, each.name)
+        if each.name in ELSEWHERE or each.default is MISSING or value == each.default:
+            continue
+        if each.name not in WorldKeys.model_fields:
+            raise InputError(f"world: the file has no key for {each.name}={value}; leave it out")
+        data[each.name] = value
+    return data

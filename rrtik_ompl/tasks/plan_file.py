@@ -19,9 +19,9 @@ from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name, known_ending, read_text, write_text
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
+from rrtik_ompl.problem_files.problem_values import WorldKeys, world_data
 from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
 from rrtik_ompl.problem_files.scene import ContactEntry, SceneEntry, scene_data
-from rrtik_ompl.problem_files.world import WorldKeys, world_data
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.contact_life import MotionContact
 from rrtik_ompl.tasks.task_file import StageEntry, stage_data

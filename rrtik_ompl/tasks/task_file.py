@@ -34,9 +34,9 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, build_goal, goal_data
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
+from rrtik_ompl.problem_files.problem_values import WorldKeys
 from rrtik_ompl.problem_files.robot import RobotEntry
 from rrtik_ompl.problem_files.scene import PoseEntry, SceneEntry, pose_data
-from rrtik_ompl.problem_files.world import WorldKeys
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.setting import Setting

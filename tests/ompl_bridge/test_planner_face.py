@@ -15,7 +15,7 @@ from ompl import tools as ot
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
-from rrtik_ompl.ompl_bridge.contract.problems import outside_bar, outside_wall, small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract import outside_bar, outside_wall, small_problem, solution_rows
 from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, RoadmapPlanner
 
 GROWING = (BiCRDT, CBiRRT, CRDT, FastRRTConnect, IKURT, MBRRT)

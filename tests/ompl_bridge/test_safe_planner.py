@@ -12,7 +12,7 @@ from ompl import base as ob
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, SpaceChecker, WorldChecker
-from rrtik_ompl.ompl_bridge.contract.problems import GOAL, START, outside_bar, small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract import GOAL, START, outside_bar, small_problem, solution_rows
 from rrtik_tests.waiting import until
 
 pytestmark = pytest.mark.usefixtures("quiet_ompl")

@@ -15,7 +15,7 @@ from ompl import geometric as og
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ompl_bridge import StateIO, space_bounds, states
-from rrtik_ompl.ompl_bridge.spaces.unrolled import MOST_GOALS, Unrolled, on_circles, pieces
+from rrtik_ompl.ompl_bridge.unrolled import MOST_GOALS, Unrolled, on_circles, pieces
 from rrtik_planners import BiCRDT, FastRRTConnect
 
 pytestmark = pytest.mark.usefixtures("quiet_ompl")

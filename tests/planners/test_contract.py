@@ -14,9 +14,15 @@ from ompl import base as ob
 from rrtik_ompl.base.errors import PlannerError
 from rrtik_ompl.description import catalog
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult, check_planner
-from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
-from rrtik_ompl.ompl_bridge.contract.problems import Clause, small_problem, solution_rows
-from rrtik_ompl.ompl_bridge.contract.spaces import takes_starts_that_lead_nowhere, turns_either_way
+from rrtik_ompl.ompl_bridge.contract import (
+    CONTRACT,
+    Clause,
+    moves_one_joint_at_a_time,
+    small_problem,
+    solution_rows,
+    takes_starts_that_lead_nowhere,
+    turns_either_way,
+)
 from rrtik_planners import CRDT, MBRRT, BiCRDT, FastAORRTC, FewestMoves, IKURTPublished, RestartShorten
 from rrtik_tests.sizes import how_many
 
@@ -83,7 +89,7 @@ def run_strictly(code: str) -> subprocess.CompletedProcess[str]:
 CHECK_ALL = """
 from ompl import util as ou
 from rrtik_ompl.ompl_bridge.contract import CONTRACT, moves_one_joint_at_a_time
-from rrtik_ompl.ompl_bridge.contract.spaces import SPACES
+from rrtik_ompl.ompl_bridge.contract import SPACES
 from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, FastRRTConnect, FewestMoves, IKURTPublished
 from rrtik_planners import RoadmapPlanner
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
@@ -110,7 +116,7 @@ def test_contract_holds_with_a_memory_that_shows_misuse() -> None:
 SOAK_ALL = f"""
 import os
 from ompl import util as ou
-from rrtik_ompl.ompl_bridge.contract.problems import small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows
 from rrtik_planners import BiCRDT
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 def resident_mb():
@@ -148,7 +154,7 @@ def test_many_solves_leave_the_memory_flat() -> None:
 def test_the_seed_of_ompl_fixes_a_planner_without_a_seed() -> None:
     code = (
         "from ompl import util as ou; ou.setLogLevel(ou.LogLevel.LOG_NONE); ou.RNG.setSeed({seed})\n"
-        "from rrtik_ompl.ompl_bridge.contract.problems import small_problem, solution_rows\n"
+        "from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows\n"
         "from rrtik_planners import BiCRDT\n"
         "def main():\n"
         "    s = small_problem(); s.setPlanner(BiCRDT(s.getSpaceInformation())); s.solve(5.0)\n"

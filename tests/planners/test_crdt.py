@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.crdt.rules import CrdtRules
 from rrtik_ompl.model.transitions import single_joint
-from rrtik_ompl.ompl_bridge.contract.problems import small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract import small_problem, solution_rows
 from rrtik_planners import CRDT, BiCRDT
 from rrtik_planners.crdt_tree import CrdtTree, Outcome
 

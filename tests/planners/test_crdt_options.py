@@ -12,7 +12,7 @@ from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.transitions import merge_moves, single_joint
 from rrtik_ompl.ompl_bridge.attempt import attempt
-from rrtik_ompl.ompl_bridge.contract.problems import small_problem
+from rrtik_ompl.ompl_bridge.contract import small_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_planners import CRDT, BiCRDT
 from rrtik_tests.slider_arm import NAMES, Plain, shipped

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ompl import base as ob
 
-from rrtik_ompl.ompl_bridge.contract.problems import GOAL, small_problem, solution_rows
+from rrtik_ompl.ompl_bridge.contract import GOAL, small_problem, solution_rows
 from rrtik_planners import DRRTCon
 
 

@@ -10,8 +10,8 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.ompl_bridge.contract import CONTRACT, spaces
-from rrtik_ompl.ompl_bridge.contract.problems import Clause, outside_wall, small_problem, solution_rows
+from rrtik_ompl.ompl_bridge import contract
+from rrtik_ompl.ompl_bridge.contract import CONTRACT, Clause, outside_wall, small_problem, solution_rows
 from rrtik_planners import FastAORRTC, FastRRTConnect, RestartShorten
 from rrtik_tests.sizes import how_many
 
@@ -23,7 +23,9 @@ PLANNERS = {"RestartShorten": RestartShorten, "FastAORRTC": FastAORRTC}
 @pytest.mark.parametrize("name", PLANNERS)
 @pytest.mark.parametrize("clause", CONTRACT, ids=lambda clause: clause.__name__)
 def test_planner_keeps_the_contract(name: str, clause: Clause, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(spaces, "SEEDS", how_many(spaces.SEEDS, 15))  # these plan and shorten several times for each
+    monkeypatch.setattr(
+        contract, "SEEDS", how_many(contract.SEEDS, 15)
+    )  # these plan and shorten several times for each
     clause(lambda si, **options: PLANNERS[name](si, patience=1, **options))
 
 

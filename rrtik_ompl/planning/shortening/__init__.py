@@ -15,7 +15,7 @@ from rrtik_ompl.base.choices import ShorteningMethod, one_of
 from rrtik_ompl.base.errors import InputError, PathWarning, called, require
 from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.model.path import JointPath, path_through
-from rrtik_ompl.ompl_bridge.simplify import simplified
+from rrtik_ompl.ompl_bridge.attempt import simplified
 from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
 from rrtik_ompl.planning.moves.axis_cut import axis_cut_rounds, double_axis_cut
 from rrtik_ompl.planning.moves.rules import MoveRules

@@ -20,7 +20,7 @@ from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.ik.ikurt.tree import FIRST_ROOM, IkurtTree
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, Target
 from rrtik_ompl.model.shapes import Sphere
-from rrtik_ompl.ompl_bridge.contract.problems import small_problem
+from rrtik_ompl.ompl_bridge.contract import small_problem
 from rrtik_planners import IKURT, IKURTPublished
 from rrtik_tests.inverse_kinematics import random_rows
 
