@@ -91,7 +91,7 @@ def pilot(
         opened = open_session(options)
 
     try:
-        _serve(server, opened, watch_only=replay is not None, browser=not no_browser)
+        _serve(server, opened, browser=not no_browser)
     finally:
         opened.close()
 
@@ -109,7 +109,7 @@ def _second(given: str | None) -> int | Path | None:
     return int(given) if given.isdecimal() else Path(given)
 
 
-def _serve(server: PilotServer, opened: OpenSession, *, watch_only: bool, browser: bool) -> None:
+def _serve(server: PilotServer, opened: OpenSession, *, browser: bool) -> None:
     from rrtik_ompl.pilot.devices.watchdog import Watchdog
     from rrtik_ompl.pilot.run import Loop
 
@@ -120,7 +120,7 @@ def _serve(server: PilotServer, opened: OpenSession, *, watch_only: bool, browse
 
             webbrowser.open(server.url)
 
-        loop = Loop(opened.engine, server, watch_only=watch_only)
+        loop = Loop(opened.engine, server)
         reports = {"the page's server": lambda: server.reported, "the session": lambda: loop.reported, **opened.reports}
         watched = Watchdog(opened.engine.session.arm, reports, tell=note)
 

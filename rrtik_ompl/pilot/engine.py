@@ -5,8 +5,9 @@ A step is cut in stages, so that a command never waits for more than one of them
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from typing import Any, Protocol
+import inspect
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
 
 import cv2
 import numpy as np
@@ -24,7 +25,7 @@ from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.views import PRESETS, CameraView, OutsideView
 
 JPEG_QUALITY = 80
-VIEW_COMMANDS = {"turn": ("right", "up"), "zoom": ("factor",), "preset": ("view",), "play": ("share",)}
+RECORD = "this is a record: it can be watched, paused and viewed from all sides"
 
 
 class Simulated(Protocol):
@@ -35,7 +36,11 @@ class Simulated(Protocol):
 
 
 class Engine:
-    """Connects session, perception and pictures. For one thread."""
+    """Connects session, perception and pictures. For one thread.
+
+    Attributes:
+        paused: A record stands still; who gives the engine its times keeps to that.
+    """
 
     def __init__(
         self,
@@ -65,29 +70,36 @@ class Engine:
         self._pictures = pictures
         self._advanced = 0.0
         self._drawn: tuple[Hashable, ...] = ()
+        self.paused = False
 
     def execute(self, command: dict[str, Any], time: float, sight: Sight | None = None) -> None:
         """Execute a command of the pilot.
 
         Args:
-            command: A ``name`` and its arguments; those of `VIEW_COMMANDS` concern the outside view alone.
+            command: A ``name`` and its arguments; those of `VIEW_VERBS` concern what is shown alone.
             time: Now [s].
             sight: What the pilot's page had shown; None without a page.
         """
-        self._advance(time)
-
         arguments = dict(command)
         name = quoted(arguments.pop("name", ""))
         if "object" in arguments:  # which one, for "name" is that of the command
             arguments["name"] = arguments.pop("object")
 
-        if name not in VIEW_COMMANDS:
+        recorded = self.session.means.recorded
+        view = VIEW_VERBS.get(name)
+        if recorded and view is None:
+            if name != "halt":
+                self.session.say(refused(RECORD))
+            return
+
+        self._advance(time)
+        if view is None or (view.of_a_record and not recorded):
             self.session.command(name, time, sight, **arguments)
             self._return_to_now()
             return
 
         try:
-            self._change_view(name, arguments)
+            view.execute(self, name, arguments)
         except InputError as error:
             self.session.say(refused(str(error)))
 
@@ -110,6 +122,7 @@ class Engine:
         shown = {"camera_lost": lost, "pictures_ended": lost == ENDED, "hint": self.perception.hint}
         shown |= {"playing": self.outside.share, "aids": self._camera_view.aids.document()}
         shown |= {"views": [*PRESETS, *self._further], "view": self._through}
+        shown |= {"paused": self.paused, "replay": self.session.means.recorded}
         return state_document(self.session) | shown
 
     def close(self) -> None:
@@ -139,6 +152,39 @@ class Engine:
         self._drawn = key
         return _jpeg(self.outside.draw())
 
+    # --- commands that concern what is shown ----------------------------------------------------------------------
+
+    def turn(self, right: object, up: object) -> None:
+        """Turn the view from outside by angles [rad]."""
+        self.outside.turn(number(right, "right"), number(up, "up"))
+
+    def zoom(self, factor: object) -> None:
+        """Change the distance of the view from outside by a factor."""
+        self.outside.zoom(number(factor, "factor"))
+
+    def preset(self, view: object) -> None:
+        """Look from one of the usual viewpoints, or through a further camera."""
+        name = quoted(view)
+        if name not in (*PRESETS, *self._further):
+            raise UnknownNameError("view", name, (*PRESETS, *self._further))
+        self._through = name if name in self._further else ""
+        self._drawn = ()
+        self.outside.preset(name)
+
+    def play(self, share: object) -> None:
+        """Show the arm at a share of the route that is proposed; None shows it as it is."""
+        shown = None if share is None else number(share, "share")
+        proposed = self.session.mode == PROPOSED
+        self.outside.share = shown if proposed else None
+        if shown is not None and not proposed:
+            raise InputError("there is no route to preview: 'plan' proposes one")
+
+    def pause(self) -> None:
+        """Let a record stand still, or go on."""
+        self.paused = not self.paused
+
+    # --------------------------------------------------------------------------------------------------------------
+
     def _return_to_now(self) -> None:
         """A preview shows a route that is proposed; whatever comes after is shown as it is."""
         if self.session.mode != PROPOSED or self.session.driving:
@@ -152,30 +198,39 @@ class Engine:
         self.session.tick(time)
         self._return_to_now()
 
-    def _change_view(self, name: str, given: dict[str, Any]) -> None:
-        wanted = VIEW_COMMANDS[name]
-        if set(given) != set(wanted):
-            raise InputError(f"{name} takes {', '.join(wanted)}")
-
-        if name == "turn":
-            self.outside.turn(number(given["right"], "right"), number(given["up"], "up"))
-        elif name == "zoom":
-            self.outside.zoom(number(given["factor"], "factor"))
-        elif name == "preset":
-            view = quoted(given["view"])
-            if view not in (*PRESETS, *self._further):
-                raise UnknownNameError("view", view, (*PRESETS, *self._further))
-            self._through = view if view in self._further else ""
-            self._drawn = ()
-            self.outside.preset(view)
-        else:
-            share = None if given["share"] is None else number(given["share"], "share")
-            proposed = self.session.mode == PROPOSED
-            self.outside.share = share if proposed else None
-            if share is not None and not proposed:
-                raise InputError("there is no route to preview: 'plan' proposes one")
-
 
 def _jpeg(picture: NDArray[np.uint8]) -> bytes:
     _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return bytes(data)
+
+
+class ViewVerb(NamedTuple):
+    """A command that concerns what is shown, and moves nothing.
+
+    Attributes:
+        act: A method of `Engine`; it takes the command's arguments as they came.
+        of_a_record: Only a record has it.
+    """
+
+    act: Callable[..., None]
+    of_a_record: bool = False
+
+    def execute(self, engine: Engine, name: str, arguments: Mapping[str, object]) -> None:
+        """Execute it.
+
+        Raises:
+            InputError: If the arguments are not those that it takes, or of no use.
+        """
+        _, *wanted = inspect.signature(self.act).parameters
+        if set(arguments) != set(wanted):
+            raise InputError(f"{name} takes {', '.join(wanted)}")
+        self.act(engine, **arguments)
+
+
+VIEW_VERBS = {
+    "turn": ViewVerb(Engine.turn),
+    "zoom": ViewVerb(Engine.zoom),
+    "preset": ViewVerb(Engine.preset),
+    "play": ViewVerb(Engine.play),
+    "pause": ViewVerb(Engine.pause, of_a_record=True),
+}

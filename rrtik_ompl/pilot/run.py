@@ -12,8 +12,8 @@ import numpy as np
 
 from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.files.messages import quoted
-from rrtik_ompl.pilot.engine import VIEW_COMMANDS, Engine
-from rrtik_ompl.pilot.events import alarm, refused
+from rrtik_ompl.pilot.engine import Engine
+from rrtik_ompl.pilot.events import alarm
 from rrtik_ompl.pilot.interlock import Sight
 from rrtik_ompl.pilot.machine import VERBS
 from rrtik_ompl.pilot.web.server import MAX_PAGES, PilotServer
@@ -41,29 +41,26 @@ class Loop:
         fault: Says why the arm was stopped by a watchdog; "" if it was not.
     """
 
-    def __init__(self, engine: Engine, server: PilotServer, *, watch_only: bool = False) -> None:
-        """Take both.
-
-        Args:
-            engine: Session and pictures.
-            server: Of the page.
-            watch_only: Execute only commands that concern the view, and "pause": for a record.
-        """
+    def __init__(self, engine: Engine, server: PilotServer) -> None:
+        """Take session and pictures, and the server of the page."""
         self._engine = engine
         self._server = server
-        self._watch_only = watch_only
         self._answered: dict[int, int] = {}
-        self._begin = clock.monotonic()
-        self._paused_at: float | None = None
+        self._time = 0.0
+        self._read_at = clock.monotonic()  # when the time was read last
         self._audience = 0
         self._outside_too = False
-        self.reported = self._begin
+        self.reported = self._read_at
         self.fault: Callable[[], str] = str
 
     @property
     def time(self) -> float:
         """Of the session [s]; stands still in a pause."""
-        return clock.monotonic() - self._begin if self._paused_at is None else self._paused_at
+        now = clock.monotonic()
+        if not self._engine.paused:
+            self._time += now - self._read_at
+        self._read_at = now
+        return self._time
 
     def run(self, until: Stop = no_stop) -> None:
         """Go on until Ctrl-C, or until ``until`` is true."""
@@ -102,8 +99,7 @@ class Loop:
 
     def _show_state(self) -> None:
         if len(self._server.clients):
-            state = self._engine.state() | {"paused": self._paused_at is not None, "replay": self._watch_only}
-            state |= {"stamp": self._engine.session.time, "heard": self._server.heard()}
+            state = self._engine.state() | {"stamp": self._engine.session.time, "heard": self._server.heard()}
             self._server.show_state(state, self._answered)
 
     def _execute_all(self) -> None:
@@ -128,7 +124,7 @@ class Loop:
         sequence = command.pop("seq", None)
         sight = Sight(self._age(command.pop("seen", None)), self._age(command.pop("picture", None)))
         try:
-            self._execute(command, sight)
+            self._engine.execute(command, self.time, sight)
         except Exception as error:  # nothing that a page sends ends the session
             self._engine.session.stand_still()
             what = f"'{quoted(command.get('name'))}' broke: {quoted(error) or type(error).__name__}"
@@ -146,21 +142,3 @@ class Loop:
         if isinstance(stamp, bool) or not isinstance(stamp, int | float) or not 0.0 <= stamp <= now:
             return np.inf
         return now - stamp
-
-    def _execute(self, command: dict[str, Any], sight: Sight) -> None:
-        name = quoted(command.get("name"))
-        if not self._watch_only or name in VIEW_COMMANDS:
-            self._engine.execute(command, self.time, sight)
-        elif name == "pause":
-            self._pause()
-        elif name != "halt":
-            said = refused("this is a record: it can be watched, paused and viewed from all sides")
-            self._engine.session.say(said)
-
-    def _pause(self) -> None:
-        now = self.time
-        if self._paused_at is None:
-            self._paused_at = now
-        else:
-            self._begin = clock.monotonic() - now
-            self._paused_at = None

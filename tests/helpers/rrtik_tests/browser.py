@@ -169,7 +169,7 @@ class Running:
         with PilotServer(title="test") as server:
             self.server = server
             self._ready.set()
-            PatientLoop(self.opened.engine, server, watch_only=self._wanted.replay is not None).run(self._ended.is_set)
+            PatientLoop(self.opened.engine, server).run(self._ended.is_set)
         self.opened.close()
 
     def __enter__(self):
