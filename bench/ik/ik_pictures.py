@@ -20,7 +20,7 @@ from bench.shared.run import REPORTS
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.ik.reach.sampling import reach_map
 from rrtik_ompl.viewer import view
-from rrtik_ompl.viewer.drawing.reach_marks import reach_marks
+from rrtik_ompl.viewer.drawing.marks import reach_marks
 from rrtik_ompl.viewer.subject import Shown
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

@@ -24,8 +24,7 @@ from rrtik_ompl.kernels.search.crdt.rules import CrdtRules
 from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
 from rrtik_ompl.planning.generated_problems import generated_problem
-from rrtik_ompl.viewer.page_planner import SAMPLES, page_planner
-from rrtik_ompl.viewer.page_tables import VERTICES
+from rrtik_ompl.viewer.page_planner import SAMPLES, VERTICES, page_planner
 from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
 from rrtik_ompl.world.problem import densely_checked
 

@@ -103,7 +103,7 @@ def _draw(shown: Robot | World, found: ReachMap, plot: Path | None, html: Path |
 
     if html is not None:
         from rrtik_ompl.viewer import view
-        from rrtik_ompl.viewer.drawing.reach_marks import reach_marks
+        from rrtik_ompl.viewer.drawing.marks import reach_marks
 
         with progress("drawing"):
             view(shown, html=html, marks=reach_marks(found), title=f"{found.robot}: {found.measure} in reach")

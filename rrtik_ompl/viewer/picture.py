@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.viewer.drawing.constraint_picture import draw_constraints
 from rrtik_ompl.viewer.drawing.framing import Frame, frame_around
 from rrtik_ompl.viewer.drawing.marks import draw_marks
 from rrtik_ompl.viewer.drawing.meshes import thickened
@@ -25,7 +24,7 @@ from rrtik_ompl.viewer.drawing.robot_picture import (
     link_parts,
     swept_points,
 )
-from rrtik_ompl.viewer.drawing.scene_picture import draw_goal, draw_scene, draw_triad, goal_frames
+from rrtik_ompl.viewer.drawing.scene_picture import draw_constraints, draw_goal, draw_scene, draw_triad, goal_frames
 from rrtik_ompl.viewer.drawing.trail import draw_before, draw_trail
 from rrtik_ompl.viewer.subject import Subject
 

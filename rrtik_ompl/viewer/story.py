@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.units import shown_unit
+from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.judgement import FARTHEST, ClearanceCurve, PathContact, Verdict
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.transitions import moved, route_length, transitions
 from rrtik_ompl.viewer.drawing import palette
-from rrtik_ompl.viewer.drawing.framing import Frame
+from rrtik_ompl.viewer.drawing.framing import Frame, overview
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name, nodes_of
 from rrtik_ompl.viewer.drawing.trail import pieces
-from rrtik_ompl.viewer.drawing.viewpoint import overview
-from rrtik_ompl.viewer.page_tips import tip_entry
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
 
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path
 DIGITS = 9
+OWN_JOINTS = 3  # of a branch that can be dragged; fewer are fingers
 
 
 def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
@@ -252,3 +254,48 @@ def _numbers(values: NDArray[np.float64] | None) -> list[object] | None:
         return None
     rounded: list[object] = (np.round(values, DIGITS) + 0.0).tolist()
     return rounded
+
+
+# --- the tips by which a person drags an arm -------------------------------------------------------------------------
+
+
+def tip_entry(robot: Robot, name: str) -> dict[str, Any]:
+    """A tip for the page: its name, the number of the joint that carries it (0: none), its pose on that."""
+    tip = robot.model.frames[robot.model.getFrameId(name)]
+    return {"name": name, "joint": int(tip.parentJoint), "placement": _numbers(tip.placement.homogeneous.ravel())}
+
+
+def dragged_tips(robot: Robot, goal: Goal | None) -> list[str]:
+    """Links by which a person can drag the arm: the robot's tip first, those of a goal for several, ends of other arms.
+
+    Args:
+        robot: The arm.
+        goal: Of the problem.
+    """
+    named = () if goal is None else goal.frames
+    tips = list(dict.fromkeys([robot.tip, *named]))
+    carried = {row for tip in tips for row in _rows(robot, tip_entry(robot, tip)["joint"] - 1)}
+
+    # Rows that are nobody's parent are the ends of the tree's branches.
+    for row in sorted(set(range(len(robot.chain.parent))) - set(robot.chain.parent.tolist())):
+        own = set(_rows(robot, row)) - carried
+        frames = [f for f in robot.model.frames if f.parentJoint == row + 1 and f.type == pin.FrameType.BODY]
+        if frames and np.count_nonzero(np.any(robot.chain.gain[sorted(own)] != 0.0, axis=0)) >= OWN_JOINTS:
+            tips.append(min(frames, key=partial(_unlike, robot.model.frames[robot.model.getFrameId(robot.tip)])).name)
+            carried |= own
+
+    return tips
+
+
+def _unlike(tip: pin.Frame, frame: pin.Frame) -> float:
+    """How much the place of a link on its joint differs from that of the robot's tip."""
+    return float(np.abs(frame.placement.homogeneous - tip.placement.homogeneous).max())
+
+
+def _rows(robot: Robot, row: int) -> list[int]:
+    """The joints from one to the base, as rows of the chain."""
+    rows = []
+    while row >= 0:
+        rows.append(row)
+        row = int(robot.chain.parent[row])
+    return rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeAlias
 
@@ -19,9 +20,10 @@ from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.viewer.drawing.marks import Mark
-from rrtik_ompl.viewer.fingers import Fingers
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
+
+FINGER_DIGITS = 6
 
 
 class HasWorld(Protocol):
@@ -30,6 +32,28 @@ class HasWorld(Protocol):
     @property
     def world(self) -> World:
         """Robot and scene."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fingers:
+    """Where fingers are over time, seen from where they are drawn.
+
+    Attributes:
+        poses: For each body, by the nodes of its joint and its own, its pose on the joint in each motion times the
+            inverse of the one that it is drawn at: x, y, z and quaternion x, y, z, w, shape (motions, 7).
+        at: For each tick the number of the motion whose fingers are shown; in between while they move, shape (ticks,).
+    """
+
+    poses: Mapping[tuple[str, str], Matrix]
+    at: Vector
+
+    def story(self) -> dict[str, Any]:
+        """For the page."""
+        bodies = [
+            {"joint": joint, "name": name, "poses": np.round(rows, FINGER_DIGITS).tolist()}
+            for (joint, name), rows in self.poses.items()
+        ]
+        return {"bodies": bodies, "at": np.round(self.at, FINGER_DIGITS).tolist()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,17 +9,19 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.poses import pose_row
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.played import PlayedTask
-from rrtik_ompl.viewer.fingers import fingers_of
-from rrtik_ompl.viewer.subject import Showable, Subject, replayed
+from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name
+from rrtik_ompl.viewer.subject import Fingers, Showable, Subject, replayed
 from rrtik_ompl.world.world import World
 
 TASK = "task"  # the planner of a run that shows one
 SAME_PLACE = 1e-9  # [m], and alike for a turn
+NO_SHIFT = 1e-9  # the same, of a finger on its joint
 
 
 def subject_of_task(shown: Showable, played: PlayedTask) -> Subject:
@@ -108,3 +110,25 @@ def _places(world: World, q: Vector) -> dict[str, pin.SE3]:
     """Where obstacles and what is held are."""
     places = {item.name: world.robot.fk(q, item.link) * item.pose for item in world.scene.attached}
     return places | {item.name: item.pose for item in world.scene.at(0.0).obstacles}
+
+
+def fingers_of(plan: TaskPlan, drawn: Robot, at: Vector) -> Fingers:
+    """The fingers of a plan's motions, beside a robot that is drawn; ``at`` as in :class:`Fingers`."""
+    nodes = joint_nodes(drawn)
+    first = _placements(drawn)
+    places = [_placements(world.robot) for world in plan.worlds]
+
+    poses = {}
+    for (joint, name), placement in first.items():
+        moved = [found[joint, name] * placement.inverse() for found in places]
+        if any(np.abs(pin.log6(shift).vector).max() > NO_SHIFT for shift in moved):
+            rows = [pose_row(shift) for shift in moved]
+            poses[nodes[joint], node_name(name)] = np.array(rows)
+
+    return Fingers(poses, at)
+
+
+def _placements(robot: Robot) -> dict[tuple[int, str], pin.SE3]:
+    """Pose of every body that is drawn on its joint, by the joint's number and the body's name."""
+    bodies = (robot.visual if robot.visual.ngeoms else robot.collision).geometryObjects
+    return {(int(body.parentJoint), str(body.name)): body.placement for body in bodies}

@@ -46,7 +46,6 @@ BY_NAME: tuple[str, ...] = (
     "planning/improving.py",
     "kernels/wasm/page_kernels.py",
     "viewer/page_planner.py",
-    "viewer/page_tables.py",
 )
 
 

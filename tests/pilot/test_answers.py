@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import rrtik_ompl.pilot
-from rrtik_ompl.pilot import answers
+from rrtik_ompl.pilot import events
 from rrtik_ompl.pilot.events import Answer, Level
 from rrtik_ompl.pilot.interlock import MODES
 from rrtik_ompl.pilot.machine import VERBS
@@ -38,7 +38,7 @@ def arguments(act):
 def test_every_command_of_the_session_answers_with_a_level_in_every_mode():
     made, _ = session()
     for mode, (verb, row) in product(MODES, VERBS.items()):
-        made.state = replace(made.state, mode=mode, answer=answers.news(""))
+        made.state = replace(made.state, mode=mode, answer=events.news(""))
         text = made.command(verb, 0.0, **arguments(row.act))
         assert isinstance(made.state.answer, Answer), (mode, verb)
         assert made.state.answer.text == text == made.message
@@ -56,7 +56,7 @@ def said_in(file):
         if name == "say":
             (said,) = node.args
             assert not isinstance(said, ast.Constant | ast.JoinedStr), f"{file.name}:{node.lineno}: says bare text"
-        assert name != "Answer" or file.name == "answers.py", f"{file.name}:{node.lineno}: use news, refused or alarm"
+        assert name != "Answer" or file.name == "events.py", f"{file.name}:{node.lineno}: use news, refused or alarm"
 
 
 def test_every_line_that_the_pilots_tool_says_is_made_with_a_level():
@@ -66,7 +66,7 @@ def test_every_line_that_the_pilots_tool_says_is_made_with_a_level():
     assert set(found.values()) == set(MAKERS)
     assert len(found) > 50
     for name, level in MAKERS.items():
-        assert getattr(answers, name)("words").level is level
+        assert getattr(events, name)("words").level is level
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import umsgpack
 
-from rrtik_ompl.viewer.drawing.nodes import Recording
-from rrtik_ompl.viewer.drawing.objects import (
+from rrtik_ompl.viewer.drawing.nodes import (
     GRAIN,
     BoxGeometry,
     CylinderGeometry,
     Material,
+    Recording,
     SphereGeometry,
     TriangleGeometry,
 )

@@ -8,7 +8,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.viewer.page import page
-from rrtik_ompl.viewer.page_tips import dragged_tips
+from rrtik_ompl.viewer.story import dragged_tips
 from rrtik_tests.browser import planning_page
 from rrtik_tests.programs import needs_chromium
 

@@ -20,11 +20,10 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.model.task_region import TaskRegion
-from rrtik_ompl.viewer.drawing.framing import frame_around
+from rrtik_ompl.viewer.drawing.framing import behind, frame_around, overview
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin
-from rrtik_ompl.viewer.drawing.objects import TriangleGeometry
+from rrtik_ompl.viewer.drawing.nodes import TriangleGeometry
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
-from rrtik_ompl.viewer.drawing.viewpoint import behind, overview
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.subject import subject_of

@@ -9,7 +9,7 @@ from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 from rrtik_ompl.model.shapes.surfaces import extruded
 from rrtik_ompl.viewer.drawing.meshes import half_space_plate, look_of_coal, look_of_shape, thickened
-from rrtik_ompl.viewer.drawing.objects import SphereGeometry
+from rrtik_ompl.viewer.drawing.nodes import SphereGeometry
 from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out, tube
 
 L_SHAPE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]])

@@ -13,17 +13,21 @@ from rrtik_ompl.base.arrays import Matrix, frozen
 from rrtik_ompl.model.shapes.surfaces import Faces, round_ended
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import look_of_triangles
-from rrtik_ompl.viewer.drawing.nodes import Node
-from rrtik_ompl.viewer.drawing.objects import Material
+from rrtik_ompl.viewer.drawing.nodes import Material, Node
 from rrtik_ompl.viewer.drawing.triangles import tube
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from rrtik_ompl.ik.reach.grid_map import ReachMap
+
 TUBE_SIDES = 6  # few, for there may be thousands of tubes
 BALL_SEGMENTS = 48
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # of a square face, in its plane
 SQUARE_FACES = np.array([[0, 1, 2, 0, 2, 3]])  # its triangles
+
+SCALE = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # of reachability, low to high: viridis
+MEANING = {"orientations": "of all directions", "manipulability": "manipulability", "samples": "samples"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,3 +132,26 @@ def _joined(name: str, color: str, bodies: Iterable[tuple[Matrix, Faces]], optio
         count += len(points)
 
     return Mark(name, color, frozen(np.concatenate(vertices)), frozen(np.concatenate(faces), np.int64), **options)
+
+
+def reach_marks(reach: ReachMap, *, cut: bool = True) -> list[Mark]:
+    """Marks to be shown by ``view(robot, marks=reach_marks(map))``.
+
+    Args:
+        reach: The map.
+        cut: Leave out the quarter in front of the base, on its right, so that the inside can be seen.
+    """
+    seen = np.array(reach.reached)
+    if cut and seen.shape[2] > 1:
+        x, y = (reach.centres(k) - reach.base[k] for k in (0, 1))
+        seen[np.ix_(x > 0.0, y < 0.0, np.ones(seen.shape[2], dtype=bool))] = False
+
+    most = 1.0 if reach.measure == "orientations" else float(reach.values.max(initial=0.0))
+    step = most / len(SCALE)
+    kind = np.minimum((reach.values / step).astype(int), len(SCALE) - 1) if most else np.zeros(seen.shape, dtype=int)
+
+    names = [f"{k * step:.2g} to {(k + 1) * step:.2g} {MEANING[reach.measure]}" for k in range(len(SCALE))]
+    return [
+        cubes(name, color, seen & (kind == k), reach.corner, reach.size)
+        for k, (name, color) in enumerate(zip(names, SCALE, strict=True))
+    ]

@@ -16,7 +16,7 @@ from rrtik_ompl.geometry.collision.shape_table import shape_of
 from rrtik_ompl.geometry.collision.solids import is_mesh, once_per_geometry
 from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, PointCloud, Shape, Sphere
 from rrtik_ompl.model.shapes.surfaces import Faces
-from rrtik_ompl.viewer.drawing.objects import (
+from rrtik_ompl.viewer.drawing.nodes import (
     BoxGeometry,
     CylinderGeometry,
     Geometry,

@@ -15,8 +15,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Scene
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import Look, look_of_coal, look_of_shape, triangle_count
-from rrtik_ompl.viewer.drawing.nodes import Node
-from rrtik_ompl.viewer.drawing.objects import Material
+from rrtik_ompl.viewer.drawing.nodes import Material, Node
 
 ROBOT_TRIANGLES = 40_000  # drawn for the whole arm at most; its meshes are thinned out above that
 GHOST_TRIANGLES = 15_000  # of each ghost

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.viewer.drawing import palette
-from rrtik_ompl.viewer.drawing.nodes import Node
-from rrtik_ompl.viewer.drawing.objects import Material, SphereGeometry
+from rrtik_ompl.viewer.drawing.nodes import Material, Node, SphereGeometry
 from rrtik_ompl.viewer.drawing.scene_picture import draw_tube
 
 RING_STEP = np.deg2rad(3.0)  # [rad] between two rings of the tube; for sliding joints a share of the move

@@ -12,8 +12,7 @@ from rrtik_ompl.cli.app import run
 from rrtik_ompl.ik.reach.grid_map import load_reach_map
 from rrtik_ompl.ik.singularity import manipulability
 from rrtik_ompl.model.shapes import Box
-from rrtik_ompl.viewer.drawing.marks import cubes
-from rrtik_ompl.viewer.drawing.reach_marks import reach_marks
+from rrtik_ompl.viewer.drawing.marks import cubes, reach_marks
 from rrtik_ompl.viewer.plots.reach import plot_slices
 from rrtik_robots.titan4.workspace import effective_slices
 

@@ -38,7 +38,7 @@ def test_what_is_there_already_is_not_added_again_and_what_is_not_cannot_be_poin
 
 @pytest.mark.kernels
 def test_no_address_of_this_process_is_left_in_the_image_of_a_world():
-    from rrtik_ompl.viewer.page_tables import page_tables  # what a page is given
+    from rrtik_ompl.viewer.page_planner import page_tables  # what a page is given
 
     problem = rrtik.load_problem("titan4_sdu")
     motions = problem.world.motions

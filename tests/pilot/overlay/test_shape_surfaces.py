@@ -5,15 +5,15 @@ import numpy as np
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box, Cylinder
-from rrtik_ompl.pilot.overlay import surfaces
+from rrtik_ompl.pilot.overlay import rasterizer
 from rrtik_ompl.pilot.overlay.rasterizer import ShapeSurfaces, obstacle_surfaces
 
 
 def test_an_obstacle_that_moves_is_made_once_and_drawn_where_it_is(monkeypatch):
     made = []
     kept = ShapeSurfaces()
-    plain = surfaces.surface_of_shape
-    monkeypatch.setattr(surfaces, "surface_of_shape", lambda *given: made.append(given[0]) or plain(*given))
+    plain = rasterizer.surface_of_shape
+    monkeypatch.setattr(rasterizer, "surface_of_shape", lambda *given: made.append(given[0]) or plain(*given))
     shapes = Box([0.1, 0.2, 0.3]), Cylinder(0.1, 0.4)
     for k in range(4):
         obstacles = [Obstacle(str(n), each, pose([0.1 * k, 0.0, n])) for n, each in enumerate(shapes)]
@@ -25,7 +25,7 @@ def test_an_obstacle_that_moves_is_made_once_and_drawn_where_it_is(monkeypatch):
 
 
 def test_what_is_kept_has_an_end(monkeypatch):
-    monkeypatch.setattr(surfaces, "MAX_SHAPES", 3)
+    monkeypatch.setattr(rasterizer, "MAX_SHAPES", 3)
     kept = ShapeSurfaces()
     for k in range(10):
         (found,) = obstacle_surfaces([Obstacle("box", Box([0.1, 0.1, 0.1 * (k + 1)]))], kept)
