@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from bench.shared.clocks import least
+from bench.shared.mb_rrt_tree import plot_tree
 from bench.shared.run import Run
 from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
 from rrtik_ompl.ik.mb_rrt.exact import arc_chains, grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, sunflower
 from rrtik_ompl.ik.mb_rrt.published import grow
-from rrtik_ompl.viewer.plots.mb_rrt_tree import plot_tree
 
 TIGHT = 1e-3  # [cm]
 GOALS = 100

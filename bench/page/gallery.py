@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 import rrtik_ompl as rrtik
+from bench.shared.mb_rrt_tree import tree_marks
 from rrtik_ompl.ik.mb_rrt.links import Links
 from rrtik_ompl.ik.mb_rrt.published import grow
 from rrtik_ompl.planning.generated_problems import generated_problem
-from rrtik_ompl.viewer.drawing.tree_marks import tree_marks
 
 SEED = 1
 POINTS = 4_000  # of the cloud

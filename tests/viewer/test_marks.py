@@ -6,12 +6,12 @@ import re
 import numpy as np
 import pytest
 
+from bench.shared.mb_rrt_tree import tree_marks
 from rrtik_ompl import Scene, load_robot, view
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.mb_rrt.links import Links
 from rrtik_ompl.ik.mb_rrt.published import grow
 from rrtik_ompl.viewer.drawing.marks import balls, tubes
-from rrtik_ompl.viewer.drawing.tree_marks import tree_marks
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.subject import subject_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrtik_ompl.viewer.drawing.tree_marks import tree_marks
+from bench.shared.mb_rrt_tree import tree_marks
 
 
 def test_every_index_of_a_tree_has_its_links_and_its_ball_and_the_answer_ends_at_the_goal(tree):

@@ -1,7 +1,7 @@
 """A tree of named nodes; what is set at them is recorded as the commands that meshcat's viewer replays in the page.
 
-Solids and materials are in the format of three.js's ObjectLoader. They are written here because ``import meshcat`` takes
-a second and brings a notebook and a server along, and the page needs its viewer's script alone.
+Solids and materials are in the format of three.js's ObjectLoader. They are written here because ``import meshcat``
+takes a second and brings a notebook and a server along, and the page needs its viewer's script alone.
 """
 
 from __future__ import annotations

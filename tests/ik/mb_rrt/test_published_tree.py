@@ -5,6 +5,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from bench.shared.mb_rrt_tree import plot_tree
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.mb_rrt.exact import arc_chains, grow_and_close, grow_on_arcs
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, headings_to_joints, joints_to_chain, sunflower
@@ -18,7 +19,6 @@ from rrtik_ompl.ik.mb_rrt.published import (
     one_link_away,
     surface,
 )
-from rrtik_ompl.viewer.plots.mb_rrt_tree import plot_tree
 
 THREE, TEN = Links([10.0] * 3), Links([10.0] * 10)
 

@@ -1,4 +1,4 @@
-"""The tree of MB-RRT and the regions in which its joints are useful: a picture as a PNG or SVG file."""
+"""The tree of MB-RRT and the regions in which its joints are useful: a picture as a PNG or SVG file, a page in 3-D."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.files.text import known_ending
 from rrtik_ompl.ik.mb_rrt.published import TreeSearch
+from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.marks import Mark, balls, tubes
 from rrtik_ompl.viewer.plots.joints import COLORS, FORMATS, save_figure, tidy
 
 if TYPE_CHECKING:
@@ -18,6 +21,9 @@ if TYPE_CHECKING:
 
 MAX_COLORS = 6  # one an index; then they repeat
 INK, GREY = COLORS[6], COLORS[7]
+LINK_RADIUS, SOLUTION_RADIUS = 0.0016, 0.006  # of links and of the solution, over the reach
+MAX_LINKS = 600  # drawn of each index, the first ones
+REGION_OPACITY = 0.08
 
 
 def plot_tree(run: TreeSearch, file: str | os.PathLike[str]) -> None:
@@ -35,9 +41,7 @@ def plot_tree(run: TreeSearch, file: str | os.PathLike[str]) -> None:
     known_ending(file, FORMATS, "plot")
     require(run, TreeSearch, "tree to plot")
     if run.links.dimension != 2:
-        raise InputError(
-            "tree to plot: it grows in space, and only planar ones are drawn; see rrtik_ompl.viewer.drawing.tree_marks"
-        )
+        raise InputError("tree to plot: it grows in space, and only planar ones are drawn; see tree_marks")
 
     from matplotlib.figure import Figure
 
@@ -118,3 +122,47 @@ def _frame(panel: Axes, run: TreeSearch) -> None:
         color=INK,
     )
     panel.legend(loc="lower right", frameon=False, fontsize=9)
+
+
+def tree_marks(run: TreeSearch, *, unit: float = 1.0) -> list[Mark]:
+    """A tree to be shown by ``view(Scene(), marks=tree_marks(run))``, each index in a colour of its own.
+
+    Args:
+        run: A run in space or in the plane.
+        unit: Length of one unit of the run [m]; 0.01 for centimetres.
+
+    Raises:
+        InputError: If ``run`` is something else.
+    """
+    require(run, TreeSearch, "tree to show")
+    reach = run.links.reach * unit
+    goal = _in_space(run.goal[None]) * unit
+
+    marks = []
+    for index in range(1, run.links.count + 1):
+        color = palette.SERIES[(index - 1) % len(palette.SERIES)]
+        if index < run.links.count:
+            name = f"where joint {index + 1} can be"
+            far = float(run.links.max_span[index]) * unit
+            marks.append(balls(name, color, goal, far, opacity=REGION_OPACITY))
+
+        before, level = (_in_space(run.nodes[k]) * unit for k in (index - 1, index))
+        edges = np.stack([before[run.parents[index - 1]], level], axis=1)[:MAX_LINKS]
+        rest = len(level) - len(edges)
+        name = f"links of index {index}" + (f" (all but {rest})" if rest else "")
+        marks.append(tubes(name, color, edges, LINK_RADIUS * reach))
+
+    chain = _in_space(run.chain) * unit
+    marks.append(
+        tubes("answer", palette.INK, [chain[k : k + 2] for k in range(len(chain) - 1)], SOLUTION_RADIUS * reach)
+    )
+    marks.append(balls("its joints", palette.INK, chain, 1.6 * SOLUTION_RADIUS * reach))
+    marks.append(balls("goal", palette.TRAIL, goal, 2.4 * SOLUTION_RADIUS * reach))
+
+    return marks
+
+
+def _in_space(points: Matrix) -> Matrix:
+    """Points of the plane at height 0, those of space as they are; shape (k, 3)."""
+    lifted: Matrix = np.pad(points, [(0, 0), (0, 3 - points.shape[1])])
+    return lifted
