@@ -21,7 +21,7 @@ import numpy as np
 
 from bench.robustness.commands import SUITE, commands, said
 from bench.robustness.spoilt_files import FILES, PROBLEM, STL, URDF, write
-from rrtik_ompl.cli.app import BAD_INPUT
+from rrtik_ompl.cli import BAD_INPUT
 
 SECONDS, MEMORY_BYTES = 2.0, 1 << 30  # of the processor, and beside what a command has when it begins
 HANG_SECONDS, ENDLESS_SECONDS = 120, 20.0  # of wall time, on a busy machine, and of the processor: then it is ended

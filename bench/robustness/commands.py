@@ -15,7 +15,8 @@ import numpy as np
 import typer
 
 from bench.robustness.spoilt_files import FILES, Drawn, spoilt, write
-from rrtik_ompl.cli.app import BAD_INPUT, FOUND, NOT_FOUND, command_line, run
+from rrtik_ompl.cli import BAD_INPUT, FOUND, NOT_FOUND
+from rrtik_ompl.cli.app import command_line, run
 
 # Servers and minutes: a page that is served, sessions, campaigns and tables that are measured.
 NEEDED = {"show": ("--html", "page.html"), "reproduce": ("--list",)}

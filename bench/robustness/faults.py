@@ -22,7 +22,7 @@ import numpy as np
 
 from bench.robustness.long_work import SUITE, UNFINISHED, WHOLE, WORK, LongWork, Reader
 from rrtik_ompl.base.errors import RrtikError
-from rrtik_ompl.cli.app import BAD_INPUT, FOUND, INTERRUPTED, NOT_FOUND
+from rrtik_ompl.cli import BAD_INPUT, FOUND, INTERRUPTED, NOT_FOUND
 
 KINDS = ("kill", "interrupt", "full disk", "clock")
 MARK = "RRTIK_TRIAL"  # an environment variable by which what a child has started is found

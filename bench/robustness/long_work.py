@@ -13,7 +13,8 @@ import numpy as np
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark.records import NAME, key_of, read_head, read_records
-from rrtik_ompl.cli.app import FOUND, NOT_FOUND, run
+from rrtik_ompl.cli import FOUND, NOT_FOUND
+from rrtik_ompl.cli.app import run
 from rrtik_ompl.cli.terminal import stoppable
 from rrtik_ompl.ik.reach.grid_map import load_reach_map
 from rrtik_ompl.model.certificate import load_certificate

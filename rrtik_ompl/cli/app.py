@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from rrtik_ompl.base.errors import RrtikError, printable
+from rrtik_ompl.cli import BAD_INPUT, FOUND, INTERRUPTED, NOT_FOUND
 from rrtik_ompl.cli.bench import bench
+from rrtik_ompl.cli.check import check
 from rrtik_ompl.cli.drawing import overlay, play, show
 from rrtik_ompl.cli.ik import inverse_kinematics
 from rrtik_ompl.cli.markers import markers
@@ -24,23 +26,13 @@ from rrtik_ompl.cli.reach import reach
 from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.task import straight, task
-from rrtik_ompl.cli.terminal import ProblemName, command, drop_output, prepare_terminal, say, stoppable, suggest
+from rrtik_ompl.cli.terminal import drop_output, prepare_terminal, say, stoppable
 from rrtik_ompl.cli.trust import with_trust
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
-if TYPE_CHECKING:
-    from rrtik_ompl.model.certificate import Certificate
-    from rrtik_ompl.model.path import JointPath
-    from rrtik_ompl.world.problem import Problem
-
 COMPLETING = "_RRTIK_COMPLETE"  # by which a shell asks for completions
-FOUND, NOT_FOUND, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
-
-PathFile = Annotated[
-    Path | None, typer.Argument(help="A path: .json, .csv or .txt; or a timed motion: .json, .csv, .yaml.")
-]
 
 
 class Kind(str, Enum):
@@ -68,100 +60,6 @@ def _options(
     ] = False,
 ) -> None:
     del version
-
-
-def check(
-    problem: ProblemName,
-    path: PathFile = None,
-    proof: Annotated[Path | None, typer.Option(help="Verify this certificate of the path, and nothing else.")] = None,
-) -> int:
-    """Check a problem, and a path, a motion or a run for it.
-
-    Motions are proven free for their whole length; where that cannot be done they are checked densely. A timed motion
-    is checked along the curve between its points, and its speeds are compared with the robot's. The file of a path may
-    contain a certificate. A record is judged against the scene at each time, between the ticks too. Exit code 1 if the
-    path is not valid, if its certificate does not hold, or if something touches in the record.
-
-    In the place of a problem there may be the plan of a task (.json): each motion is checked in its own world, on the
-    contacts that it stands on and no longer.
-    """
-    from rrtik_ompl.cli.task import task_plan_checked
-
-    if (code := task_plan_checked(problem, beside=(path, proof) != (None, None))) is not None:
-        return code
-    if proof is not None and path is None:
-        raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
-
-    from rrtik_ompl import load_path, load_problem
-    from rrtik_ompl.cli.plan_report import faults_of_motion, faults_of_path, how_proven, path_lines
-    from rrtik_ompl.cli.run_report import is_record, judged
-    from rrtik_ompl.model.certificate import load_certificate
-    from rrtik_ompl.motion.trajectory import Trajectory
-    from rrtik_ompl.motion.trajectory.load import load_motion_or_path
-
-    question = load_problem(problem)
-    world = question.world
-
-    if path is not None and proof is not None:
-        return _certified(question, load_path(path, world.robot), load_certificate(proof), f"{proof}")
-    if is_record(path):
-        return _said(path, *judged(question, path))
-
-    route = None if path is None else load_motion_or_path(path, world.robot)  # a bad file is refused at once
-    kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
-    _say_ends(question, kept)
-
-    if path is None or route is None:
-        suggest(command("plan", problem), command("show", problem))
-        return FOUND
-
-    faults = faults_of_motion(question, route) if isinstance(route, Trajectory) else faults_of_path(question, route)
-    if faults:
-        say(*(f"{path}: {fault}" for fault in faults))
-        suggest(f"look at it: {command('show', problem, path)}")
-        return NOT_FOUND
-
-    see = f"see it: {command('show', problem, path)}"
-    if isinstance(route, Trajectory):
-        say(f"{path}: valid, {how_proven(question, route)}; {len(route.times)} points, {route.duration:.3f} s")
-        suggest(see)
-        return FOUND
-
-    say(*(f"{path}: {line}" for line in path_lines(question, route, kept)))
-    code = _beside(question, route, path)
-    suggest(see, f"time it: {command('time', problem, path)}")
-    return code
-
-
-def _say_ends(problem: Problem, kept: str) -> None:
-    """Say how much room start and goal have."""
-    goal = problem.goal.q
-    ends = {"start": problem.start} | ({} if goal is None else {"goal": goal})
-    for end, q in ends.items():
-        say(f"{problem.name}: {end} is free, clearance {_millimetres(problem.world.clearance(q))}{kept}")
-
-
-def _said(file: Path, lines: Sequence[str], holds: bool) -> int:
-    """Say what was found of a file; the exit code."""
-    say(*(f"{file}: {line}" for line in lines))
-    return FOUND if holds else NOT_FOUND
-
-
-def _beside(problem: Problem, route: JointPath, path: Path) -> int:
-    """Say whether the certificate holds that a path's file has, if it has one."""
-    from rrtik_ompl.model.certificate import certificate_beside
-
-    found = certificate_beside(path)
-    return FOUND if found is None else _certified(problem, route, found, f"{path}")
-
-
-def _certified(problem: Problem, route: JointPath, certificate: Certificate, file: str) -> int:
-    """Say whether a certificate holds."""
-    from rrtik_ompl.cli.plan_report import certified
-
-    line, holds = certified(problem, route, certificate)
-    say(f"{file}: {line}")
-    return FOUND if holds else NOT_FOUND
 
 
 def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if left out.")] = None) -> int:
@@ -321,10 +219,6 @@ def _usage(text: str, context: typer.Context | None, given: list[str]) -> int:
     named = [word for word in given[:1] if not word.startswith("-")]  # an option with too few words has no context
     command = " ".join(["rrtik", *named]) if context is None else context.command_path
     return _fail(f"{' '.join(text.replace('Value error, ', '').split())} (see: {command} --help)")
-
-
-def _millimetres(distance: float) -> str:
-    return "unlimited" if distance == float("inf") else f"{1e3 * distance:.1f} mm"
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.terminal import counter, note, progress, say, suggest
 
 
@@ -73,4 +74,4 @@ def bench(
         say(*(f"{problem}, {planner}: {number} x {why}" for problem, planner, number, why in failures(results)))
         say(*(f"wrote {each}" for each in files))
         suggest(*(f"open {each}" for each in files if each.suffix == ".html"))
-    return 1 if always_refused(results) else 0
+    return NOT_FOUND if always_refused(results) else FOUND

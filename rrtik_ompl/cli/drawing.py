@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.base.errors import InputError, ProblemError
+from rrtik_ompl.cli import FOUND
 from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, note, progress, say, shown_names, suggest
 from rrtik_ompl.files.text import check_target
 
@@ -126,7 +127,7 @@ def play(
     question = load_problem(problem)
     route = None if path is None else load_path(path, question.world.robot)
     serve(question, route, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
-    return 0
+    return FOUND
 
 
 def overlay(
@@ -174,7 +175,7 @@ def overlay(
 
     missing = f"; the first {arm.without_base} show no base and are unchanged" if arm.without_base else ""
     say(f"wrote {out}: {arm.count} pictures, {rate:g} a second{missing}")
-    return 0
+    return FOUND
 
 
 def _drawn(

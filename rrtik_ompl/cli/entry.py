@@ -9,6 +9,8 @@ import sys
 import threading
 from contextlib import suppress
 
+from rrtik_ompl.cli import INTERRUPTED
+
 
 def main() -> None:
     """Run the command line and exit with its code."""
@@ -18,7 +20,7 @@ def main() -> None:
     if usual is signal.default_int_handler:  # not in a shell's background, where Ctrl-C is ignored
         signal.signal(signal.SIGINT, _leave)
 
-    from rrtik_ompl.cli.app import INTERRUPTED, run
+    from rrtik_ompl.cli.app import run
 
     signal.signal(signal.SIGINT, usual)
     code = run()
@@ -46,4 +48,4 @@ def _end(code: int, *, everything_else: bool) -> None:
 def _leave(*_: object) -> None:
     """End at once: nothing has been done, and half-loaded libraries turn an exception into something else."""
     os.write(2, b"rrtik: interrupted; no file is half-written\n")
-    os._exit(130)
+    os._exit(INTERRUPTED)

@@ -10,19 +10,22 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.cli.ik_rows import each, followed, milliseconds, point, refuse_orientation
+from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.terminal import PAGE_FORMATS, note, plural, progress, say, suggest
 from rrtik_ompl.files.text import check_target, comma_numbers
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
     from rrtik_ompl.base.arrays import Matrix, Vector
-    from rrtik_ompl.model.goal import Goal, TipGoal
+    from rrtik_ompl.ik.solve import IkResult
+    from rrtik_ompl.ik.trajectory import IkTrajectory
+    from rrtik_ompl.model.goal import Goal, PositionGoal, TipGoal
     from rrtik_ompl.model.robot import Robot
     from rrtik_ompl.world.problem import Problem
     from rrtik_ompl.world.world import World
 
-
-FOUND, NOT_FOUND = 0, 1
 MAX_ROWS = 40  # of a table; CSV and JSON have them all
 
 Triple = tuple[float, float, float]
@@ -188,7 +191,21 @@ def _goal(
         return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
     if rpy_deg:
         return PoseGoal(pose_from_rpy(position, np.radians(rpy_deg), "--position, --rpy-deg"), **tolerances)
-    return point(position, tolerances)
+    return _point(position, tolerances)
+
+
+def _point(position: ArrayLike, tolerances: dict[str, float]) -> PositionGoal:
+    """A goal of the tip's position alone, which has no tolerance of orientation."""
+    from rrtik_ompl import PositionGoal
+
+    _refuse_orientation(tolerances, "give --quaternion or --rpy-deg, or leave it out")
+    return PositionGoal(position, tolerances.get("position_tolerance", 1e-3))
+
+
+def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
+    """Refuse a tolerance of orientation where there is none."""
+    if "orientation_tolerance" in tolerances:
+        raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
 
 
 def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any], output: Output) -> int:
@@ -212,7 +229,9 @@ def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any]
         checked = world if world is not None and world.scene.obstacles else None
         clearances = [] if checked is None else [checked.clearance(q) for q in result.solutions]
         more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
-        say(f"{robot.name}, {result.method}: {plural(len(result.solutions), 'solution')}{more}, {milliseconds(result)}")
+        say(
+            f"{robot.name}, {result.method}: {plural(len(result.solutions), 'solution')}{more}, {_milliseconds(result)}"
+        )
         say(ik_report.solutions_table(robot, result, names, turns, clearances, MAX_ROWS))
         say(*_more(len(result.solutions)))
 
@@ -222,6 +241,9 @@ def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any]
     if result.found:
         _draw(given, goal, result.solutions, output)
     return FOUND if result.found else NOT_FOUND
+
+
+# --- many poses ------------------------------------------------------------------------------------------------------
 
 
 def _many(
@@ -240,10 +262,10 @@ def _many(
     robot = given.robot
     rows = load_poses(file)
     if rows.ndim == 2:
-        refuse_orientation(tolerances, "leave it out")
+        _refuse_orientation(tolerances, "leave it out")
 
     with progress(f"inverse kinematics of {plural(len(rows), 'pose')}"):
-        solve = followed if trajectory else each
+        solve = _followed if trajectory else _each
         q, residuals, reasons, details, notes, line = solve(robot, rows, tolerances, common)
 
     found = sum(not reason for reason in reasons)
@@ -264,6 +286,80 @@ def _many(
     if len(good):
         _draw(given, None, good, output, moving=trajectory)
     return FOUND if found == len(rows) else NOT_FOUND
+
+
+class Solved(NamedTuple):
+    """Inverse kinematics of many poses: joint values, errors, reasons and details row by row.
+
+    Of a trajectory also a note for each row, such as a jump, and a line about the whole.
+    """
+
+    q: Matrix
+    residuals: Matrix
+    reasons: list[str]
+    details: list[str]
+    notes: list[str]
+    line: str = ""
+
+
+def _each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], common: dict[str, Any]) -> Solved:
+    """Joint values, residuals, reasons and details: poses as one batch unless tolerances are given, else singly."""
+    import numpy as np
+
+    from rrtik_ompl import PoseGoal, solve_ik, solve_ik_batch
+
+    if rows.ndim == 3 and not tolerances:
+        batch = solve_ik_batch(robot, rows, **common)
+        return Solved(batch.q, batch.residuals, list(batch.reasons), list(batch.details), [""] * len(rows))
+
+    q = np.full((len(rows), robot.dof), np.nan)
+    residuals = np.full((len(rows), 2), np.nan)
+    reasons = []
+    details = []
+
+    for k, row in enumerate(rows):
+        goal = _point(row, tolerances) if rows.ndim == 2 else PoseGoal(row, **tolerances)
+        result = solve_ik(robot, goal, **{**common, "seed": common["seed"] + k})
+        reasons.append(result.reason)
+        details.append(result.detail)
+        if result.found:
+            q[k] = result.solutions[0]
+            residuals[k] = result.residuals[0]
+
+    return Solved(q, residuals, reasons, details, [""] * len(rows))
+
+
+def _followed(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], common: dict[str, Any]) -> Solved:
+    """The same, details of the first point without a solution alone, with a note for each: a jump, a collision."""
+    from rrtik_ompl import solve_ik_trajectory
+
+    options: dict[str, Any] = dict(tolerances)
+    done = solve_ik_trajectory(robot, rows, **common, **options)
+
+    notes = [""] * len(rows)
+    details = [""] * len(rows)
+    for text, where in (("jump", done.jumps), ("collision on the way", done.blocked)):
+        for k in where:
+            notes[k] = f"{notes[k]}, {text}" if notes[k] else text
+
+    line = f", {plural(len(done.jumps), 'jump')}, {done.method}, {_milliseconds(done)}"
+    if done.detail:  # which names its point, counted from 0
+        first = next(k for k, reason in enumerate(done.reasons) if reason)
+        details[first] = done.detail.partition(": ")[2]
+
+    return Solved(done.q, done.residuals, list(done.reasons), details, notes, line)
+
+
+# --- what both show --------------------------------------------------------------------------------------------------
+
+
+def _milliseconds(result: IkResult | IkTrajectory) -> str:
+    """The time that a result took."""
+    return f"{1e3 * result.seconds:.3g} ms"
+
+
+def _more(rows: int) -> list[str]:
+    return [] if rows <= MAX_ROWS else [f"... {rows - MAX_ROWS} more: see --csv or --json"]
 
 
 def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
@@ -312,7 +408,3 @@ def _question(given: Setting, q: Matrix) -> Problem | None:
 
     goal = q[np.argmax(free[1:])]
     return Problem(world, start if free[0] else goal, goal, name=given.robot.name)
-
-
-def _more(rows: int) -> list[str]:
-    return [] if rows <= MAX_ROWS else [f"... {rows - MAX_ROWS} more: see --csv or --json"]

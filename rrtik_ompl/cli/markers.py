@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.cli import FOUND
 from rrtik_ompl.cli.terminal import plural, progress, say
 from rrtik_ompl.cli.trust import with_trust
 from rrtik_ompl.files.text import check_target
@@ -72,7 +73,7 @@ def print_sheet(
         count = sheets.print_markers(out, _numbers(ids), side=1e-3 * side, dictionary=dictionary, paper=paper)
 
     say(f"wrote {out}: {plural(count, 'sheet')}; print at 100 % and measure the rule")
-    return 0
+    return FOUND
 
 
 @markers.command("calibrate")
@@ -117,7 +118,7 @@ def calibrate_camera(
 
     _tell(found, [picture.name for picture in taken])
     say(f"error {found.error:.3f} px over {sum(not r for r in found.unused)} photographs; wrote {out}")
-    return 0
+    return FOUND
 
 
 def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
@@ -145,7 +146,7 @@ def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
 
     turn = np.degrees(rig.rotation_sigma)
     say(f"+- {1e3 * rig.position_sigma:.2f} mm, +- {turn:.3f} deg; wrote {out}")
-    return 0
+    return FOUND
 
 
 def _tell(found: Calibration, names: list[str]) -> None:
@@ -226,7 +227,7 @@ def sense(
         from rrtik_ompl.sensing.problem_from_view import grasp_problem
 
         save_problem(grasp_problem(load_problem(str(problem)), view.usable(), *goal), task)
-    return 0
+    return FOUND
 
 
 def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tuple[str, str, int]:

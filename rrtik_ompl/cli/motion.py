@@ -10,6 +10,7 @@ import typer
 
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.cli import FOUND
 from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, ProblemName, progress, say
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target, comma_numbers
@@ -64,7 +65,7 @@ def list_moves(
         say(*moves_text.spoken_moves(route))
     else:
         say(report.moves_table(route), f"{route.transitions} moves, length {route.length:.2f} {route.unit}")
-    return 0
+    return FOUND
 
 
 def time_path(
@@ -145,7 +146,7 @@ def time_path(
             f"{task.name}: {found.duration:.3f} s", report.peaks_table(found, limits), *([defaults] if defaults else [])
         )
         say(*(f"wrote {file}" for file in (out, plot) if file is not None))
-    return 0
+    return FOUND
 
 
 def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> JointPath:

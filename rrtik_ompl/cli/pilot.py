@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.cli import FOUND
 from rrtik_ompl.cli.terminal import ProblemName, note, progress, say
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def pilot(
         raise InputError(opened.record.fault)
     if record is not None:
         say(f"wrote {record}")
-    return 0
+    return FOUND
 
 
 def _second(given: str | None) -> int | Path | None:

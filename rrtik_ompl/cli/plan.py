@@ -12,6 +12,7 @@ import typer
 
 from rrtik_ompl.base.choices import CommandShortening, Name, ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, command, note, progress, say, suggest
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
@@ -130,7 +131,7 @@ def plan(
         note(lack)
     elif less := report.less_clearance(path, clearance):
         note(less)
-    return 0 if found.found and not lack else 1
+    return FOUND if found.found and not lack else NOT_FOUND
 
 
 def _next_steps(problem: str, path: JointPath | None, out: Path | None, html: Path | None) -> list[str]:

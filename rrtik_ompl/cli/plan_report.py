@@ -14,13 +14,10 @@ from rrtik_ompl.model.transitions import lower_bound
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.planning.moves.text import COLUMNS, moves_document
 from rrtik_ompl.planning.plan import Plan
-from rrtik_ompl.world.clearance_curve import clearance_along
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.route_check import as_it_stands, how_checked
+from rrtik_ompl.world.route_check import how_checked
 
 if TYPE_CHECKING:
-    from rrtik_ompl.model.certificate import Certificate
-    from rrtik_ompl.model.robot import Robot
     from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
 
 SLACK = 1e-6  # share of a joint's fastest rate that rounding may add
@@ -213,73 +210,3 @@ def write_certificate(problem: Problem, path: JointPath, file: Path, *, beside: 
     else:
         certificate_by(proved.proof, proved.waypoints).save(file)
     return ""
-
-
-def wrong_ends(problem: Problem, path: JointPath) -> list[str]:
-    """A line for each end of a path that is not that of its problem."""
-    wrong = {
-        "the path does not begin at the start of the problem": abs(path.start - problem.start).max() > 1e-6,
-        "the path does not end at the goal of the problem": not problem.reached(path.end),
-    }
-    return [text for text, found in wrong.items() if found]
-
-
-def certified(problem: Problem, path: JointPath, found: Certificate) -> tuple[str, bool]:
-    """A line on whether a certificate proves that a path solves a problem, and whether it does."""
-    from rrtik_ompl.world.certificates.verify import verify_certificate
-
-    faults = [verify_certificate(found, problem.world, path.waypoints), *wrong_ends(problem, path)]
-    if any(faults):
-        return f"does not hold: {next(filter(None, faults))}", False
-
-    kept = f", {1e3 * found.clearance:g} mm kept from obstacles" if found.clearance else ""
-    moves = len(found.motions)
-    still = as_it_stands(problem.world.scene)
-    return f"holds: {moves} motion{'s' * (moves != 1)} proven free{kept}, {found.entries} entries{still}", True
-
-
-def faults_of_path(problem: Problem, route: JointPath) -> list[str]:
-    """A line for each motion of a path that is not free, and for ends that are not the problem's."""
-    lines = [f"motion {v.edge + 1}: {v.reason}" for v in route.violations(problem.world)]
-    return lines + wrong_ends(problem, route)
-
-
-def faults_of_motion(problem: Problem, motion: Trajectory) -> list[str]:
-    """The same of a timed motion, and a line for each joint that is too fast."""
-    return [*motion.faults(problem.world), *_too_fast(problem.robot, motion), *wrong_ends(problem, motion.path())]
-
-
-def _too_fast(robot: Robot, motion: Trajectory) -> list[str]:
-    """A line for each joint that goes faster than the robot's description allows."""
-    most = motion.peaks().velocity
-    units = ["m/s" if slides else "rad/s" for slides in robot.prismatic]
-    rows = zip(robot.joint_names, most.tolist(), robot.velocity.tolist(), units, strict=True)
-
-    return [
-        f"'{name}' goes at {rate:.4g} {unit}, its limit is {limit:.4g} {unit}"
-        for name, rate, limit, unit in rows
-        if rate > limit * (1.0 + SLACK)
-    ]
-
-
-def how_proven(problem: Problem, motion: Trajectory) -> str:
-    """How much of a timed motion without faults is proven free, in a few words."""
-    proof = motion.prove(problem.world)
-    still = as_it_stands(problem.world.scene)
-
-    if proof.proven:
-        return f"proven free at every time{still}"
-
-    proven = f"{proof.motions - len(proof.unproven)} of {proof.motions} pieces proven free"
-    return f"{proven}, the others checked in steps{still}"
-
-
-def path_lines(problem: Problem, route: JointPath, kept: str) -> list[str]:
-    """What is said of a path without faults; ``kept`` follows its clearance."""
-    world = problem.world
-    lines = []
-    if any(body.kind == "obstacle" for body in world.bodies):
-        lines.append(f"{clearance_along(world, route.waypoints)}{kept}")
-
-    size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
-    return [*lines, f"valid, {how_checked(world, route.waypoints)}; {size}"]

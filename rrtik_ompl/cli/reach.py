@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.cli import FOUND
 from rrtik_ompl.cli.terminal import PAGE_FORMATS, progress, say
 from rrtik_ompl.files.text import check_target
 
@@ -78,7 +79,7 @@ def reach(
         print(json.dumps(_document(found)))
     else:
         say(*_summary(found), *(f"wrote {file}" for file in (out, plot, html) if file is not None))
-    return 0
+    return FOUND
 
 
 def _effective(robot: str, plot: Path | None) -> int:
@@ -91,7 +92,7 @@ def _effective(robot: str, plot: Path | None) -> int:
     if plot is not None:
         plot_slices(slices, plot, title=f"{robot}: effective workspace", colors="Blues")
     say(*(f"{robot}, {each.title}" for each in slices), *([] if plot is None else [f"wrote {plot}"]))
-    return 0
+    return FOUND
 
 
 def _draw(shown: Robot | World, found: ReachMap, plot: Path | None, html: Path | None) -> None:

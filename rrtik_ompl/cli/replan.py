@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.terminal import PAGE_FORMATS, note, progress, say
 from rrtik_ompl.files.text import check_target
 
@@ -81,7 +82,7 @@ def replan_scenario(
         if isinstance(made, str):
             failed = {"problem": chosen.problem.name, "outcome": "not found", "reason": made}
             say(json.dumps(failed) if as_json else f"{chosen.problem.name}: {made}")
-            return 1
+            return NOT_FOUND
         run = made
     else:
         run = _recorded(replay, chosen.problem.name)
@@ -97,7 +98,7 @@ def replan_scenario(
     else:
         say(run.summary())
         say(*(f"wrote {file}" for file in (record, html) if file is not None))
-    return 0 if run.arrived else 1
+    return FOUND if run.arrived else NOT_FOUND
 
 
 def _new_run(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun:

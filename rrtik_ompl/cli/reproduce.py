@@ -4,24 +4,35 @@ from __future__ import annotations
 
 import json
 import time
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import typer
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.cli.published.kept import Kept
-from rrtik_ompl.cli.published.page import HEADS, Row, Table, cells, counted, page, plain
+from rrtik_ompl.base.version import __version__
+from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.terminal import note, plural, progress, say
-from rrtik_ompl.files.text import check_target, write_text
+from rrtik_ompl.files.text import check_target, read_text, write_text
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 NONE: Mapping[str, str] = MappingProxyType({})
 WIDTH = 60  # of a reading in a table for a person
+
+KEYS = ("name", "published", "measured", "verdict", "reading")
+HEADS = ("figure", *KEYS[1:])
+VERDICTS = ("held", "better", "differs", "refuted", "missed")
+MEANINGS = (
+    "Held: as printed, within chance. Better: beyond the print on the side that is wanted. Differs: not as printed, as "
+    "the reading lets expect. Refuted: a computation shows that the print is wrong. Missed: none of these. Seconds "
+    "against older machines have no verdict."
+)
 
 
 def _folder(given: Path | None) -> Path | None:
@@ -62,7 +73,7 @@ def reproduce(
         raise InputError("no installed package offers published tables")
     if listed:
         say(_list(known.values()), *(line for offer in offers for line in offer.not_here))
-        return 0
+        return FOUND
     if everything == bool(tables):
         raise InputError("which tables? give their names, or --all; `rrtik reproduce --list` shows them")
 
@@ -91,7 +102,11 @@ def reproduce(
     else:
         say(counted(done))
         say(*([] if markdown is None else [f"wrote {markdown}"]))
-    return 1 if any(row.verdict is not None and not row.verdict.passes for _, rows in done for row in rows) else 0
+    return (
+        NOT_FOUND
+        if any(row.verdict is not None and not row.verdict.passes for _, rows in done for row in rows)
+        else FOUND
+    )
 
 
 def _rows(table: Table, quick: bool, kept: Kept, *, shown: bool) -> Sequence[Row]:
@@ -126,7 +141,7 @@ def _draw(tables: Iterable[Table], quick: bool, folder: Path) -> int:
         with progress(f"{table.name}: {figure.title}"):
             figure.save(file, quick)
         say(f"wrote {file}: {figure.title} ({figure.source})")
-    return 0
+    return FOUND
 
 
 def chosen(known: Mapping[str, Table], names: Iterable[str], also: Mapping[str, str] = NONE) -> list[Table]:
@@ -155,6 +170,119 @@ def _seconds(table: Table, quick: bool) -> float:
     return float(table.quick_seconds if quick else table.seconds)
 
 
+# --- what a package offers -------------------------------------------------------------------------------------------
+
+
+class Verdict(Protocol):
+    """What to make of a figure: the word that is shown, and whether the comparison is a success."""
+
+    @property
+    def value(self) -> str:
+        """The word."""
+
+    @property
+    def passes(self) -> bool:
+        """Whether it is a success."""
+
+
+class Row(Protocol):
+    """One figure, as printed and as measured, and how the text was read; no verdict where there is nothing to judge."""
+
+    @property
+    def name(self) -> str:
+        """What it is."""
+
+    @property
+    def published(self) -> str:
+        """As printed."""
+
+    @property
+    def measured(self) -> str:
+        """As it comes out here."""
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """What to make of it."""
+
+    @property
+    def reading(self) -> str:
+        """How the text was read, or why the figure differs."""
+
+
+class Figure(Protocol):
+    """A figure of a publication, drawn from our measurement; see `rrtik_bench.figures.Figure`."""
+
+    name: str
+    title: str
+    source: str
+
+    def save(self, file: Path, quick: bool, /) -> None:
+        """Measure what it shows, and draw it."""
+
+
+class Table(Protocol):
+    """A published table as a package offers it; see `rrtik_bench.tables.Table`."""
+
+    name: str
+    title: str
+    source: str
+    seconds: float
+    quick_seconds: float
+    fitted: str
+    bars: str
+    figures: Sequence[Figure]
+
+    def run(self, quick: bool, /) -> Sequence[Row]:
+        """Measure it again."""
+
+
+Done = Sequence[tuple[Table, Sequence[Row]]]
+
+
+# --- a comparison in words -------------------------------------------------------------------------------------------
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """As a table shows it."""
+    return row.name, row.published, row.measured, "-" if row.verdict is None else row.verdict.value, row.reading
+
+
+def plain(row: Row) -> dict[str, str | None]:
+    """As JSON has it: ``verdict`` is null where there is nothing to judge."""
+    verdict = None if row.verdict is None else row.verdict.value
+    return {**dict(zip(KEYS, cells(row), strict=True)), "verdict": verdict}
+
+
+def counted(done: Done) -> str:
+    """How many of each verdict."""
+    counts = Counter(row.verdict.value for _, rows in done for row in rows if row.verdict is not None)
+    silent = sum(row.verdict is None for _, rows in done for row in rows)
+    words = [f"{counts[word]} {word}" for word in sorted(counts, key=VERDICTS.index)]
+    return ", ".join([*words, *([f"{silent} without a verdict"] if silent else [])])
+
+
+def page(done: Done, quick: bool) -> str:
+    """The whole comparison as Markdown."""
+    import platform
+
+    from rrtik_ompl.benchmark.tables import markdown_table
+
+    command = f"rrtik reproduce {'--all' if len(done) > 1 else done[0][0].name}{' --quick' if quick else ''}"
+    lines = ["# Published and measured", "", f"Written by `{command}`, rrtik-ompl {__version__}, {platform.machine()}."]
+    lines += ["", MEANINGS, "", f"In all: {counted(done)}.", ""]
+
+    rows = [(f"`{table.name}`", table.title, counted([(table, rows)])) for table, rows in done]
+    lines += markdown_table(("table", "what", "verdicts"), rows)
+
+    for table, each in done:
+        lines += ["", f"## {table.title}", "", f"`{table.name}`, {table.source}", ""]
+        lines += [f"Fitted to the published figures: {table.fitted}.", ""] if table.fitted else []
+        lines += [f"Bars: {table.bars}.", ""] if table.bars else []
+        lines += markdown_table(HEADS, map(cells, each))
+
+    return "\n".join([*lines, ""])
+
+
 def _list(tables: Iterable[Table]) -> RichTable:
     from rich import box
     from rich.table import Table
@@ -180,3 +308,76 @@ def _table(rows: Sequence[Row]) -> RichTable:
 
 def _time(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+
+
+# --- what a round has done so far ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class KeptVerdict:
+    """A verdict as it was kept."""
+
+    value: str
+
+    @property
+    def passes(self) -> bool:
+        """Whether it is a success."""
+        return self.value != "missed"
+
+
+@dataclass(frozen=True, slots=True)
+class KeptRow:
+    """A row as it was kept."""
+
+    name: str
+    published: str
+    measured: str
+    verdict: KeptVerdict | None
+    reading: str
+
+
+class Kept:
+    """The tables that a round has measured, in a file beside its page; without a page nothing is kept.
+
+    Args:
+        markdown: The page.
+        quick: Whether the round is the quick one; the rows of another round, or of another version, are not taken.
+    """
+
+    def __init__(self, markdown: Path | None, quick: bool) -> None:
+        self.file = None if markdown is None else markdown.with_suffix(".parts.jsonl")
+        self._round = f"{__version__} {'quick' if quick else 'full'}"
+        self._lines: dict[str, str] = {}
+
+        if self.file is not None and self.file.is_file():
+            for line in read_text(self.file).splitlines():
+                self._lines[json.loads(line)["table"]] = line
+
+    def known(self, table: Table) -> Sequence[Row] | None:
+        """The rows of a table that this round has measured before it was interrupted."""
+        line = self._lines.get(table.name)
+        if line is None or json.loads(line)["round"] != self._round:
+            return None
+        return [_row(each) for each in json.loads(line)["rows"]]
+
+    def add(self, table: Table, rows: Sequence[Row]) -> None:
+        """Keep the rows of a table.
+
+        Raises:
+            InputError: If there is no room for them; what was kept before is still there.
+        """
+        if self.file is None:
+            return
+        line = {"table": table.name, "round": self._round, "rows": [plain(row) for row in rows]}
+        self._lines[table.name] = json.dumps(line)
+        write_text(self.file, "".join(f"{each}\n" for each in self._lines.values()))
+
+    def forget(self) -> None:
+        """The round has come to its end."""
+        if self.file is not None:
+            self.file.unlink(missing_ok=True)
+
+
+def _row(kept: dict[str, str]) -> Row:
+    name, published, measured, verdict, reading = (kept[key] for key in KEYS)
+    return KeptRow(name, published, measured, KeptVerdict(verdict) if verdict else None, reading)

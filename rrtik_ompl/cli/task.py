@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.terminal import PAGE_FORMATS, TRAJECTORY_FORMATS, command, progress, say, suggest
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
@@ -83,7 +83,7 @@ def straight(
         say(*(f"wrote {file}" for file in written))
         if made.path is not None:
             suggest("see it: --html line.html" if html is None else f"open {html}")
-    return 0 if made.fraction == 1.0 else 1
+    return FOUND if made.fraction == 1.0 else NOT_FOUND
 
 
 def task(
@@ -130,7 +130,7 @@ def task(
     if as_json:
         print(json.dumps({**_document(plan), "seed": seed, "duration": duration}))
     elif plan.found:
-        say(*_lines(loaded.name, plan))
+        say(*plan_lines(loaded.name, plan))
         say(*([] if duration is None else [f"  in {duration:.2f} s, each rest of {pause:g} s"]))
         say(*(f"wrote {file}" for file in (out, trajectory, html) if file is not None))
         seen = f"see it: {command('task', task, '--html', 'task.html')}" if html is None else f"open {html}"
@@ -138,40 +138,7 @@ def task(
     else:
         say(f"{loaded.name}: not found: {plan.reason}")
         suggest("give it more time: --seconds")
-    return 0 if plan.found else 1
-
-
-def task_plan_checked(name: str, *, beside: bool) -> int | None:
-    """Say of each motion of a saved plan how it is known to be free, and on what contacts; 1 if one is not.
-
-    Args:
-        name: Of the file; None is the answer where it holds no plan of a task.
-        beside: Whether a path or a proof is named beside it.
-    """
-    from rrtik_ompl.tasks.plan_file import is_task_plan, load_task_plan
-    from rrtik_ompl.tasks.setting import world_of_motion
-
-    if not is_task_plan(name):
-        return None
-    if beside:
-        raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--proof' out.")
-
-    plan = load_task_plan(name)
-    faults = plan.faults()
-
-    paths = tuple(
-        path.proved(world_of_motion(path, world, stage))
-        for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True)
-    )
-
-    wrong = frozenset(number for number, motion in enumerate(faults) if motion)
-    say(*_lines(name, replace(plan, paths=paths, notes=()), wrong))
-    for number, world in enumerate(plan.worlds):
-        said = plan.contacts[number] if plan.contacts else ()
-        others = {*world.scene.contacts} - {each.touching for each in said}  # hold for the whole motion
-        say(*(f"  motion {number + 1} stands on a contact: {each}" for each in (*said, *others)))
-    say(*(f"not valid: {fault.reason}" for motion in faults for fault in motion))
-    return 1 if wrong else 0
+    return FOUND if plan.found else NOT_FOUND
 
 
 def _document(plan: TaskPlan) -> dict[str, Any]:
@@ -181,7 +148,7 @@ def _document(plan: TaskPlan) -> dict[str, Any]:
     return {**kept, "motions": motions}
 
 
-def _lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -> list[str]:
+def plan_lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -> list[str]:
     """A plan for a person: a line for each motion, and its notes; ``wrong``: numbers of motions that are not valid."""
     from rrtik_ompl.world.route_check import as_it_stands
 

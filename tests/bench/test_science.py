@@ -14,7 +14,7 @@ from rrtik_bench.registry import COLLECTION
 from rrtik_bench.report.figures import PICTURE, Figure
 from rrtik_bench.report.rows import exactly, judged
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.cli.published.page import page
+from rrtik_ompl.cli.reproduce import page
 from rrtik_ompl.ik.mb_rrt.links import Links
 from rrtik_ompl.ik.mb_rrt.published import grow
 from rrtik_tests.places import ROOT

@@ -62,7 +62,8 @@ def test_long_tables_of_points_are_read_line_by_line(tmp_path):
 
 @pytest.mark.parametrize("name", ["a" * 300 + ".yaml", "b/" * 3000 + "x.yaml"])
 def test_names_that_are_too_long_are_said_to_be(name, tmp_path, monkeypatch, capsys):
-    from rrtik_ompl.cli.app import BAD_INPUT, run
+    from rrtik_ompl.cli import BAD_INPUT
+    from rrtik_ompl.cli.app import run
 
     monkeypatch.chdir(tmp_path)
     for words in (["check", name], ["markers", "sense", name, "--camera", name, "--map", name], ["bench", name],
