@@ -125,7 +125,7 @@ def task(
         from rrtik_ompl.viewer import view
 
         with progress("drawing"):
-            view(loaded.world, plan, html=html, title=f"{loaded.name}: {len(plan.paths)} motions")
+            view(loaded.world, plan.played(), html=html, title=f"{loaded.name}: {len(plan.paths)} motions")
 
     if as_json:
         print(json.dumps({**_document(plan), "seed": seed, "duration": duration}))

@@ -19,6 +19,7 @@ from rrtik_ompl.files.text import write_text
 if TYPE_CHECKING:
     from rrtik_ompl.replanning.record import ReplanRun
     from rrtik_ompl.tasks import TaskPlan
+    from rrtik_ompl.tasks.played import PlayedTask
     from rrtik_ompl.viewer.drawing.marks import Mark
     from rrtik_ompl.viewer.notebook import InlinePage
     from rrtik_ompl.viewer.subject import Showable, ShownPath
@@ -29,7 +30,7 @@ __all__ = ["play", "view"]
 
 def view(
     shown: Showable,
-    path: ShownPath | TaskPlan | None = None,
+    path: ShownPath | TaskPlan | PlayedTask | None = None,
     *,
     before: ShownPath | None = None,
     ghosts: ArrayLike | None = None,
@@ -47,7 +48,8 @@ def view(
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; nothing moves if None. A ``Trajectory`` plays
-            in real time, a ``TaskPlan`` (with the first of its worlds) motion by motion, with what is carried.
+            in real time, a ``TaskPlan`` (with the first of its worlds), or what its ``played()`` gives, motion by
+            motion, with what is carried.
         before: Another path to compare with, such as the one that ``path`` was shortened from: the trail of its tip
             is drawn too.
         ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of
@@ -74,6 +76,7 @@ def view(
         >>> rrtik.view(problem, rrtik.plan(problem, seed=1).path, html="plan.html").name
         'plan.html'
     """
+    from rrtik_ompl.tasks import TaskPlan
     from rrtik_ompl.viewer.notebook import InlinePage, in_kernel
     from rrtik_ompl.viewer.page import page
     from rrtik_ompl.viewer.serve import PageServer
@@ -83,7 +86,8 @@ def view(
     require(still, bool, "still")
     require(inline, bool | None, "inline")
 
-    text = page(shown, path, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still)
+    played = path.played() if isinstance(path, TaskPlan) else path  # the plan is timed and proven by itself
+    text = page(shown, played, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still)
     if html is not None:
         write_text(html, text)
         return Path(html)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.errors import InputError, listed
 from rrtik_ompl.model.transitions import single_joint
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.tasks.played import PlayedTask
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.page_fixed import packed
@@ -53,7 +53,7 @@ PLANNING = (
 
 def page(
     shown: Showable,
-    path: ShownPath | TaskPlan | None = None,
+    path: ShownPath | PlayedTask | None = None,
     *,
     before: ShownPath | None = None,
     ghosts: ArrayLike | None = None,
@@ -69,7 +69,7 @@ def page(
 
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; a ``TaskPlan`` with the first of its worlds.
+        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; a ``PlayedTask`` with the first of its worlds.
         before: Another path, to compare with; the trail of its tip is drawn too.
         ghosts: Configurations, shape (k, dof), drawn like tinted glass.
         marks: Further bodies.
@@ -81,8 +81,8 @@ def page(
     Raises:
         InputError: If that cannot be shown, or the page asks and cannot plan.
     """
-    if isinstance(path, TaskPlan):
-        subject = subject_of_task(shown, path.played())
+    if isinstance(path, PlayedTask):
+        subject = subject_of_task(shown, path)
     else:
         more = listed(marks, "marks")
         subject = subject_of(shown, path, before, ghosts, more) if run is None else subject_of_run(shown, run)

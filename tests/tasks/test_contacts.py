@@ -302,6 +302,16 @@ def test_a_thing_held_from_the_beginning_may_touch_what_it_touches(tmp_path, pan
     assert "stands on a contact: 'cup' and 'table'" in capsys.readouterr().out
 
 
+def test_contacts_are_listed_in_the_order_of_the_world(tmp_path, panda, capsys):
+    names = [f"stone {k}" for k in range(8)]
+    far_away = [rrtik.Obstacle(name, rrtik.Sphere(0.05), [3.0, 0.3 * k, 0.0]) for k, name in enumerate(names)]
+    contacts = [rrtik.Touching("panda_hand", name, 0.0) for name in reversed(names)]
+    plan = planned(panda, rrtik.Scene(far_away, contacts=contacts), [MoveTo(above(*PLACE[:2]))])
+    rrtik.save_task_plan(plan, tmp_path / "plan.json")
+    assert run(["check", str(tmp_path / "plan.json")]) == 0
+    assert re.findall(r"stands on a contact: 'panda_hand' and '(.*)'", capsys.readouterr().out) == names[::-1]
+
+
 def test_the_check_of_a_saved_plan_names_contacts_and_finds_those_that_are_not_said(tmp_path, panda, capsys):
     plan = planned(panda, scene(), [*taken(), Straight(by=UP)])
     file = tmp_path / "plan.json"

@@ -73,7 +73,7 @@ def test_the_page_draws_the_regions_of_stages_where_they_begin(served):
     assert region.frame == "cup"
     assert (begin == served.paths[stage].start).all()
     assert region.outside(begin) == (0.0, 0.0)
-    text = page(served.worlds[0], served, still=True)
+    text = page(served.worlds[0], served.played(), still=True)
     packed = re.search(r'<script id="commands"[^>]*>\s*(\S+?)\s*</script>', text)
     assert packed is not None
     commands = json.loads(gzip.decompress(base64.b64decode(packed[1])))

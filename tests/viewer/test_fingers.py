@@ -66,7 +66,7 @@ def test_a_task_without_gripper_has_no_fingers_that_move():
 def test_a_browser_shows_the_fingers_come_together(closing, tmp_path):
     world, plan = closing
     target = tmp_path / "fork.html"
-    target.write_text(page(world, plan), encoding="utf-8")
+    target.write_text(page(world, plan.played()), encoding="utf-8")
     begin, end = rrtik.time_task(plan).pauses[0]
     wide = []
     for time in (begin, 0.5 * (begin + end), end):

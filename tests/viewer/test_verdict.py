@@ -135,7 +135,7 @@ def of_task(good: bool) -> Case:
     if not good:
         through = plan.paths[0].with_waypoints([FAR, IN, NEAR])
         plan = replace(plan, paths=(through, *plan.paths[1:]))
-    return page(world(), plan), {}, plan.proven and not plan.violations()
+    return page(world(), plan.played()), {}, plan.proven and not plan.violations()
 
 
 def crossed() -> rrtik.Problem:
@@ -300,7 +300,7 @@ def test_moving_obstacles_are_said_to_stand_where_they_do_at_time_0() -> None:
         assert told.count("as they stand at time 0") == 1
     assert "time 0" not in story(page(problem(), np.array([FAR, NEAR]), still=True))["proof"]["text"]
     plan = Task([MoveTo(NEAR)]).plan(asked.world, FAR, seed=1)
-    assert story(page(asked.world, plan))["proof"]["text"].count("as they stand at time 0") == 1
+    assert story(page(asked.world, plan.played()))["proof"]["text"].count("as they stand at time 0") == 1
 
 
 def timed_task() -> rrtik.TimedTask:
