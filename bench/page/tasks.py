@@ -34,7 +34,7 @@ def page_of(name: str) -> str:
         made = task.task.plan(task.world, task.start, seconds=60.0, seed=SEED)
         if not made.found:
             raise SystemExit(f"{name}: {made.reason}")
-        return page(task.world, made, still=True)
+        return page(task.world, made.played(), still=True)
     problem = rrtik.load_problem(name)
     plan = rrtik.plan(problem, seconds=60.0, seed=SEED)
     if plan.path is None:
