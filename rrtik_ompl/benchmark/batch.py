@@ -14,8 +14,7 @@ from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, lis
 from rrtik_ompl.benchmark import spread
 from rrtik_ompl.benchmark.campaign import all_jobs
 from rrtik_ompl.benchmark.sources import build, file_source, from_plain
-from rrtik_ompl.benchmark.suite import Entrant, Suite
-from rrtik_ompl.benchmark.suite_file import NONE, SHORTENINGS
+from rrtik_ompl.benchmark.suite import NONE, SHORTENINGS, Entrant, Suite
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto, options_of, refuse_options
 from rrtik_ompl.ompl_bridge.planner_options import is_safe
 

@@ -11,7 +11,7 @@ import numpy as np
 from rrtik_ompl.base.choices import ShorteningMethod, SuiteShortening
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.benchmark.sources import build, from_plain
-from rrtik_ompl.benchmark.suite_file import BY_KIND, NONE
+from rrtik_ompl.benchmark.suite import BY_KIND, NONE
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
 from rrtik_ompl.planning.plan import plan

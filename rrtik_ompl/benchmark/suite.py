@@ -6,7 +6,9 @@ import os
 from collections import Counter
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Final, get_args
+
+from pydantic import Field, Tag
 
 from rrtik_ompl.base.choices import SuiteShortening, one_of
 from rrtik_ompl.base.errors import UnknownNameError
@@ -17,22 +19,19 @@ from rrtik_ompl.benchmark.sources import (
     generated_sources,
     scaling_sources,
 )
-from rrtik_ompl.benchmark.suite_file import (
-    SHORTENINGS,
-    Generated,
-    Joints,
-    Obstacles,
-    PlannerGroup,
-    Resolution,
-    SuiteFile,
-)
 from rrtik_ompl.description.catalog import find_suite, load_robot
-from rrtik_ompl.files.sections import parse
+from rrtik_ompl.files.sections import Name, Positive, Section, Version, parse, tag, told_apart_by
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.ompl_bridge.planner_names import is_planner_file, label_of, options_of, planner_in_folder
 from rrtik_ompl.ompl_bridge.planner_traits import unbound_planners
 from rrtik_ompl.planning.generated_problems import FAMILIES
+
+BY_KIND: Final = "by-kind"  # of shortening, beside the methods
+NONE: Final = "none"
+SHORTENINGS: tuple[SuiteShortening, ...] = get_args(SuiteShortening)
+Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,3 +175,104 @@ def _refuse_twins(document: YamlDocument, key: str, names: list[str]) -> None:
     if number > 1:
         remedy = "give them labels" if key == "planners" else "delete one"
         raise document.error((key,), f"'{name}' stands there {number} times; {remedy}")
+
+
+# --- what its file may say -------------------------------------------------------------------------------------------
+
+
+class GeneratedEntry(Section):
+    """Problems of ``rrtik_ompl.planning.generated_problems``."""
+
+    robot: Name
+    family: Name
+    count: Count = Field(1, description="problems")
+    first: Seed = Field(0, description="seed of the first one")
+
+
+class ObstaclesEntry(Section):
+    """One arm between more and more obstacles."""
+
+    robot: Name
+    counts: Annotated[list[Count], Field(min_length=1)]
+    seed: Seed = 0
+
+
+class JointsEntry(Section):
+    """Planar chains of more and more joints."""
+
+    counts: Annotated[list[Annotated[Count, Field(ge=2, le=100)]], Field(min_length=1)]
+    seed: Seed = 0
+
+
+class ResolutionEntry(Section):
+    """One problem whose motions are checked in finer and finer steps."""
+
+    problem: Name
+    metres: Annotated[list[Positive], Field(min_length=1)]
+
+
+class Generated(Section):
+    """See :class:`GeneratedEntry`."""
+
+    generated: GeneratedEntry
+
+
+class Obstacles(Section):
+    """See :class:`ObstaclesEntry`."""
+
+    obstacles: ObstaclesEntry
+
+
+class Joints(Section):
+    """See :class:`JointsEntry`."""
+
+    joints: JointsEntry
+
+
+class Resolution(Section):
+    """See :class:`ResolutionEntry`."""
+
+    resolution: ResolutionEntry
+
+
+ProblemEntry = Annotated[
+    Annotated[Name, Tag(tag("name"))]
+    | Annotated[Generated, Tag(tag("generated"))]
+    | Annotated[Obstacles, Tag(tag("obstacles"))]
+    | Annotated[Joints, Tag(tag("joints"))]
+    | Annotated[Resolution, Tag(tag("resolution"))],
+    told_apart_by(
+        "generated", "obstacles", "joints", "resolution", what="a problem", text="name",
+    ),
+]  # fmt: skip
+
+
+class PlannerGroup(Section):
+    """A planner with options."""
+
+    name: Name
+    label: Name | None = None
+    parameters: dict[str, Any] = Field(default={})
+    shorten: Name | None = Field(None, description="in place of the suite's")
+
+
+PlannerEntry = Annotated[
+    Annotated[Name, Tag(tag("text"))] | Annotated[PlannerGroup, Tag(tag("name"))],
+    told_apart_by("name", what="a planner", text="text"),
+]
+
+
+class SuiteFile(Section):
+    """A campaign of benchmarks."""
+
+    version: Version
+    title: Name = "benchmark"
+    robot: Name | None = Field(None, description="for problem files and folders, in place of the one they name")
+    problems: list[ProblemEntry] = Field(default=[], description="may be left out if a folder is given")
+    planners: Annotated[list[PlannerEntry], Field(min_length=1)]
+    runs: Count = Field(description="of every planner on every problem")
+    seconds: Positive = Field(description="for planning in each run [s]")
+    patience: Positive | None = Field(None, description="a run that takes longer in all is killed [s]; 3 seconds + 30")
+    memory_mb: Positive = Field(4096.0, description="that a run may take beside robot, scene and library [MB]")
+    seed: Seed = 0
+    shorten: Name = Field(BY_KIND, description="a method of shortening, none, or by-kind: axis for single-joint moves")
