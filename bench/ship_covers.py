@@ -17,7 +17,7 @@ from typer import Option
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.description.catalog import list_robots, load_robot
 from rrtik_ompl.files.cache import FOLDER_VARIABLE
-from rrtik_ompl.geometry.covers import cache, shipped
+from rrtik_ompl.geometry.covers import cache
 from rrtik_ompl.world.world import World
 
 
@@ -42,5 +42,5 @@ def covers_of_robots() -> dict[str, Matrix]:
 def main(anew: Annotated[bool, Option(help="Make every cover, whatever the cache holds: minutes.")] = False) -> None:
     """Write the file."""
     with tempfile.TemporaryDirectory() as empty, patch.dict(os.environ, {FOLDER_VARIABLE: empty} if anew else {}):
-        shipped.write_store(covers_of_robots())
-    print(f"{shipped.STORE}: {shipped.STORE.stat().st_size / 1e6:.2f} MB")
+        cache.write_store(covers_of_robots())
+    print(f"{cache.STORE}: {cache.STORE.stat().st_size / 1e6:.2f} MB")

@@ -13,8 +13,8 @@ import pinocchio as pin
 from bench.proofs.cases import Case, inner_point
 from rrtik_ompl import load_robot
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.collision.contacts import measured
 from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.model.certificate import Certificate, MotionEntries
 from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.model.robot import Robot

@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.pilot.interlock import FOLLOWING, PROPOSED
 from rrtik_ompl.pilot.overlay.augment import Augmenter, Ghost

@@ -19,12 +19,21 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.poses import pose
-from rrtik_ompl.geometry.collision.bodies import Body, Pairs, colliding_pairs, in_contact, link_bodies, scene_bodies
+from rrtik_ompl.geometry.collision.bodies import (
+    Body,
+    Pairs,
+    colliding_pairs,
+    contact_distance,
+    in_contact,
+    keeps_clearance,
+    kept_apart,
+    link_bodies,
+    scene_bodies,
+)
 from rrtik_ompl.geometry.collision.certificate import distance
-from rrtik_ompl.geometry.collision.extent import farthest
-from rrtik_ompl.geometry.collision.margins import contact_distance, keeps_clearance, kept_apart
+from rrtik_ompl.geometry.collision.distances import is_ours, own_nearest
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
-from rrtik_ompl.geometry.collision.own_distances import is_ours, own_nearest
+from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Motion, Obstacle, Scene, TimedPoses, pairs_that_may_touch
 from rrtik_ompl.model.shapes import same_shape

@@ -12,7 +12,7 @@ from rrtik_ompl.base.arrays import Matrix, finite_array, frozen
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import rigid
-from rrtik_ompl.geometry.collision.extent import farthest
+from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import HalfSpace
 from rrtik_ompl.sensing.cameras.camera import Camera

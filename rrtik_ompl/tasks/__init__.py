@@ -14,7 +14,7 @@ from rrtik_ompl.base.arrays import Vector, positive, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import require
-from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.model.judgement import Violation
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.tasks.branches import Branch

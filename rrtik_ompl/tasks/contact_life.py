@@ -18,9 +18,8 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.collision.bodies import Body, deepest_contact
-from rrtik_ompl.geometry.collision.contacts import measured
-from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, usually_apart
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, deepest_contact, usually_apart
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.solids import is_mesh
 from rrtik_ompl.model.path import JointPath, path_through

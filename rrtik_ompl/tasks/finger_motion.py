@@ -17,10 +17,9 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.description.catalog import robot_from_entry
-from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart
 from rrtik_ompl.geometry.collision.containment import Containment
-from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, kept_apart
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.solids import around
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.tasks.contact_life import DEEPER, NEAR, signed_distance

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE
 from rrtik_ompl.model.judgement import Violation
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot

@@ -14,6 +14,7 @@ from rrtik_ompl.base.copies import Items, Once, changed
 from rrtik_ompl.base.errors import UnknownNameError
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.geometry.collision.bodies import (
+    DISTANCE_TOLERANCE,
     Body,
     Pairs,
     by_motion,
@@ -26,7 +27,6 @@ from rrtik_ompl.geometry.collision.bodies import in_contact as with_contacts
 from rrtik_ompl.geometry.collision.body_arrays import BodyArrays, body_arrays
 from rrtik_ompl.geometry.collision.certificate import fixed_contact
 from rrtik_ompl.geometry.collision.containment import Containment
-from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights, displacement_weights
 from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.model.robot import Robot

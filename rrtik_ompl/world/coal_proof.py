@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body
 from rrtik_ompl.geometry.collision.containment import Containment
-from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.solids import is_closed, is_mesh
 from rrtik_ompl.kernels.proof import layout

@@ -20,10 +20,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.copies import Items
 from rrtik_ompl.base.poses import working_memory
-from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.geometry.collision.collector import collector_waits
-from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
-from rrtik_ompl.geometry.collision.own_distances import is_ours, own_gap
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, collector_waits, kept_apart, request
+from rrtik_ompl.geometry.collision.distances import is_ours, own_gap
 from rrtik_ompl.geometry.collision.solids import around, is_mesh, solids_of
 from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions

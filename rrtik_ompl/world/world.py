@@ -19,7 +19,7 @@ from rrtik_ompl.base.sharing import Shared
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs
 from rrtik_ompl.geometry.collision.certificate import Certificate
-from rrtik_ompl.geometry.collision.contacts import inside, measured
+from rrtik_ompl.geometry.collision.distances import inside, measured
 from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.model.judgement import Contact, Judge, Judged, Violation

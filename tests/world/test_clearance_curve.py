@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.model.judgement import FARTHEST
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Sphere

@@ -8,7 +8,7 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.kernels import FREE
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
 from rrtik_ompl.model.scene import Obstacle, Scene

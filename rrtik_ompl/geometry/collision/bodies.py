@@ -1,15 +1,16 @@
-"""The solids of a world, robot links and obstacles alike, and the pairs of them that must not touch."""
+"""The solids of a world, links and obstacles alike; the pairs that must not touch, and how far those stay apart."""
 
 from __future__ import annotations
 
+import gc
 import math
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, wraps
 from itertools import chain, combinations, compress
 from operator import not_
-from typing import Any, TypeAlias
+from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import coal
 import numpy as np
@@ -17,8 +18,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, UnknownNameError, few
-from rrtik_ompl.geometry.collision.collector import collector_waits
-from rrtik_ompl.geometry.collision.joined_links import joined_links
 from rrtik_ompl.geometry.collision.shape_table import Piece, pieces
 from rrtik_ompl.geometry.collision.solids import robot_solids
 from rrtik_ompl.geometry.collision.thickness import SHARE, least_width
@@ -27,8 +26,10 @@ from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 
 ALWAYS_COLLIDING_SAMPLES = 64
 DEPTH_TOLERANCE = 1e-9  # [m] of rounding, of depths that files hold
-
+DISTANCE_TOLERANCE = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances and depths
 Pairs: TypeAlias = tuple[tuple[int, int], ...]
+Given = ParamSpec("Given")
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +60,22 @@ class Body:
     padding: float = 0.0
     within: Any = field(default_factory=pin.SE3.Identity)
     contacts: tuple[tuple[str, float], ...] = ()
+
+
+def collector_waits(work: Callable[Given, Made]) -> Callable[Given, Made]:
+    """The same work, in which the collector does not look through all objects again and again."""
+
+    @wraps(work)
+    def undisturbed(*args: Given.args, **kwargs: Given.kwargs) -> Made:
+        if not gc.isenabled():
+            return work(*args, **kwargs)
+        gc.disable()
+        try:
+            return work(*args, **kwargs)
+        finally:
+            gc.enable()
+
+    return undisturbed
 
 
 @lru_cache(maxsize=16)
@@ -271,6 +288,86 @@ def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
     return frozenset(pairs) - _always_touching(robot, bodies, doubtful)
 
 
+def joined_links(robot: Robot) -> frozenset[frozenset[str]]:
+    """Pairs of names of links, with solids, that one joint joins which is not fixed in the description.
+
+    A link without solids that is fixed to one with solids is a frame of that: what a joint joins to the frame is joined
+    to the link. Where a frame has several such links, as a flange with a camera and a tool has, no one knows of which
+    it is, and it is joined to none of them.
+
+    Example:
+        >>> sorted(map(sorted, joined_links(rrtik.load_robot("planar3", radius=0.02))))
+        [['base', 'link1'], ['link1', 'link2'], ['link2', 'link3']]
+    """
+    links = _links(robot)
+    solid_links = {robot.link_of(item) for item in robot.collision.geometryObjects}
+    fixed_neighbours: dict[str, list[str]] = {}
+    for link in links:
+        if link.fixed:
+            fixed_neighbours.setdefault(link.name, []).append(link.parent)
+            fixed_neighbours.setdefault(link.parent, []).append(link.name)
+
+    pairs = set()
+    for link in links:
+        if link.fixed:
+            continue
+
+        lower_links = _nearest(link.name, fixed_neighbours, solid_links)
+        upper_links = _nearest(link.parent, fixed_neighbours, solid_links)
+        if len(lower_links) == 1 and len(upper_links) == 1:
+            pairs.add(lower_links | upper_links)
+
+    return frozenset(pairs)
+
+
+@dataclass(frozen=True, slots=True)
+class _Link:
+    """A link as its description hangs it on another: by a fixed joint, or by one that moves (or is held)."""
+
+    name: str
+    parent: str
+    fixed: bool
+
+
+def _links(robot: Robot) -> list[_Link]:
+    """All links but the base. The frames of a model tell how it was described: a link's hangs on that of its joint."""
+    frames = robot.model.frames
+    links = []
+    for frame in frames:
+        if frame.type != pin.FrameType.BODY:
+            continue
+
+        parent = frames[frame.parentFrame]
+        is_held = False
+        if parent.type != pin.FrameType.BODY:
+            is_held = parent.name in robot.movable
+            parent = frames[parent.parentFrame]
+
+        if parent.type == pin.FrameType.BODY:
+            moves = frame.parentJoint != parent.parentJoint
+            links.append(_Link(frame.name, parent.name, not (moves or is_held)))
+    return links
+
+
+def _nearest(link: str, fixed_neighbours: Mapping[str, Iterable[str]], solid_links: set[str]) -> frozenset[str]:
+    """The link if it has solids, else those that fixed joints lead to over links without any."""
+    nearest = set()
+    visited = {link}
+    to_visit = [link]
+
+    while to_visit:
+        visited_link = to_visit.pop()
+        if visited_link in solid_links:
+            nearest.add(visited_link)
+            continue
+        for other in fixed_neighbours.get(visited_link, ()):
+            if other not in visited:
+                visited.add(other)
+                to_visit.append(other)
+
+    return frozenset(nearest)
+
+
 def _may_meet(first: Body, second: Body) -> bool:
     """Whether two bodies of the robot, or what it holds, are neither one thing nor rigidly joined."""
     return first.name != second.name and first.joint != second.joint
@@ -314,9 +411,8 @@ def _always_touching(robot: Robot, bodies: tuple[Body, ...], pairs: Sequence[tup
 def _touch(first: Body, second: Body, frames: Sequence[pin.SE3]) -> bool:
     poses = [pin.SE3(frames[b.joint]) * b.placement for b in (first, second)]
     transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
-    result = coal.CollisionResult()
-    request = coal.CollisionRequest()
-    return bool(coal.collide(first.geometry, transforms[0], second.geometry, transforms[1], request, result))
+    ends = (first.geometry, transforms[0], second.geometry, transforms[1])
+    return bool(coal.collide(*ends, request(0.0), coal.CollisionResult()))
 
 
 def _solid_name(bodies: tuple[Body, ...], number: int) -> str:
@@ -345,3 +441,40 @@ def far_apart(first: Body, second: Body, distance: float) -> bool:
     return bool(
         math.dist(first_centre, second_centre) > centre_distance_limit
     )  # no number where one of them has no end
+
+
+def kept_apart(first: Body, second: Body) -> float:
+    """How far two bodies must stay apart [m]: the margin of an obstacle, or that of the arm's own bodies, and paddings.
+
+    Negative is the depth to which two that are in contact may overlap. No margin between bodies of which neither moves,
+    for no posture of the arm would give what is missing: they must only not touch.
+    """
+    contact = contact_distance(first, second)
+    without_contact = usually_apart(first, second)
+    return without_contact if contact is None else min(without_contact, contact)
+
+
+def usually_apart(first: Body, second: Body) -> float:
+    """How far two bodies must stay apart where they are not in contact [m]."""
+    if first.joint == second.joint == 0:
+        return 0.0
+    return (second.margin if second.kind == "obstacle" else first.margin) + first.padding + second.padding
+
+
+def keeps_clearance(first: Body, second: Body) -> bool:
+    """Whether a clearance from obstacles is kept between two bodies too: one is an obstacle, and they do not touch."""
+    return "obstacle" in (first.kind, second.kind) and contact_distance(first, second) is None
+
+
+def contact_distance(first: Body, second: Body) -> float | None:
+    """How near each other two bodies may come that are in contact [m], negative for a depth; None if they are not."""
+    if not first.contacts or not second.contacts:
+        return None
+    return min((distance for name, distance in first.contacts if name == second.name), default=None)
+
+
+def request(margin: float) -> coal.DistanceRequest:
+    """A fresh request to coal: do two geometries touch, or stay no farther than ``margin`` [m] apart."""
+    collision_request = coal.CollisionRequest()
+    collision_request.security_margin = margin
+    return collision_request

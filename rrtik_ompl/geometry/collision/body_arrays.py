@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.geometry.collision.margins import contact_distance
+from rrtik_ompl.geometry.collision.bodies import Body, contact_distance
 
 UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box
 

@@ -16,13 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.containment import Containment
-from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, request
+from rrtik_ompl.geometry.collision.distances import gap_beyond
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
-from rrtik_ompl.geometry.collision.own_distances import is_ours, own_gap
-from rrtik_ompl.geometry.collision.solids import solids_of
 from rrtik_ompl.model.robot import Robot
 
 MAX_PAIR_CHECKS = 1 << 16  # runs of rows times pairs checked together, to bound memory
@@ -278,20 +276,9 @@ def distance(
     second_pose: Matrix,
     margin: float = 0.0,
 ) -> float | None:
-    """A lower bound of the distance of two coal geometries at poses, shape (4, 4), less a margin [m].
-
-    None if the margin is not kept. Computed with a fresh request and result.
-    """
+    """As :func:`.distances.gap_beyond`, of two coal geometries at poses, shape (4, 4)."""
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
-    ends, margin = solids_of((first, transforms[0], second, transforms[1]), margin)
-
-    if is_ours(ends):
-        return own_gap(ends, margin)
-
-    result = coal.CollisionResult()
-    if coal.collide(*ends, request(margin), result):
-        return None
-    return float(result.distance_lower_bound)
+    return gap_beyond((first, transforms[0], second, transforms[1]), margin)
 
 
 def _half_space_pairs(

@@ -9,9 +9,8 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.poses import working_memory
-from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart, request
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
-from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, kept_apart, request
 from rrtik_ompl.geometry.collision.solids import is_mesh
 from rrtik_ompl.model.robot import Robot
 

@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import coal
 import numpy as np
@@ -45,6 +45,9 @@ from rrtik_ompl.model.shapes import (
 )
 from rrtik_ompl.model.shapes.box_pile import BoxPile
 from rrtik_ompl.model.shapes.polygons import convex_parts
+
+if TYPE_CHECKING:
+    pass
 
 BOX_CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
@@ -319,3 +322,16 @@ def shape_of(geometry: coal.CollisionGeometry) -> Shape | None:
     if isinstance(geometry, coal.Convex):
         return Mesh(*convex_arrays(geometry))
     return None
+
+
+def farthest(shape: Shape, pose: pin.SE3) -> float:
+    """An upper bound of the distance of a shape's points from the origin [m]; of a half-space that is infinite.
+
+    Args:
+        shape: What it is.
+        pose: Where it is, ``pinocchio.SE3``.
+    """
+    if not shape.bounded:
+        return float("inf")
+    solids = [(piece.geometry, pose * piece.placement) for piece in pieces(shape)]
+    return max(float(np.linalg.norm(place.act(s.aabb_center)) + s.aabb_radius) for s, place in solids)

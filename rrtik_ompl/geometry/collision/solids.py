@@ -1,11 +1,11 @@
-"""Coal geometries: convex hulls and meshes, what is inside them, and those of a robot."""
+"""Coal geometries: convex hulls and their planes, meshes, what is inside them, and those of a robot."""
 
 from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Iterable
 from functools import lru_cache, wraps
-from typing import Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 import coal
 import numpy as np
@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import LARGEST, Matrix, Vector, distinct
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
+
+if TYPE_CHECKING:
+    pass
 
 Found = TypeVar("Found")
 Ends: TypeAlias = tuple[Any, Any, Any, Any]  # first geometry, its coal.Transform3s, second geometry, its
@@ -29,6 +32,7 @@ SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal, twice
 
 FLATTEST = 1e-7  # thickness of a hull over its extent; what is flatter is refused
 SMALLEST = 1e-6  # [m] extent of a hull
+MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
 
 
 def once_per_geometry(find: Callable[[Any], Found]) -> Callable[[Any], Found]:
@@ -211,6 +215,45 @@ def face_normals(points: Matrix, triangles: NDArray[np.int64]) -> tuple[Matrix, 
 
     outward = (a - points.mean(axis=0))[faces]
     return normals * np.where(np.einsum("ij,ij->i", normals, outward) < 0.0, -1.0, 1.0)[:, None], areas[faces]
+
+
+@once_per_geometry
+def outer_planes(solid: coal.Convex) -> Matrix:
+    """The planes of the outer polyhedron of a convex solid."""
+    return most_different(cast(Matrix, outward_planes(solid)), MOST_PLANES)
+
+
+@once_per_geometry
+def outward_planes(solid: coal.Convex) -> Matrix | None:
+    """Outward unit normals and offsets of a coal convex solid's faces, shape (k, 4); None if it has no thickness.
+
+    Each plane is moved to the outermost corner along its normal, so that the solid lies behind all of them whatever
+    the faces' own precision; almost parallel faces share one plane.
+    """
+    points, triangles = convex_arrays(solid)
+    if len(triangles) < 4:
+        return None
+
+    normals, areas = face_normals(points, triangles)
+    if len(normals) < 4:
+        return None
+
+    normals = normals[np.argsort(-areas)]  # of almost parallel faces the largest stands for the others
+    normals = normals[np.sort(np.unique(np.round(normals, 6), axis=0, return_index=True)[1])]
+    return np.column_stack([normals, (points @ normals.T).max(axis=0)])
+
+
+def most_different(planes: Matrix, count: int) -> Matrix:
+    """At most ``count`` of the planes, each time the one whose normal is farthest from those already taken."""
+    if len(planes) <= count:
+        return planes
+
+    taken = [0]
+    largest_cosine = planes[:, :3] @ planes[0, :3]
+    while len(taken) < count:
+        taken.append(int(np.argmin(largest_cosine)))
+        largest_cosine = np.maximum(largest_cosine, planes[:, :3] @ planes[taken[-1], :3])
+    return planes[taken]
 
 
 @once_per_geometry

@@ -1,18 +1,20 @@
 """Covers kept on disk, so that a geometry is covered once per machine. Nothing here ever fails: no cache, no gain.
 
 One file per geometry, parameters and algorithm, named by a hash of all three; the package brings those of the robots
-that come along.
+that come along, which ``python -m bench ship_covers`` writes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 
 import coal
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.cache import cache_folder, nobody_else_s, write_whole
 from rrtik_ompl.files.digest import sha256
@@ -20,11 +22,12 @@ from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.notice import COVERING, tell_once
 from rrtik_ompl.geometry.collision.shape_table import numbers_of
 from rrtik_ompl.geometry.collision.solids import around, fills_its_hull, is_mesh
-from rrtik_ompl.geometry.covers.shipped import shipped_cover
 
 LAYOUT = 1
 ALGORITHM = 3  # counts up when rrtik_ompl.geometry.covers.spheres makes other spheres of the same geometry
 PIECES = 2  # counts up when rrtik_ompl.geometry.covers.mesh_pieces makes other pieces of the same mesh
+STORE = Path(__file__).with_name("shipped.npz")
+COLUMNS = 4  # numbers of a row of any cover
 
 
 def cached_outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
@@ -143,3 +146,47 @@ def _write(file: Path, key: str, spheres: Matrix) -> None:
     key_array = np.array(key)
     checksum = np.array(_check(spheres))
     write_whole(file, lambda stream: np.savez(stream, spheres=spheres, key=key_array, check=checksum))
+
+
+def shipped_cover(key: str, file: Path = STORE) -> Matrix | None:
+    """The cover of that hash, shape (n, 4), read-only; None if the package has none."""
+    packed = _stored(file).get(key)
+    return None if packed is None else _unpacked(packed)
+
+
+def write_store(covers: Mapping[str, Matrix], file: Path = STORE) -> None:
+    """Write covers by their hashes; the same ones always make the same file.
+
+    Each is packed by itself: a robot needs few of them, and to unpack all takes longer than to load the robot.
+    """
+    keys = sorted(covers)
+    packed = [zlib.compress(np.ascontiguousarray(covers[key].T, dtype=np.float64).tobytes(), 9) for key in keys]
+    ends = np.cumsum([len(part) for part in packed], dtype=np.int64)
+    hashes = np.frombuffer(bytes.fromhex("".join(keys)), dtype=np.uint8)
+    data = np.frombuffer(b"".join(packed), dtype=np.uint8)
+    np.savez(file, keys=hashes.reshape(len(keys), -1), ends=ends, packed=data)
+
+
+@cache
+def _stored(file: Path) -> dict[str, bytes]:
+    """All covers of a file by their hashes, packed; none if it is absent or damaged."""
+    try:
+        stored = NamedArrays(file)
+        keys = stored["keys"]
+        ends = stored["ends"].tolist()
+        packed = stored["packed"].tobytes()
+    except InputError:
+        return {}
+
+    starts = [0, *ends[:-1]]
+    return {key.tobytes().hex(): packed[a:b] for key, a, b in zip(keys, starts, ends, strict=True)}
+
+
+@cache
+def _unpacked(packed: bytes) -> Matrix | None:
+    """A cover; None if it is damaged."""
+    try:
+        columns = np.frombuffer(zlib.decompress(packed)).reshape(COLUMNS, -1)
+    except (zlib.error, ValueError):
+        return None
+    return frozen(columns).T

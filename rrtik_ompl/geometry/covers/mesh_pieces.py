@@ -20,8 +20,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.enclosure import enclosure
-from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, mesh_arrays
-from rrtik_ompl.geometry.covers.planes import most_different
+from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, mesh_arrays, most_different
 
 if TYPE_CHECKING:
     import coal

@@ -1,7 +1,10 @@
 """Balls around a solid (outer cover, contains it) and balls inside it (inner spheres), for any coal geometry.
 
 An outer cover is proven, not sampled: the solid is cut into convex elements without gaps
-(``geometry/covers/cells.py``), and every element lies wholly inside one ball (``geometry/covers/search.py``).
+(``geometry/covers/cells.py``), and every element lies wholly inside one ball (``geometry/covers/search.py``); capsules,
+cylinders and boxes have covers by formula too. Inner spheres leave little room between themselves and the surface:
+whatever reaches deeper into the solid than that room meets a ball. Each is the one that narrows the room most, on
+average over points of the surface.
 
 Spheres are float64 arrays of shape (n, 4): centre x, y, z and radius [m], in the frame of the geometry. Containment
 holds within 1e-9 of the size of the solid [m per m].
@@ -11,16 +14,15 @@ from __future__ import annotations
 
 import coal
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import QhullError, cKDTree
 
-from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.shape_table import Core, box_corners, core_of
 from rrtik_ompl.geometry.collision.solids import is_closed, is_mesh, mesh_arrays, vertices_of
-from rrtik_ompl.geometry.covers.cells import elements
-from rrtik_ompl.geometry.covers.inner import inscribed
-from rrtik_ompl.geometry.covers.regular import ROD_PROTRUSION, balls_on_axis, regular_cover, rod_cover, row_on_z, spread
-from rrtik_ompl.geometry.covers.search import smallest_cover, surface_points
+from rrtik_ompl.geometry.covers.cells import elements, lattice_inside
+from rrtik_ompl.geometry.covers.search import random_subset, smallest_cover, surface_points
 from rrtik_ompl.geometry.covers.solids import (
     ROUNDING,
     Frame,
@@ -44,6 +46,11 @@ CROSSED_CELLS = 1500  # at most
 CELLS_PER_BALL = 80
 SURFACE_POINTS = 6000
 SMALLEST = 1e-12  # [m]; what is smaller counts as a point
+ROD_PROTRUSION = 0.06  # share of the radius
+INNER_CENTRES = 300  # points inside from which inner balls start
+FEWEST_INSIDE = 200
+INNER_SAMPLES = 400  # points of the surface
+CLIMBS = 4  # steps of the centre of an inner ball away from the surface
 
 
 def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
@@ -150,6 +157,35 @@ def _round_cover(core: Core, protrusion: float | None) -> Matrix:
     return rod_cover(radius, half_length, limit, protrusion)
 
 
+def rod_cover(radius: float, half_length: float, limit: int, protrusion: float | None) -> Matrix:
+    """Equal balls in a row along z that hold a capsule, at most ``limit`` (but 2), shape (n, 4)."""
+    count = balls_on_axis(radius, half_length, ROD_PROTRUSION * radius if protrusion is None else protrusion)
+    count = max(min(count, max(limit, 2)), 1 if half_length <= 0.0 else 2)
+    step = 2.0 * half_length / max(count - 1, 1)
+    return row_on_z(spread(half_length, count), np.hypot(radius, 0.5 * step) * (1.0 + ROUNDING))
+
+
+def balls_on_axis(radius: float, half_length: float, protrusion: float) -> int:
+    """Number of balls along an axis of length ``2 half`` that hold the rod around it of the given radius."""
+    if half_length <= 0.0:
+        return 1
+    step = 2.0 * np.sqrt(max(protrusion * (protrusion + 2.0 * radius), 0.0))
+    return int(min(np.ceil(2.0 * half_length / step), 1e6)) + 1 if step > 0.0 else 10**6
+
+
+def spread(half: float, count: int) -> Vector:
+    """Numbers evenly from -half to half, shape (number,)."""
+    return np.linspace(-half, half, count) if count > 1 else np.zeros(max(count, 0))
+
+
+def row_on_z(heights: Vector, radius: float) -> Matrix:
+    """Equal balls on the z axis, shape (n, 4)."""
+    spheres = np.zeros((len(heights), 4))
+    spheres[:, 2] = heights
+    spheres[:, 3] = radius
+    return spheres
+
+
 def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
     """The geometry as a solid of about unit size, or None if its kind is not known or it has no volume to speak of."""
     core = core_of(geometry)
@@ -226,6 +262,45 @@ def _searched_cover(solid: Solid, limit: int, target: float | None) -> Matrix:
     return spheres
 
 
+def regular_cover(core: Core, limit: int, protrusion: float | None) -> Matrix | None:
+    """Boxes as grids of balls, cylinders as rows of balls: the best one of at most ``limit`` balls."""
+    half = core.half_sides
+    radius = core.disc
+    if half is not None:
+        counts_xy = ((a, b) for a in range(1, limit + 1) for b in range(1, limit // a + 1))
+        grids = np.array([(a, b, c) for a, b in counts_xy for c in range(1, limit // (a * b) + 1)])
+        cells = half / grids
+        protrusions = np.linalg.norm(cells, axis=1) - cells.min(axis=1)
+        return _grid(half, _chosen(grids, protrusions, protrusion))
+
+    if radius is not None:
+        grids = np.array([(1, 1, k) for k in range(1, limit + 1)])
+        step = core.half_length / grids[:, 2]
+        protrusions = np.hypot(radius, step) - np.minimum(step, radius)
+        return _row(radius, core.half_length, int(_chosen(grids, protrusions, protrusion)[2]))
+
+    return None
+
+
+def _chosen(grids: NDArray[np.int64], protrusions: Vector, protrusion: float | None) -> NDArray[np.int64]:
+    small_enough = np.flatnonzero(protrusions <= protrusion) if protrusion is not None else np.empty(0, dtype=np.int64)
+    if len(small_enough):
+        return np.asarray(grids[small_enough[grids[small_enough].prod(axis=1).argmin()]])
+    return np.asarray(grids[protrusions.argmin()])
+
+
+def _row(radius: float, half_length: float, count: int) -> Matrix:
+    step = half_length / count
+    return row_on_z(spread(half_length - step, count), np.hypot(radius, step) * (1.0 + ROUNDING))
+
+
+def _grid(half_sides: Vector, grid: NDArray[np.int64]) -> Matrix:
+    cell = half_sides / grid
+    axes = [spread(float(h - c), int(n)) for h, c, n in zip(half_sides, cell, grid, strict=True)]
+    centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.column_stack([centres, np.full(len(centres), np.linalg.norm(cell) * (1.0 + ROUNDING))])
+
+
 def _better(geometry: coal.CollisionGeometry, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
     """Whether the first cover is better: it sticks out less or, if both stay within what is required, is smaller."""
     protrusions = [protrusion_bound(geometry, cover) for cover in (first, second)]
@@ -253,3 +328,63 @@ def _round_inner(core: Core, count: int | None) -> Matrix:
         return np.array([[0.0, 0.0, 0.0, radius]])[:count]
     number = min(balls_on_axis(radius, half_length, ROD_PROTRUSION * radius), balls_for(2.0 * (half_length + radius)))
     return row_on_z(spread(half_length, number if count is None else min(count, number)), radius)
+
+
+def inscribed(solid: Solid, surface: cKDTree, count: int) -> Matrix:
+    """At most ``count`` balls in a closed solid, the most useful first, shape (n, 4).
+
+    A ball about a point that is known to be inside reaches at most to the surface. Centres are moved from such points;
+    a move is trusted if the ball at its end holds the point where it began.
+    """
+    inside_points = random_subset(lattice_inside(solid, FEWEST_INSIDE), INNER_CENTRES)
+    if not len(inside_points):
+        return np.empty((0, 4))
+
+    moved, start_depths, moved_depths = _moved_inwards(inside_points, surface)
+    centres = np.concatenate([inside_points, moved])
+    samples: Matrix = np.array(surface.data[:: -(-len(surface.data) // INNER_SAMPLES)])
+    chosen = _greedy_choice(centres, np.concatenate([start_depths, moved_depths]), samples, count)
+
+    radii = solid.distance(centres[chosen]) - ROUNDING
+    start = np.concatenate([inside_points, inside_points])
+    trusted = np.linalg.norm(centres[chosen] - start[chosen], axis=1) < radii
+    return np.asarray(np.column_stack([centres[chosen], radii])[trusted])
+
+
+def _moved_inwards(points: Matrix, surface: cKDTree) -> tuple[Matrix, Vector, Vector]:
+    """Points moved away from the surface that is nearest, while that makes them deeper; depths before and after."""
+    distance, nearest = surface.query(points)
+    centres = points
+    start_depth = distance
+    depth = distance
+    stride = 0.5 * distance
+
+    for _ in range(CLIMBS):
+        inward = (centres - surface.data[nearest]) / np.maximum(depth, 1e-300)[:, None]
+        candidates = centres + stride[:, None] * inward
+        distance, candidate_nearest = surface.query(candidates)
+        deeper = distance > depth
+
+        centres = np.where(deeper[:, None], candidates, centres)
+        depth = np.where(deeper, distance, depth)
+        nearest = np.where(deeper, candidate_nearest, nearest)
+        stride = np.where(deeper, stride, 0.4 * stride)
+
+    return centres, start_depth, depth
+
+
+def _greedy_choice(centres: Matrix, radii: Vector, samples: Matrix, count: int) -> list[int]:
+    """Numbers of the balls of a greedy choice: each time the one that brings the samples nearest to a ball."""
+    gap_to_ball = np.linalg.norm(samples[:, None] - centres, axis=2).astype(np.float32) - radii.astype(np.float32)
+    gap = np.full(len(samples), 2.0 * float(gap_to_ball.max()) + 1.0, dtype=np.float32)
+    chosen: list[int] = []
+
+    while len(chosen) < count:
+        gain = np.maximum(gap[:, None] - gap_to_ball, 0.0).sum(axis=0)
+        best = int(gain.argmax())
+        if gain[best] <= 0.0:
+            break
+        chosen.append(best)
+        gap = np.minimum(gap, gap_to_ball[:, best])
+
+    return chosen

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.bodies import Body, collector_waits
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
-from rrtik_ompl.geometry.collision.collector import collector_waits
 from rrtik_ompl.kernels.layout import CLOUD_SOLID, HALF_SPACE_SOLID
 from rrtik_ompl.kernels.layout import CONVEX_SOLID as IS_CONVEX
 from rrtik_ompl.kernels.proof import layout

@@ -18,8 +18,7 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.shape_table import Core, core_of
-from rrtik_ompl.geometry.collision.solids import of_each, once_per_geometry
-from rrtik_ompl.geometry.covers.planes import known_planes, outer_planes
+from rrtik_ompl.geometry.collision.solids import of_each, once_per_geometry, outer_planes, outward_planes
 from rrtik_ompl.kernels.layout import (
     BALL,
     BALL_RADIUS,
@@ -127,7 +126,7 @@ def primitive_kind(solid: Any) -> int | None:
     if isinstance(solid, coal.Halfspace):
         return HALF_SPACE
     if isinstance(solid, coal.ConvexBase):
-        return None if known_planes(solid) is None else CONVEX
+        return None if outward_planes(solid) is None else CONVEX
     core = core_of(solid)
     if core is None:
         return None
@@ -263,7 +262,7 @@ def _half_space(body: Body, place: int, grow: float, inflation: float) -> Primit
 
 def _convex(body: Body, place: int, grow: float, inflation: float) -> Primitives:
     """A convex solid by its planes; a ball meets the inner primitive if its centre lies behind all of them."""
-    planes = cast(Matrix, known_planes(body.geometry))
+    planes = cast(Matrix, outward_planes(body.geometry))
     rotation, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
     corners = np.array(body.geometry.points()).reshape(-1, 3) @ rotation.T + origin
     low, high = corners.min(axis=0), corners.max(axis=0)

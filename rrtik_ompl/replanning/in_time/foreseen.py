@@ -19,7 +19,7 @@ from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.certificate import distance
-from rrtik_ompl.geometry.collision.extent import farthest
+from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.replanning.feed import ROTATION_NOISE
 from rrtik_ompl.world.moving_world import MovingWorld

@@ -17,12 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, keeps_clearance, kept_apart
 from rrtik_ompl.geometry.collision.certificate import fixed_contact
-from rrtik_ompl.geometry.collision.contacts import measured
 from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest
-from rrtik_ompl.geometry.collision.margins import DISTANCE_TOLERANCE, keeps_clearance, kept_apart
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.kernels.layout import CONVEX_SOLID, HALF_SPACE_SOLID
 from rrtik_ompl.kernels.tables.solid_tables import UNKNOWN, ConvexSolid, convex_solids, placed_solids
 from rrtik_ompl.model.certificate import DEEPEST, VERSION, Certificate, MotionEntries

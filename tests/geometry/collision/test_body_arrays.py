@@ -5,10 +5,9 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.geometry.collision.bodies import by_motion
+from rrtik_ompl.geometry.collision.bodies import by_motion, kept_apart
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.containment import Containment
-from rrtik_ompl.geometry.collision.margins import kept_apart
 from rrtik_ompl.geometry.collision.solids import is_mesh
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids, placed_bodies
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene

@@ -6,8 +6,8 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.geometry.collision.bodies import kept_apart, request
 from rrtik_ompl.geometry.collision.certificate import FEW, RUNS, Boxes, Certificate
-from rrtik_ompl.geometry.collision.margins import kept_apart, request
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from rrtik_ompl.model.transitions import subdivided

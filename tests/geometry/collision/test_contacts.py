@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.solids import bvh
 from rrtik_ompl.model.judgement import Contact
 

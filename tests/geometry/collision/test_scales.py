@@ -8,7 +8,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.geometry.collision import certificate
 from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.geometry.collision.contacts import measured
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.world import exact_checks
 from rrtik_tests.sizes import how_many

@@ -8,7 +8,7 @@ from rrtik_ompl.files import notice
 from rrtik_ompl.files.cache import FOLDER_VARIABLE
 from rrtik_ompl.geometry.collision.bodies import link_bodies
 from rrtik_ompl.geometry.collision.solids import is_mesh, mesh_arrays
-from rrtik_ompl.geometry.covers import cache, shipped
+from rrtik_ompl.geometry.covers import cache
 from rrtik_ompl.geometry.covers.cache import cached_convex_pieces, cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.geometry.covers.spheres import inner_spheres, outer_cover
 from rrtik_ompl.world.world import World
@@ -26,7 +26,7 @@ def test_a_cover_made_anew_is_the_shipped_one():
     meshes = [body.geometry for body in link_bodies(load_robot("ur5")) if is_mesh(body.geometry)]
     smallest = min(meshes, key=lambda mesh: len(mesh_arrays(mesh)[1]))
     for parameters, make in (("outer None", outer_cover), ("inner None", inner_spheres)):
-        stored = shipped.shipped_cover(cache.cover_key(smallest, parameters))
+        stored = cache.shipped_cover(cache.cover_key(smallest, parameters))
         assert stored is not None
         np.testing.assert_array_equal(stored, make(smallest))
 
@@ -34,23 +34,23 @@ def test_a_cover_made_anew_is_the_shipped_one():
 def test_the_store_gives_back_what_was_written_and_is_always_the_same(tmp_path):
     covers = {"ab" * 32: np.arange(8.0).reshape(2, 4), "01" * 32: np.ones((1, 4)), "cd" * 32: np.zeros((0, 4))}
     for name in ("one.npz", "two.npz"):
-        shipped.write_store(covers, tmp_path / name)
+        cache.write_store(covers, tmp_path / name)
         covers = dict(reversed(covers.items()))
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
-    assert shipped._stored(tmp_path / "one.npz").keys() == covers.keys()
-    assert all(np.array_equal(shipped.shipped_cover(key, tmp_path / "one.npz"), covers[key]) for key in covers)
+    assert cache._stored(tmp_path / "one.npz").keys() == covers.keys()
+    assert all(np.array_equal(cache.shipped_cover(key, tmp_path / "one.npz"), covers[key]) for key in covers)
 
 
 def test_a_missing_or_damaged_store_is_an_empty_one(tmp_path):
-    (tmp_path / "cut.npz").write_bytes(shipped.STORE.read_bytes()[:1000])
-    assert shipped._stored(tmp_path / "cut.npz") == shipped._stored(tmp_path / "absent.npz") == {}
+    (tmp_path / "cut.npz").write_bytes(cache.STORE.read_bytes()[:1000])
+    assert cache._stored(tmp_path / "cut.npz") == cache._stored(tmp_path / "absent.npz") == {}
     keys = np.zeros((1, 32), dtype=np.uint8)
     np.savez(tmp_path / "spoilt.npz", keys=keys, ends=np.array([3]), packed=np.zeros(3, dtype=np.uint8))
-    assert shipped.shipped_cover("00" * 32, tmp_path / "spoilt.npz") is None
+    assert cache.shipped_cover("00" * 32, tmp_path / "spoilt.npz") is None
 
 
 def test_the_store_is_small():
-    assert shipped.STORE.stat().st_size < 2e6
+    assert cache.STORE.stat().st_size < 2e6
 
 
 def test_a_new_mesh_is_told_once(tmp_path, monkeypatch):
