@@ -16,6 +16,7 @@ import pinocchio as pin
 import tornado.websocket
 
 from bench.pilot.scene import NAME, PLACE, ROBOT, seen_at
+from rrtik_bench.sensing.synthetic_camera import published_camera
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box
@@ -26,7 +27,6 @@ from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_ompl.sensing.cameras.pictures import Picture
-from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
 
 PICTURES, SWAY = 30, 0.03  # of the object that moves; [m]
 QUIET = 4.0  # [s] without a click, in which states are counted

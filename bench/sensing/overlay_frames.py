@@ -13,6 +13,7 @@ import numpy as np
 from bench.shared.problems import goal_joints
 from bench.shared.reference_z_buffer import ROUNDING, reference_z_buffer
 from rrtik_bench.report.page import Report
+from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl import load_problem, load_robot
 from rrtik_ompl.pilot.devices.simulated_vehicle import find_vehicle, load_vehicle
 from rrtik_ompl.pilot.overlay.augment import Augmenter, Ghost
@@ -20,7 +21,6 @@ from rrtik_ompl.pilot.overlay.rasterizer import FARTHEST_DRAWN, Canvas, figure_o
 from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
-from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.sensor import Sensor
 

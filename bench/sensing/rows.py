@@ -21,11 +21,11 @@ from rrtik_bench.sensing.runs import (
     random_poses,
     seen_poses,
 )
+from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl import load_robot
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
-from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import objects_in_base

@@ -16,9 +16,9 @@ from bench.sensing.stress_pictures import SIDE, Trouble, facing, taken
 from bench.shared.parts import Parts
 from bench.shared.run import Run
 from rrtik_bench.report.page import Report
+from rrtik_bench.sensing.synthetic_camera import PUBLISHED_MATRIX
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.cameras.synthetic_camera import PUBLISHED_MATRIX
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.sight import Sighting, detect_objects
 

@@ -1,7 +1,7 @@
 """Pictures of printed markers under everything that goes wrong with a camera, with the true pose.
 
-This renderer shares nothing with `sensing.cameras.synthetic_camera`: rays are traced to a sheet that may be bent, light
-falls on it, the lens blurs light, and the sensor codes it by sRGB's curve (IEC 61966-2-1). 25 rays a photosite.
+This renderer shares nothing with `rrtik_bench.sensing.synthetic_camera`: rays are traced to a sheet that may be bent,
+light falls on it, the lens blurs light, and the sensor codes it by sRGB's curve (IEC 61966-2-1). 25 rays a photosite.
 """
 
 from __future__ import annotations

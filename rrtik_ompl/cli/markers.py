@@ -224,7 +224,7 @@ def sense(
         save_scene(view.scene(), scene)
     if task is not None:
         from rrtik_ompl import load_problem, save_problem
-        from rrtik_ompl.sensing.problem_from_view import grasp_problem
+        from rrtik_ompl.sensing.scene_from_view import grasp_problem
 
         save_problem(grasp_problem(load_problem(str(problem)), view.usable(), *goal), task)
     return FOUND

@@ -15,7 +15,7 @@ from rrtik_ompl.pilot.interlock import STALE_SECONDS
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
-from rrtik_ompl.sensing.frames import base_from_camera, tip_seen
+from rrtik_ompl.sensing.scene_from_view import base_from_camera, tip_seen
 from rrtik_ompl.sensing.sensor import Sensor, View
 
 REPEATS = "the camera repeats its last picture"

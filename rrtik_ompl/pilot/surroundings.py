@@ -16,8 +16,7 @@ from rrtik_ompl.base.poses import apart
 from rrtik_ompl.geometry.collision.bodies import deepest_contact
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, Touching
-from rrtik_ompl.sensing.problem_from_view import scene_with
-from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.sensing.scene_from_view import SeenObject, scene_with
 from rrtik_ompl.tasks.contact_life import (
     DEEPER,
     Nearness,

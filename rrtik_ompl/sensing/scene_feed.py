@@ -9,7 +9,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.replanning.feed import Snapshot
 from rrtik_ompl.sensing.cameras.pictures import Picture
-from rrtik_ompl.sensing.problem_from_view import scene_with
+from rrtik_ompl.sensing.scene_from_view import scene_with
 from rrtik_ompl.sensing.sensor import Sensor
 
 REMEDY = "show every object of the marker map, or give the scene that holds it"

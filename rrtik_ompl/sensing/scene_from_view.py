@@ -1,8 +1,13 @@
-"""Detected objects become obstacles and goals: a scene in the frame of the arm's base, from one picture or several."""
+"""Detected objects in the frame of the arm's base: their solids as a scene, the approach to a grasp as the goal.
+
+Source: [1, ch. 4]: ``T_camera_tip = T_camera_mount T_mount_base T_base_tip(q)``. Where the base is known from its mount
+(the camera moves with the arm), only the pose of the target is noisy; with a marker on the base, that of the arm too.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -11,14 +16,15 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, finite_array, frozen
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.base.poses import pose, rigid
 from rrtik_ompl.geometry.collision.shape_table import farthest
+from rrtik_ompl.model.goal import PoseGoal
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import HalfSpace
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.frames import base_from_camera, place_in_base
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 from rrtik_ompl.sensing.sight import Sighting, detect_objects
+from rrtik_ompl.world.problem import Problem
 
 SIGMAS = 3.0  # standard deviations of an obstacle's position that its margin covers
 
@@ -125,6 +131,99 @@ def scene_from_image(
     """
     seen = objects_in_base(detect_objects(picture, camera, marker_map), marker_map, sigmas=sigmas)
     return Scene(tuple(solid for each in seen for solid in each.solids()))
+
+
+def scene_with(scene: Scene, solids: Iterable[Obstacle]) -> Scene:
+    """A scene with more solids, which take the place of those of the same names."""
+    more = tuple(solids)
+    names = {solid.name for solid in more}
+    other_obstacles = tuple(obstacle for obstacle in scene.obstacles if obstacle.name not in names)
+    return replace(scene, obstacles=(*other_obstacles, *more))
+
+
+def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind: str, level: int) -> Problem:
+    """From the start of a problem to where the approach to a grasp of a seen object begins.
+
+    From there the tip goes straight along its own z axis, by the ``approach`` of the grasp type; that is not part of
+    the problem, so nothing may touch the object along the path. Solids of detected objects have their margins.
+
+    Args:
+        problem: Its robot, start and scene are kept.
+        seen: Objects in the frame of the base.
+        name: Of the object to be grasped.
+        kind: Grasp type.
+        level: From 1.
+
+    Raises:
+        InputError: If the object was not seen, or has no such grasp.
+        ProblemError: If the start touches something.
+    """
+    objects = tuple(seen)
+    target = next((object_seen for object_seen in objects if object_seen.object.name == name), None)
+    if target is None:
+        names = ", ".join(object_seen.object.name for object_seen in objects) or "nothing"
+        raise InputError(f"object '{name}' was not seen; {names} was")
+
+    levels = len(target.object.grasp(kind).levels)
+    if not 1 <= level <= levels:
+        raise InputError(f"grasp type '{kind}' of '{name}' has levels 1 to {levels}, not {level}")
+
+    solids = [solid for object_seen in objects for solid in object_seen.solids()]
+    scene = scene_with(problem.world.scene, solids)
+    world = problem.world.with_accuracy("exact").with_scene(scene)
+
+    approach_pose = target.grasp_pose(kind, level - 1) * pose([0.0, 0.0, -target.object.grasp(kind).approach])
+    return Problem(world, problem.start, PoseGoal(approach_pose), name=f"{name}_{kind}_{level}")
+
+
+class NoBaseError(InputError):
+    """The base of the arm is not in view, so that nothing can be said in its frame."""
+
+
+def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> tuple[pin.SE3, Matrix]:
+    """``T_base_camera`` and the covariance of the base's pose in the frame of the camera.
+
+    Raises:
+        NoBaseError: If the base has markers and none of them is in view, or its pose is refused.
+    """
+    if marker_map.T_base_camera is not None:
+        return marker_map.T_base_camera, np.zeros((6, 6))
+
+    name = marker_map.base.name if marker_map.base is not None else "base"
+    for each in sightings:
+        if each.object.role == "base":
+            if each.refused:
+                raise NoBaseError(f"base '{name}': {each.refused}")
+            return each.pose.T_camera_object.inverse(), each.pose.covariance
+    raise NoBaseError(f"no marker of the base '{name}' is in view; turn the camera, or say camera_pose in the map")
+
+
+def tip_seen(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> tuple[pin.SE3, Matrix] | None:
+    """``T_base_tip`` and its covariance by a marker on the arm; None without one in view, or without the base."""
+    try:
+        T_base_camera, spread = base_from_camera(marker_map, sightings)
+    except NoBaseError:
+        return None
+    seen = next((each for each in sightings if each.object.role == "arm" and not each.refused), None)
+    return None if seen is None else place_in_base(T_base_camera, spread, seen)
+
+
+def place_in_base(T_base_camera: pin.SE3, base_covariance: Matrix, sight: Sighting) -> tuple[pin.SE3, Matrix]:
+    """``T_base_object`` and its covariance: position [m] and small rotation [rad] in the axes of the base, (6, 6).
+
+    The error of the base's rotation counts with the distance between base and object as its lever arm.
+    """
+    pose = T_base_camera * sight.pose.T_camera_object
+    turn = T_base_camera.rotation
+
+    T_camera_base = T_base_camera.inverse()
+    arm = sight.pose.T_camera_object.translation - T_camera_base.translation
+    lever = np.eye(6)
+    lever[:3, 3:] = -pin.skew(arm)
+    spread = sight.pose.covariance + lever @ base_covariance @ lever.T
+
+    axes = np.kron(np.eye(2), turn)
+    return pose, axes @ spread @ axes.T
 
 
 def checked_sigmas(value: float) -> float:

@@ -18,11 +18,11 @@ from rrtik_ompl.sensing.markers.corner_pose import (
     ALIGNED_SIGMA,
     ROUGH_SIGMA,
     CornerPose,
+    lens_bend,
     pose_of_points,
     pose_of_square,
 )
 from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers
-from rrtik_ompl.sensing.markers.lens_bend import lens_bend
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 
 MIN_SIDE_PIXELS = 12.0  # two a cell of the coarsest dictionaries

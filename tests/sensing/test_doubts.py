@@ -4,10 +4,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl.sensing.markers import sheets
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers, marker_cells

@@ -4,15 +4,15 @@ import cv2
 import numpy as np
 import pytest
 
+from rrtik_bench.sensing.synthetic_camera import Print, clean_picture, marker_print, photograph
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.calibration import calibrate
 from rrtik_ompl.sensing.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, marker_print, photograph
-from rrtik_ompl.sensing.cameras.tone import coded
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square
 from rrtik_ompl.sensing.markers.detection import charuco_board, dictionary_of, find_markers, marker_cells
+from rrtik_ompl.sensing.markers.lighting import coded
 from rrtik_tests.marker_views import CAMERA, SIDE, facing
 
 ROS = """\

@@ -4,11 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
+from rrtik_bench.sensing.synthetic_camera import Print, clean_picture, photograph
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.calibration import calibrate
 from rrtik_ompl.sensing.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.pictures import pictures_from, read_picture
-from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, photograph
 from rrtik_ompl.sensing.markers.detection import charuco_board, find_markers
 from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
 from rrtik_ompl.sensing.markers.sheets import print_board, print_markers

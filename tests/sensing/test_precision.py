@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rrtik_bench.sensing.precision import Series, series_of
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.sensing.precision import Series, series_of
 
 
 def test_statistics_reproduce_the_published_ones():

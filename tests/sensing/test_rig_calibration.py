@@ -5,9 +5,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from rrtik_bench.sensing.synthetic_camera import Print, clean_picture, photograph
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose_from_rpy
-from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, photograph
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.detection import charuco_board
 from rrtik_ompl.sensing.rig_calibration import calibrate_rig

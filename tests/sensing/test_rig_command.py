@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.sensing.camera_file import save_camera
-from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_tests.command_line import rrtik

@@ -6,10 +6,15 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose
-from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera, place_in_base
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
-from rrtik_ompl.sensing.scene_from_view import objects_in_base, scene_from_image
+from rrtik_ompl.sensing.scene_from_view import (
+    NoBaseError,
+    base_from_camera,
+    objects_in_base,
+    place_in_base,
+    scene_from_image,
+)
 from rrtik_ompl.sensing.sight import detect_objects
 from rrtik_tests.marker_views import BOX, CAMERA, SIDE, STAND, T_BOX_MARKERS, facing, picture_of
 

@@ -7,11 +7,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose, pose_from_rpy
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pan_tilt_zoom import Encoder, PanTiltZoom
-from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker

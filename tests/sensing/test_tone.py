@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrtik_ompl.sensing.cameras.synthetic_camera import Print, clean_picture, marker_print, published_camera
-from rrtik_ompl.sensing.cameras.tone import coded, light_of
-from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
+from rrtik_bench.sensing.synthetic_camera import Print, clean_picture, marker_print, published_camera
+from rrtik_ompl.sensing.markers.corner_pose import lens_bend, pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.detection import find_markers, marker_cells
-from rrtik_ompl.sensing.markers.lens_bend import lens_bend
+from rrtik_ompl.sensing.markers.lighting import coded, light_of
 from rrtik_tests.marker_views import SIDE, facing
 
 CAMERA = published_camera()

@@ -18,8 +18,8 @@ from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.ik.singularity import singularity_report
 from rrtik_ompl.pilot.overlay.virtual_camera import pinhole_camera
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError
-from rrtik_ompl.sensing.frames import NoBaseError
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
+from rrtik_ompl.sensing.scene_from_view import NoBaseError
 from rrtik_ompl.world.certificates.write import certificate_of
 
 AT = rrtik.pose([0.1, 0.2, 0.3])

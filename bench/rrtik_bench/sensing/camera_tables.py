@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from rrtik_bench.report.rows import Bar, Row, about, judged, within
+from rrtik_bench.sensing.precision import NORMAL_QUARTILES, series_of
 from rrtik_bench.sensing.tables import ACCURACY, GRIPPER, SERIES, SOURCE
 from rrtik_bench.tables import Table
-from rrtik_ompl.sensing.precision import NORMAL_QUARTILES, series_of
 
 TIMES_STEADIER = 3.0  # wanted of the depth of a marker; of a gripper only that it is not less steady
 CHANCE = 3.0  # factor between poses of one series; theirs is not known
@@ -55,7 +55,7 @@ def gripper(quick: bool) -> list[Row]:
 def accuracy(quick: bool) -> list[Row]:
     """Two markers 300 mm apart, the lens known or taken to be without distortion."""
     from rrtik_bench.sensing.runs import CAMERA, PLAIN, pair_at, pair_distances, seen_poses
-    from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
+    from rrtik_bench.sensing.synthetic_camera import published_camera
 
     count, rows = 10 if quick else 100, []
     for distance, _, _, printed in ACCURACY:

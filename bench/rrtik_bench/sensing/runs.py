@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.markers.corner_pose import (
     ALIGNED_SIGMA,
     ROUGH_SIGMA,

@@ -6,9 +6,9 @@ import numpy as np
 
 from rrtik_bench.report.rows import Bar, Row, judged
 from rrtik_bench.sensing.runs import CAMERA, SIDE, in_view, pair_at
+from rrtik_bench.sensing.synthetic_camera import published_camera
 from rrtik_bench.sensing.tables import ACCURACY, SOURCE
 from rrtik_bench.tables import Table
-from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
 from rrtik_ompl.sensing.markers.corner_pose import ALIGNED_SIGMA, pose_of_square, square_corners
 
 APART = (125, 300, 400, 500)  # [mm]

@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_bench.report.rows import Bar, Row, about, judged, within
+from rrtik_bench.sensing.precision import NORMAL_QUARTILES
 from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.sensing.precision import NORMAL_QUARTILES
 
 SOURCE = "[1, ch. 4]"
 COUNT = 100  # observations of a series

@@ -59,11 +59,6 @@ class Grid:
     size: Vector
     shape: Shape
 
-    @property
-    def corner_count(self) -> int:
-        """Number of corners."""
-        return int(np.prod(np.array(self.shape) + 1))
-
     def corners(self) -> Matrix:
         """All corners in the solid's frame, shape (k, 3)."""
         number = np.indices((self.shape[0] + 1, self.shape[1] + 1, self.shape[2] + 1))

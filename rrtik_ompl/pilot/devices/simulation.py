@@ -1,7 +1,7 @@
 """The cameras of a simulated vehicle, and how it moves: pictures of marked objects, surroundings and the arm.
 
 Pictures are made at the rate of a camera: solids by the rasteriser, markers as images warped into their plane.
-For measurements of the markers themselves use `sensing.synthetic_camera`, which is exact and slow.
+For measurements of the markers themselves use `rrtik_bench.sensing.synthetic_camera`, which is exact and slow.
 """
 
 from __future__ import annotations

@@ -17,8 +17,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.overlay.augment import Augmenter, Ghost
 from rrtik_ompl.sensing.cameras.pictures import Picture, quiet
-from rrtik_ompl.sensing.frames import NoBaseError, base_from_camera
-from rrtik_ompl.sensing.scene_from_view import SeenObject
+from rrtik_ompl.sensing.scene_from_view import NoBaseError, SeenObject, base_from_camera
 from rrtik_ompl.sensing.sensor import Sensor
 
 FILMS = {".mp4": "mp4v", ".avi": "MJPG"}

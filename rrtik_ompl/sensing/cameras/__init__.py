@@ -1,1 +1,1 @@
-"""Cameras: the pinhole model, a head that pans and tilts, files of others, tone, pictures, and a synthetic camera."""
+"""Cameras: the pinhole model, a head that pans and tilts, and where pictures come from."""

@@ -28,7 +28,7 @@ class Camera:
         height: Of the picture, in pixels.
         sigmas: Standard deviations of fx, fy, cx, cy [pixels] and of the five numbers of the lens: what the
             calibration is not sure of, 0 where it says nothing. Shape (9,).
-        tone: How it codes light as grey values (`cameras.tone`); None: estimated for each marker.
+        tone: How it codes light as grey values (`markers.lighting`); None: estimated for each marker.
     """
 
     matrix: Matrix

@@ -4,7 +4,7 @@ The criterion is the enhanced correlation coefficient of Evangelidis and Psaraki
 with brightness and contrast; the motion is a homography. Four corners alone are pulled inwards by blur, by as much
 as 0.2 pixels; all edges of all cells together are not, if the ideal marker is blurred as the picture is: as much, and
 evenly in the picture, so unevenly on a marker that is tilted. Blur is blur of light: the ideal marker is blurred first,
-and then shown by the tone curve, and cut off where white is, with which it is most like the picture (`cameras.tone`).
+and then shown by the tone curve, and cut off where white is, with which it is most like the picture (`lighting`).
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.sensing.cameras.tone import LINEAR, SRGB, TONES
 from rrtik_ompl.sensing.markers.corner_spread import corner_spread
-from rrtik_ompl.sensing.markers.lighting import likenesses, shown
+from rrtik_ompl.sensing.markers.lighting import LINEAR, SRGB, TONES, likenesses, shown
 
 Pixels = NDArray[np.float32]
 
@@ -44,7 +43,7 @@ class Look(NamedTuple):
 
     Attributes:
         spot: Standard deviation of its blur [pixels].
-        tone: Of the picture (`cameras.tone`).
+        tone: Of the picture (`markers.lighting`).
         likeness: Of the marker when both were estimated.
     """
 

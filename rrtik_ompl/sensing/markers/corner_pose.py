@@ -4,6 +4,8 @@ A single square seen almost from the front has two poses that explain its pictur
 2014 [51]): both are kept. Where perspective is strong, or by chance, only one of the two is a minimum of the
 error: then the second one is that of the closed form, for a long valley may lead from there to the minimum, with the
 true pose somewhere in it. Covariance: first-order propagation of the error of a corner.
+
+A homography keeps straight lines straight, a lens does not: corners that were aligned by one are mended by `lens_bend`.
 """
 
 from __future__ import annotations
@@ -26,6 +28,9 @@ MAX_SURPRISE = 6.0  # squared deviations that chance makes of a square; what exc
 MAX_DISTANCE = 1e4  # [m]
 MIN_BRANCH_ANGLE = 1e-3  # [rad]: minima that are nearer to each other are one; distinct ones are 0.03 apart and more
 _MAX_STEPS = 40
+_PLACES = 9  # in a row, on the marker and its rim, at which the lens is looked at
+_OF_HOMOGRAPHIES = 8  # of the motions that are fitted; the others are the bends that alignment fits, too
+_RIM = 1.1  # of the marker's side, with its rim
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,6 +151,55 @@ def pose_of_points(
     return CornerPose(
         best, None, error, np.inf, covariance, surprise, _strain(camera, points, pixels, best, covariances)
     )
+
+
+def lens_bend(camera: Camera, corners: Matrix, side: float) -> Matrix:
+    """How far the corners of an aligned marker lie off, because the lens is not a homography [pixels]. Shape (4, 2).
+
+    Alignment fits bends along with the homography (`corner_spread`), so that of the lens the homography's part is left.
+
+    Args:
+        camera: Of the picture.
+        corners: Of the marker, shape (4, 2) [pixels].
+        side: Of the marker [m].
+    """
+    if not camera.distortion.any():
+        return np.zeros((4, 2))
+
+    at = pose_of_square(camera, corners, side).T_camera_object
+    row = 0.5 * _RIM * side * np.linspace(-1.0, 1.0, _PLACES)
+    x, y = (each.ravel() for each in np.meshgrid(row, row))
+    flat = np.c_[x, y]
+
+    square = square_corners(side)
+    pixels = camera.project(np.c_[flat, np.zeros(len(flat))] @ at.rotation.T + at.translation)
+
+    homography, _ = cv2.findHomography(flat, pixels, 0)
+    back = cv2.perspectiveTransform(np.ascontiguousarray(pixels)[:, None], np.linalg.inv(homography))[:, 0]
+
+    # What the lens adds to a homography, as small motions on the marker.
+    scale = 0.5 * side
+    shift, *_ = np.linalg.lstsq(np.vstack(_motions(flat / scale)), (back - flat).T.ravel(), rcond=None)
+
+    # Alignment takes the bends among them for bends, and only the others move its corners.
+    on_marker = square[:, :2] / scale
+    moved = square[:, :2] + np.stack([part[:, :_OF_HOMOGRAPHIES] @ shift[:_OF_HOMOGRAPHIES]
+                                      for part in _motions(on_marker)], axis=1)  # fmt: skip
+
+    straight = cv2.perspectiveTransform(moved[:, None].copy(), homography)[:, 0]
+    return np.asarray(straight - camera.project(square @ at.rotation.T + at.translation), dtype=np.float64)
+
+
+def _motions(places: Matrix) -> tuple[Matrix, Matrix]:
+    """Small motions of a plane, x and y by themselves: those of homographies, then four bends. Shapes (m, 12)."""
+    u, v = places.T
+    none = np.zeros(len(u))
+    one = np.ones(len(u))
+
+    along = [one, u, v, none, none, none, u * u, u * v, v * v, none, u * u, u * v]
+    across = [none, none, none, one, u, v, u * v, v * v, none, u * u, -u * v, -v * v]
+
+    return np.stack(along, axis=1), np.stack(across, axis=1)
 
 
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:

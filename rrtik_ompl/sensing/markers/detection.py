@@ -95,7 +95,7 @@ def find_markers(
         gray: Shape (height, width).
         dictionary: One of `DICTIONARIES`.
         align: Align the ideal marker with the picture (`aligned_corners`); else corners are those of the detector.
-        tone: Of the picture (`cameras.tone`); None: for each marker the one with which it fits best.
+        tone: Of the picture (`markers.lighting`); None: for each marker the one with which it fits best.
         before: Those of the picture before, of a film: they are aligned faster.
         near: Search only where those were, unless one of them is not there any more; and where nothing is found,
             not for what is blurred most, which costs as much again.

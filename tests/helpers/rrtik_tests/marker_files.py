@@ -1,6 +1,6 @@
 """A marker map with a stand and a valve, and the camera that sees them."""
 
-from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
+from rrtik_bench.sensing.synthetic_camera import published_camera
 
 CAMERA = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.0))
 MAP = """version: 1

@@ -3,10 +3,10 @@
 import numpy as np
 import pinocchio as pin
 
+from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box
-from rrtik_ompl.sensing.cameras.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MountedMarker
 

@@ -6,6 +6,7 @@ import pinocchio as pin
 import pytest
 
 from bench.shared.reference_z_buffer import reference_z_buffer
+from rrtik_bench.sensing.synthetic_camera import published_camera
 from rrtik_ompl import load_robot
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose
@@ -23,7 +24,6 @@ from rrtik_ompl.pilot.overlay.rasterizer import (
     surface_of_shape,
 )
 from rrtik_ompl.pilot.overlay.virtual_camera import background, orbit_pose, pinhole_camera
-from rrtik_ompl.sensing.cameras.synthetic_camera import published_camera
 
 CAMERA = published_camera()
 BENT = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.03))
